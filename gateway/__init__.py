@@ -1,0 +1,1 @@
+"""Springscale: weighs a vehicle by listening to its springs."""

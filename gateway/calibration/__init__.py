@@ -1,0 +1,1 @@
+"""From known-load drives to a vehicle calibration file."""

@@ -1,0 +1,1 @@
+"""Pure estimation: arrays in, numbers out. No clock, no files, no bus."""

@@ -1,0 +1,41 @@
+"""The errors a person may meet. Each message says what is wrong, where, and how to mend it."""
+
+
+class SpringscaleError(Exception):
+    """The work failed; the command line prints the message alone and exits with 1."""
+
+    exit_code = 1
+
+
+class ConfigurationError(SpringscaleError):
+    """A file or an option that a person wrote cannot be used; exits with 2."""
+
+    exit_code = 2
+
+
+class SignalMapError(ConfigurationError):
+    """A signal map and its DBC files do not fit together."""
+
+
+class CampaignError(ConfigurationError):
+    """A campaign file cannot be used as it stands."""
+
+
+class CalibrationFileError(ConfigurationError):
+    """A calibration file is missing, damaged, of another version or of another vehicle."""
+
+
+class CalibrationImpossible(SpringscaleError):
+    """The known-load drives do not carry enough to calibrate from."""
+
+
+class LogUnreadable(SpringscaleError):
+    """A log holds no frame that can be read."""
+
+
+class BusError(SpringscaleError):
+    """A CAN interface cannot be opened at all (wrong name, missing driver)."""
+
+
+class StoreError(SpringscaleError):
+    """The database cannot be used (newer schema, another program's file)."""

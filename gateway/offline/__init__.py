@@ -1,0 +1,1 @@
+"""The same pipeline without clock or network: logs in, batches and estimates out."""

@@ -1,0 +1,1 @@
+"""A test bench of our own: road, vehicle, sensors, drives. Shares no model with core."""

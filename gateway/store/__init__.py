@@ -1,0 +1,1 @@
+"""Estimates and events on disk (SQLite)."""

@@ -1,0 +1,54 @@
+"""The one border where foreign units become SI."""
+
+import math
+from typing import Final
+
+from gateway.errors import SignalMapError
+
+STANDARD_GRAVITY_MPS2: Final = 9.80665  # CGPM 1901
+
+NS_PER_S: Final = 1_000_000_000
+
+_TO_SI: Final[dict[str, dict[str, float]]] = {
+    "acceleration": {
+        "m/s^2": 1.0,
+        "m/s2": 1.0,
+        "m/s²": 1.0,
+        "m/s/s": 1.0,
+        "g": STANDARD_GRAVITY_MPS2,
+        "mg": STANDARD_GRAVITY_MPS2 / 1000.0,
+    },
+    "angular_rate": {
+        "rad/s": 1.0,
+        "deg/s": math.pi / 180.0,
+        "°/s": math.pi / 180.0,
+        "dps": math.pi / 180.0,
+        "mrad/s": 1e-3,
+    },
+    "speed": {
+        "m/s": 1.0,
+        "km/h": 1.0 / 3.6,
+        "kph": 1.0 / 3.6,
+        "kmh": 1.0 / 3.6,
+        "mph": 0.44704,
+        "kn": 1852.0 / 3600.0,
+        "knots": 1852.0 / 3600.0,
+    },
+    "mass": {"kg": 1.0, "t": 1000.0},
+    "temperature": {"degc": 1.0, "°c": 1.0, "deg c": 1.0, "c": 1.0},
+    "state": {"": 1.0, "1": 1.0, "bit": 1.0},
+}
+
+
+def si_factor(quantity: str, unit: str | None) -> float:
+    """Factor that turns a number in ``unit`` into the SI unit of ``quantity``.
+
+    ``quantity`` is one of acceleration (m/s2), angular_rate (rad/s), speed (m/s), mass (kg),
+    temperature (degC) or state (1). Raises SignalMapError for a unit that is missing or unknown.
+    """
+    known = _TO_SI[quantity]
+    key = (unit or "").strip().lower()
+    if key in known:
+        return known[key]
+    said = f"unit {unit!r} is not known" if key else "the DBC gives no unit"
+    raise SignalMapError(f"{said} for a {quantity} signal: set unit = one of {', '.join(u for u in known if u)}")
