@@ -25,11 +25,11 @@ class CalibrationFileError(ConfigurationError):
     """A calibration file is missing, damaged, of another version or of another vehicle."""
 
 
-class CalibrationImpossible(SpringscaleError):
+class CalibrationImpossibleError(SpringscaleError):
     """The known-load drives do not carry enough to calibrate from."""
 
 
-class LogUnreadable(SpringscaleError):
+class LogUnreadableError(SpringscaleError):
     """A log holds no frame that can be read."""
 
 

@@ -1,0 +1,1 @@
+"""Our own CAN databases and signal maps, for devices that people can buy."""
