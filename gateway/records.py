@@ -53,6 +53,7 @@ class Why(StrEnum):
     SPEED_MISSING = "speed_missing"
     SPEED_FROZEN = "speed_frozen"
     SPEED_SPREAD = "speed_spread"
+    SPEED_UNCALIBRATED = "speed_uncalibrated"
     ACCELERATION_MISSING = "acceleration_missing"
     ACCELERATION_STUCK = "acceleration_stuck"
     ACCELERATION_SATURATED = "acceleration_saturated"

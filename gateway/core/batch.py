@@ -1,0 +1,199 @@
+"""One window of decoded samples -> one Batch on a uniform grid, gated. A pure function of its rows."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gateway.core.settings import BatchSettings
+from gateway.core.timeline import onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
+from gateway.records import F64, I64, Batch, Bool, Motion, SensorTraits, Signal, Why
+from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
+
+GRAVITY_TOLERANCE_MPS2 = 2.0  # allows a mount tilted by 37 degrees, not a missing or turned axis
+RATE_MIN_SHARE = 0.8  # a sensor slower than this share of the grid's rate cannot fill it
+REASON_SHARE_MIN = 0.1  # a cause that masked at least this much of a refused window is named
+SATURATION_HALO_S = 0.1
+
+Traits = Mapping[Signal, SensorTraits]
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Which stretch of a drive a batch covers, and how it came to end."""
+
+    t_start_ns: int
+    t_end_ns: int
+    drive_start_ns: int
+    ended_by: Why | None = None
+    is_provisional: bool = False
+
+
+def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: Traits) -> Batch:
+    """Rows of one window -> Batch. Only rows within [t_start, t_end) count; their order does not matter."""
+    n = round((window.t_end_ns - window.t_start_ns) * settings.rate_hz / NS_PER_S)
+    inside = (rows.t_ns >= window.t_start_ns) & (rows.t_ns < window.t_end_ns)
+    rows = Motion(rows.signals, rows.t_ns[inside], rows.columns[inside])
+    acceleration, acceleration_causes = _sensor(rows, Signal.VERTICAL_ACCELERATION, window, n, settings, traits)
+    pitch_rate, pitch_rate_causes = _sensor(rows, Signal.PITCH_RATE, window, n, settings, traits)
+    speed, frozen = _speed(rows, window, n, settings, traits)
+    causes = _merge_missing(acceleration_causes | pitch_rate_causes) | _speed_causes(speed, frozen, settings)
+    usable = np.ones(n, bool)
+    for masked in causes.values():
+        usable &= ~masked
+    gravity = _mean(acceleration, usable)
+    shares = {why: float(np.mean(masked)) for why, masked in causes.items() if masked.any()}
+    return Batch(
+        t_start_ns=window.t_start_ns,
+        t_end_ns=window.t_end_ns,
+        drive_start_ns=window.drive_start_ns,
+        rate_hz=settings.rate_hz,
+        vertical_acceleration_mps2=acceleration - gravity,
+        pitch_rate_radps=pitch_rate,
+        speed_mps=speed,
+        usable=usable,
+        gravity_mps2=gravity,
+        gap_share=_gap_share(shares),
+        shares=shares,
+        longest_stop_s=_longest_run(speed < settings.standstill_speed_mps) / settings.rate_hz,
+        rejected=_reasons(rows, window, n, usable, gravity, shares, settings),
+        is_provisional=window.is_provisional,
+        longitudinal_acceleration_mps2=_optional(rows, window, n, settings),
+    )
+
+
+_NAMES = {
+    Signal.VERTICAL_ACCELERATION: (Why.ACCELERATION_MISSING, Why.ACCELERATION_STUCK, Why.ACCELERATION_SATURATED),
+    Signal.PITCH_RATE: (Why.PITCH_RATE_MISSING, Why.PITCH_RATE_STUCK, Why.PITCH_RATE_SATURATED),
+}
+_MISSING = (Why.GAP, Why.ACCELERATION_MISSING, Why.PITCH_RATE_MISSING)
+
+
+def _sensor(
+    rows: Motion, signal: Signal, window: Window, n: int, settings: BatchSettings, traits: Traits
+) -> tuple[F64, dict[Why, Bool]]:
+    """One inertial sensor on the grid, and where each cause says it cannot be used."""
+    if signal not in rows.signals:
+        return np.full(n, np.nan), {}
+    missing, stuck, saturated = _NAMES[signal]
+    trait = traits.get(signal, SensorTraits())
+    t_ns, x = sort_by_time(*rows.of(signal))
+    t_ns = t_ns - round(trait.latency_s * NS_PER_S)
+    on_grid = onto_grid(t_ns, x, window.t_start_ns, n, settings.rate_hz, settings.gap_s)
+    stuck_ns = settings.stuck_s * NS_PER_S
+    return on_grid, {
+        missing: np.isnan(on_grid),
+        stuck: _spans_onto_grid(_constant_runs(t_ns, x, stuck_ns), window, n, settings.rate_hz),
+        saturated: _spans_onto_grid(_saturated_spans(t_ns, x, trait), window, n, settings.rate_hz),
+    }
+
+
+def _constant_runs(t_ns: I64, x: F64, at_least_ns: float) -> I64:
+    """(k, 2) first and last time of every run of bit-identical samples that lasts ``at_least_ns``."""
+    if not len(x):
+        return np.empty((0, 2), np.int64)
+    starts = np.flatnonzero(np.r_[True, x[1:] != x[:-1]])
+    ends = np.r_[starts[1:], len(x)] - 1
+    long = t_ns[ends] - t_ns[starts] >= at_least_ns
+    return np.column_stack([t_ns[starts[long]], t_ns[ends[long]]])
+
+
+def _saturated_spans(t_ns: I64, x: F64, trait: SensorTraits) -> I64:
+    """(k, 2) a tenth of a second either side of each sample at the end of the sensor's range."""
+    step = trait.resolution if np.isfinite(trait.resolution) else 0.0
+    at_end = (x >= trait.maximum - 0.5 * step) | (x <= trait.minimum + 0.5 * step)  # False where NaN
+    halo_ns = round(SATURATION_HALO_S * NS_PER_S)
+    return np.column_stack([t_ns[at_end] - halo_ns, t_ns[at_end] + halo_ns])
+
+
+def _spans_onto_grid(spans_ns: I64, window: Window, n: int, rate_hz: float) -> Bool:
+    """True on the grid points that any span (k, 2) covers."""
+    edges = np.zeros(n + 1, np.int64)
+    bounds = np.clip(np.rint((spans_ns - window.t_start_ns) * rate_hz / NS_PER_S), 0, n).astype(np.int64)
+    np.add.at(edges, bounds[:, 0], 1)
+    np.add.at(edges, bounds[:, 1], -1)
+    covered: Bool = np.cumsum(edges[:n]) > 0
+    return covered
+
+
+def _speed(rows: Motion, window: Window, n: int, settings: BatchSettings, traits: Traits) -> tuple[F64, Bool]:
+    """Speed on the grid, wheel speed where GNSS has none, and where GNSS froze."""
+    speed, frozen = np.full(n, np.nan), np.zeros(n, bool)
+    for signal in (Signal.SPEED, Signal.WHEEL_SPEED):
+        trait = traits.get(signal, SensorTraits())
+        t_ns, x = rows.of(signal)
+        t_ns = t_ns - round(trait.latency_s * NS_PER_S)
+        on_grid = speed_onto_grid(t_ns, x, window.t_start_ns, n, settings.rate_hz, settings.speed_hold_s)
+        speed = np.where(np.isnan(speed), on_grid, speed)
+        if signal is Signal.SPEED and not trait.resolution > settings.speed_min_mps / 50.0:
+            moving = x >= settings.speed_min_mps
+            runs = _constant_runs(*sort_by_time(t_ns, x), settings.speed_frozen_s * NS_PER_S)
+            frozen = _spans_onto_grid(runs, window, n, settings.rate_hz) if moving.any() else frozen
+    return speed, frozen & (speed >= settings.speed_min_mps)
+
+
+def _speed_causes(speed: F64, frozen: Bool, settings: BatchSettings) -> dict[Why, Bool]:
+    return {
+        Why.SPEED_MISSING: np.isnan(speed),
+        Why.TOO_SLOW: speed < settings.speed_min_mps,
+        Why.TOO_FAST: speed > settings.speed_max_mps,
+        Why.SPEED_FROZEN: frozen,
+    }
+
+
+def _merge_missing(causes: dict[Why, Bool]) -> dict[Why, Bool]:
+    """Both sensors silent at once is a gap; one alone is that sensor's fault."""
+    a, g = causes.get(Why.ACCELERATION_MISSING), causes.get(Why.PITCH_RATE_MISSING)
+    if a is None or g is None:
+        return causes
+    both = a & g
+    return causes | {Why.GAP: both, Why.ACCELERATION_MISSING: a & ~both, Why.PITCH_RATE_MISSING: g & ~both}
+
+
+def _gap_share(shares: Mapping[Why, float]) -> float:
+    return sum(shares.get(why, 0.0) for why in _MISSING)
+
+
+def _mean(x: F64, usable: Bool) -> float:
+    return float(np.mean(x[usable])) if usable.any() else float("nan")
+
+
+def _longest_run(mask: Bool) -> int:
+    edges = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(np.int8)))
+    return int(np.max(edges[1::2] - edges[::2], initial=0))
+
+
+def _optional(rows: Motion, window: Window, n: int, settings: BatchSettings) -> F64 | None:
+    t_ns, x = rows.of(Signal.LONGITUDINAL_ACCELERATION)
+    if not len(x):
+        return None
+    return onto_grid(t_ns, x, window.t_start_ns, n, settings.rate_hz, settings.gap_s)
+
+
+def _reasons(
+    rows: Motion,
+    window: Window,
+    n: int,
+    usable: Bool,
+    gravity: float,
+    shares: Mapping[Why, float],
+    settings: BatchSettings,
+) -> tuple[Why, ...]:
+    """Every reason that keeps any estimator from using the window, in a fixed order."""
+    found: list[Why] = []
+    whole_n = settings.window_s * settings.rate_hz
+    if not window.is_provisional and n < settings.last_batch_share_min * whole_n:
+        found.append(Why.TOO_SHORT)
+        found.extend([window.ended_by] if window.ended_by else [])
+    if n and float(np.mean(usable)) < settings.usable_share_min:
+        largest = max(shares.values(), default=0.0)
+        found.extend(why for why, share in shares.items() if share >= min(REASON_SHARE_MIN, largest))
+    elif _gap_share(shares) > settings.gap_share_max:
+        found.extend(why for why in _MISSING if shares.get(why, 0.0) > settings.gap_share_max / len(_MISSING))
+    for signal in _NAMES:
+        rate_hz = sample_rate_hz(np.unique(rows.of(signal)[0]))
+        if 0.0 < rate_hz < RATE_MIN_SHARE * settings.rate_hz:
+            found.append(Why.SENSOR_RATE_LOW)
+    if abs(gravity - STANDARD_GRAVITY_MPS2) > GRAVITY_TOLERANCE_MPS2:
+        found.append(Why.GRAVITY_MISSING)
+    return tuple(dict.fromkeys(found))

@@ -1,0 +1,33 @@
+"""A vehicle together with what calibration found out about it: all an estimator may know beforehand."""
+
+from dataclasses import dataclass
+
+from gateway.core.ratio_index import RatioIndexCalibration
+from gateway.core.vehicle import Vehicle
+
+RANGE_MARGIN = 0.25  # of the span seen in calibration, at either end
+
+
+@dataclass(frozen=True, slots=True)
+class CalibratedVehicle:
+    """One calibration file, ready for use. ``id`` is the hash of its content."""
+
+    id: str
+    vehicle: Vehicle
+    payload_seen_kg: tuple[float, float]
+    front_share_seen_pct: tuple[float, float]
+    ratio_index: RatioIndexCalibration | None = None
+
+    def is_out_of_range(self, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]) -> bool:
+        """True where a 95 % interval lies wholly outside what calibration saw, plus a quarter of its span.
+
+        A calibration from one load saw no span and so sets no limit; an interval of NaN is not outside.
+        """
+        return _is_outside(payload95_kg, self.payload_seen_kg) or _is_outside(
+            front_share95_pct, self.front_share_seen_pct
+        )
+
+
+def _is_outside(interval: tuple[float, float], seen: tuple[float, float]) -> bool:
+    margin = RANGE_MARGIN * (seen[1] - seen[0])
+    return margin > 0.0 and (interval[1] < seen[0] - margin or interval[0] > seen[1] + margin)

@@ -1,0 +1,72 @@
+"""Static regression of a target on the two ratio indexes: the terms, and prediction with its spread."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from scipy.special import stdtrit
+
+from gateway.records import F64
+
+Term = Callable[[F64, F64], F64]
+
+# raw R > 0 goes in; the columns are scaled to [-1, 1] afterwards
+TERMS: Mapping[str, Term] = MappingProxyType(
+    {
+        "cbrt_ra": lambda ra, rg: np.cbrt(ra),
+        "sqrt_ra": lambda ra, rg: np.sqrt(ra),
+        "ra": lambda ra, rg: ra,
+        "ra2": lambda ra, rg: ra**2,
+        "log_ra": lambda ra, rg: np.log(ra),
+        "cbrt_rg": lambda ra, rg: np.cbrt(rg),
+        "sqrt_rg": lambda ra, rg: np.sqrt(rg),
+        "rg": lambda ra, rg: rg,
+        "rg2": lambda ra, rg: rg**2,
+        "log_rg": lambda ra, rg: np.log(rg),
+        "ra_rg": lambda ra, rg: ra * rg,
+    }
+)
+
+# the structures of the paper, each with a constant term besides
+MODEL_9_PAYLOAD = ("cbrt_ra",)
+MODEL_10_FRONT_SHARE = ("cbrt_rg", "sqrt_rg")
+MODEL_11_PAYLOAD = ("cbrt_ra", "cbrt_rg", "sqrt_ra", "ra_rg")
+MODEL_11_FRONT_SHARE = ("cbrt_rg", "rg", "ra2")
+
+
+@dataclass(frozen=True, slots=True)
+class RegressionModel:
+    """target = coefficients . [1, scaled terms]; everything that prediction and its spread need.
+
+    lows and highs (p,) scale each term to [-1, 1]; coefficients (p + 1,), constant first;
+    gram_inverse (p + 1, p + 1) is (X'X)^-1 of the scaled columns; residual_std in the target's unit;
+    dof are the degrees of freedom behind it.
+    """
+
+    terms: tuple[str, ...]
+    lows: F64
+    highs: F64
+    coefficients: F64
+    gram_inverse: F64
+    residual_std: float
+    dof: float
+
+    def predict(self, ra: float, rg: float) -> tuple[float, float, tuple[float, float]]:
+        """Value, standard deviation of a new observation, and its 95 % interval (Student's t)."""
+        row = scaled_columns(self.terms, np.array([ra]), np.array([rg]), self.lows, self.highs)[0]
+        centre = float(row @ self.coefficients)
+        std = self.residual_std * float(np.sqrt(1.0 + row @ self.gram_inverse @ row))
+        half = float(stdtrit(self.dof, 0.975)) * std
+        return centre, std, (centre - half, centre + half)
+
+
+def term_columns(terms: tuple[str, ...], ra: F64, rg: F64) -> F64:
+    """Raw columns (n, p) of the named terms for indexes (n,)."""
+    return np.column_stack([TERMS[name](ra, rg) for name in terms])
+
+
+def scaled_columns(terms: tuple[str, ...], ra: F64, rg: F64, lows: F64, highs: F64) -> F64:
+    """Design matrix (n, p + 1): a column of ones, then each term scaled so that lows..highs is -1..1."""
+    raw = term_columns(terms, ra, rg)
+    return np.column_stack([np.ones(len(raw)), 2.0 * (raw - lows) / (highs - lows) - 1.0])

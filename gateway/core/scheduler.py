@@ -1,0 +1,176 @@
+"""The batch scheduler: cuts the stream of decoded rows into drives, and drives into windows.
+
+What it decides depends on the rows and their order alone, never on how they were chunked or on any
+clock: the live service and the offline tools therefore form the same batches.
+"""
+
+from collections.abc import Generator, Iterator
+
+import numpy as np
+
+from gateway.core.batch import Traits, Window, build_batch
+from gateway.core.settings import BatchSettings
+from gateway.records import I64, Batch, Bool, Motion, Signal, Why
+from gateway.units import NS_PER_S
+
+_MOVING = np.iinfo(np.int64).max  # "standing since never"
+_SPEEDS = (Signal.SPEED, Signal.WHEEL_SPEED)
+
+
+class Scheduler:
+    """Feed it rows in order of arrival; it yields a Batch whenever a window ends.
+
+    A drive begins with the first row and ends after ``standstill_s`` of standstill, ``silence_s``
+    without a row, or a step back of the clock. Windows follow one another from its first row. After
+    a standstill the next drive begins when the vehicle moves again. Rows that come later than their
+    window are counted in ``n_late_rows``.
+    """
+
+    def __init__(self, settings: BatchSettings, traits: Traits) -> None:
+        self._settings = settings
+        self._traits = traits
+        self._rows: list[Motion] = []
+        self._drive_start_ns = 0
+        self._window_start_ns = 0
+        self._provisional_ns = 0
+        self._newest_ns: int | None = None  # None between drives
+        self._still_since_ns: int = _MOVING
+        self.is_parked = False
+        self.n_late_rows = 0
+
+    @property
+    def collected_s(self) -> float:
+        """How much of the current window has been seen, in seconds."""
+        return 0.0 if self._newest_ns is None else (self._newest_ns - self._window_start_ns) / NS_PER_S
+
+    def feed(self, motion: Motion) -> Iterator[Batch]:
+        """Take rows in order of arrival; yield the batches that end with them."""
+        begin = 0
+        while begin < len(motion):
+            if self.is_parked:
+                begin += self._skip_until_moving(motion.part(begin, len(motion)))
+            else:
+                begin += yield from self._advance(motion.part(begin, len(motion)))
+
+    def flush(self) -> Iterator[Batch]:
+        """The stream has ended: close the window that is open."""
+        if self._newest_ns is not None:
+            yield from self._end_drive(self._newest_ns)
+
+    def _advance(self, motion: Motion) -> Generator[Batch, None, int]:
+        """Take rows up to the end of the drive or of the rows; return how many were taken."""
+        if self._newest_ns is None:
+            self._begin_drive(int(motion.t_ns[0]))
+        n, broken_by = self._next_break(motion.t_ns)
+        newest_ns = np.maximum.accumulate(np.r_[self._newest_ns or 0, motion.t_ns[:n]])[1:]
+        still_since_ns = self._standing_since(motion.part(0, n))
+        parked = np.flatnonzero(newest_ns - still_since_ns >= self._ns(self._settings.standstill_s))
+        if parked.size:
+            n = int(parked[0])
+        yield from self._cut(motion.part(0, n), newest_ns[:n])
+        if parked.size:
+            yield from self._end_drive(int(still_since_ns[n]) + self._ns(self._settings.standstill_s))
+            self.is_parked = True
+        elif broken_by is not None:
+            yield from self._end_drive(self._newest_ns or 0, broken_by)
+        else:
+            self._still_since_ns = int(still_since_ns[-1])
+        return n
+
+    def _next_break(self, t_ns: I64) -> tuple[int, Why | None]:
+        """First row that silence or a backward clock step parts from those before it, and which."""
+        newest_ns = np.maximum.accumulate(np.r_[self._newest_ns or 0, t_ns])[:-1]
+        ahead_ns = t_ns - newest_ns
+        is_silence = ahead_ns > self._ns(self._settings.silence_s)
+        broken = np.flatnonzero(is_silence | (ahead_ns < -self._ns(self._settings.clock_step_s)))
+        if not broken.size:
+            return len(t_ns), None
+        first = int(broken[0])
+        return first, Why.GAP if is_silence[first] else Why.CLOCK_STEP
+
+    def _standing_since(self, rows: Motion) -> I64:
+        """(n,) since when the vehicle stands, as the speeds up to each row tell; _MOVING where it does not."""
+        moving, still = self._moving_and_still(rows)
+        at = np.arange(len(rows))
+        last_moving = np.maximum.accumulate(np.where(moving, at, -1))
+        last_still = np.maximum.accumulate(np.where(still, at, -1))
+        stood_before = self._still_since_ns != _MOVING
+        stands = (last_still > last_moving) | ((last_moving < 0) & stood_before)
+        begins = still & ~np.r_[stood_before, stands[:-1]]
+        last_begin = np.maximum.accumulate(np.where(begins, at, -1))
+        since_ns = np.where(last_begin >= 0, rows.t_ns[last_begin], self._still_since_ns)
+        return np.where(stands, since_ns, _MOVING)
+
+    def _moving_and_still(self, rows: Motion) -> tuple[Bool, Bool]:
+        """(n,) rows whose speeds say that the vehicle moves, or stands; neither where they say nothing."""
+        speeds = [rows.columns[:, rows.signals.index(s)] for s in _SPEEDS if s in rows.signals]
+        fastest = np.fmax.reduce([np.full(len(rows), np.nan), *speeds])
+        return fastest >= self._settings.standstill_speed_mps, fastest < self._settings.standstill_speed_mps
+
+    def _cut(self, rows: Motion, newest_ns: I64) -> Iterator[Batch]:
+        """Unbroken rows of one drive: kept, and cut at window ends and provisional marks."""
+        begin = 0
+        while begin < len(rows):
+            mark_ns = self._next_mark_ns()
+            end = int(np.searchsorted(newest_ns, mark_ns, side="left"))
+            if end > begin:
+                self._keep(rows.part(begin, end))
+                self._newest_ns = int(newest_ns[end - 1])
+                begin = end
+            if begin < len(rows):
+                yield self._reach(mark_ns)
+
+    def _keep(self, part: Motion) -> None:
+        self.n_late_rows += int(np.count_nonzero(part.t_ns < self._window_start_ns))
+        self._rows.append(part)
+
+    def _next_mark_ns(self) -> int:
+        window_end_ns = self._window_start_ns + self._ns(self._settings.window_s)
+        return min(window_end_ns, self._provisional_ns) if self._settings.provisional_every_s else window_end_ns
+
+    def _reach(self, mark_ns: int) -> Batch:
+        """A row at or past ``mark_ns`` has come: the window ends there, or is looked at provisionally."""
+        if mark_ns < self._window_start_ns + self._ns(self._settings.window_s):
+            self._provisional_ns += self._ns(self._settings.provisional_every_s)
+            return self._build(mark_ns, is_provisional=True)
+        batch = self._build(mark_ns)
+        self._begin_window(mark_ns)
+        return batch
+
+    def _begin_drive(self, t_ns: int) -> None:
+        self._drive_start_ns = self._newest_ns = t_ns
+        self._still_since_ns = _MOVING
+        self._begin_window(t_ns)
+
+    def _begin_window(self, t_ns: int) -> None:
+        self._rows = []
+        self._window_start_ns = t_ns
+        self._provisional_ns = t_ns + self._ns(self._settings.provisional_every_s)
+
+    def _end_drive(self, t_end_ns: int, ended_by: Why | None = None) -> Iterator[Batch]:
+        t_end_ns = min(t_end_ns, self._window_start_ns + self._ns(self._settings.window_s))
+        if t_end_ns > self._window_start_ns:
+            yield self._build(t_end_ns, ended_by)
+        self._rows = []
+        self._newest_ns = None
+
+    def _skip_until_moving(self, motion: Motion) -> int:
+        """How many rows to pass over until the vehicle moves; a moving row wakes the scheduler."""
+        moving = np.flatnonzero(self._moving_and_still(motion)[0])
+        if not moving.size:
+            return len(motion)
+        self.is_parked = False
+        return int(moving[0])
+
+    def _build(self, t_end_ns: int, ended_by: Why | None = None, *, is_provisional: bool = False) -> Batch:
+        rows = Motion(
+            self._rows[0].signals,
+            np.concatenate([part.t_ns for part in self._rows]),
+            np.concatenate([part.columns for part in self._rows]),
+        )
+        window = Window(self._window_start_ns, t_end_ns, self._drive_start_ns, ended_by, is_provisional)
+        return build_batch(rows, window, self._settings, self._traits)
+
+    @staticmethod
+    def _ns(duration_s: float) -> int:
+        return round(duration_s * NS_PER_S)
