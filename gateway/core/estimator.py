@@ -33,7 +33,7 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
         mean_speed_mps=batch.mean_speed_mps,
         gap_share=batch.gap_share,
         usable_share=batch.usable_share,
-        shares=dict(batch.shares),
+        shares={str(why): share for why, share in batch.shares.items()},
         rejected=batch.rejected,
         is_provisional=batch.is_provisional,
         spectra=spectra_of(batch),

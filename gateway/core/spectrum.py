@@ -38,7 +38,7 @@ def segment_transforms(x: F64, starts: I64, n_segment: int, rate_hz: float) -> C
 
 def frequencies_hz(n_segment: int, rate_hz: float) -> F64:
     """(n_segment // 2 + 1,) from 0 to half the rate."""
-    return np.arange(n_segment // 2 + 1) * (rate_hz / n_segment)
+    return np.arange(n_segment // 2 + 1, dtype=float) * (rate_hz / n_segment)
 
 
 def _detrended(segments: F64) -> F64:

@@ -1,0 +1,162 @@
+"""springscale.toml and SPRINGSCALE_* variables -> frozen settings. An unknown key is an error that names it."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+
+from gateway.core.settings import BatchSettings
+from gateway.errors import ConfigurationError
+from gateway.toml_file import describe_faults, read_toml
+
+Seconds = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Share = Annotated[float, Field(gt=0.0, le=1.0)]
+
+ESTIMATOR_NAMES = ("cross_spectrum", "ratio_index")
+EstimatorName = Literal["cross_spectrum", "ratio_index"]
+
+
+class Section(BaseModel):
+    """A table of the file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class VehicleSection(Section):
+    """Who this vehicle is."""
+
+    id: str = Field("vehicle", min_length=1, max_length=64, description="name under which the fleet knows the vehicle")
+    vin: str | None = Field(
+        None, pattern=r"^[A-HJ-NPR-Z0-9]{17}$", description="vehicle identification number (ISO 3779)"
+    )
+
+
+class BusSection(Section):
+    """Where the frames come from."""
+
+    interface: str = Field("socketcan", description="any python-can interface: socketcan, slcan, pcan, virtual, ...")
+    channel: str = Field("can0", description="channel of that interface")
+    options: dict[str, str | int | float | bool] = Field(
+        default_factory=dict, description="further arguments of that python-can interface, e.g. bitrate"
+    )
+    inbox_frames: int = Field(65_536, ge=1024, description="frames held between reader and pipeline; more are dropped")
+    silence_s: Seconds = Field(2.0, description="the bus counts as silent (asleep) after this long without a frame")
+
+
+class BatchSection(Section):
+    """How batches are formed and gated."""
+
+    window_s: float = Field(300.0, ge=20.0, le=3600.0, description="length of a batch")
+    rate_hz: float = Field(50.0, ge=40.0, le=200.0, description="rate of the uniform time line")
+    speed_min_mps: float = Field(5.0, ge=0.5, description="slower samples are masked")
+    speed_max_mps: float = Field(40.0, le=100.0, description="faster samples are masked")
+    usable_share_min: Share = Field(0.6, description="a batch counts with at least this share of usable samples")
+    gap_share_max: Share = Field(0.2, description="a batch with a larger share of gaps is refused")
+    last_batch_share_min: Share = Field(
+        0.95, description="the last batch of a drive counts when it holds at least this share of the window"
+    )
+    standstill_s: Seconds = Field(60.0, description="a standstill this long ends the drive")
+    standstill_speed_mps: float = Field(0.5, gt=0.0, description="slower than this is standing")
+    silence_s: Seconds = Field(10.0, description="this long without a mapped frame ends the drive")
+    clock_step_s: Seconds = Field(1.0, description="a step back of the time stamps larger than this ends the drive")
+    gap_s: Seconds = Field(0.05, description="samples further apart than this leave a gap")
+    speed_hold_s: Seconds = Field(3.0, description="speed samples further apart than this leave a gap")
+    stuck_s: Seconds = Field(5.0, description="a sensor that repeats one number for this long is stuck")
+    speed_frozen_s: Seconds = Field(60.0, description="a GNSS speed that repeats one number for this long is frozen")
+    provisional_every_s: float = Field(
+        60.0, ge=0.0, description="the service looks at a growing window this often (0: never); offline tools do not"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "BatchSection":
+        if self.speed_min_mps >= self.speed_max_mps:
+            raise ValueError("speed_min_mps must be below speed_max_mps")
+        if self.silence_s >= self.window_s:
+            raise ValueError("silence_s must be below window_s")
+        return self
+
+    def for_core(self, *, window_s: float | None = None, is_live: bool = False) -> BatchSettings:
+        """The same settings for the core; provisional looks belong to the live service alone."""
+        chosen = self.model_dump()
+        chosen["window_s"] = window_s or self.window_s
+        chosen["provisional_every_s"] = self.provisional_every_s if is_live else 0.0
+        return BatchSettings(**chosen)
+
+
+class WebSection(Section):
+    """The HTTP side."""
+
+    host: str = Field("127.0.0.1", description="address to listen on")
+    port: int = Field(8000, ge=0, le=65535, description="port to listen on; 0 takes a free one")
+    stale_after_s: Seconds = Field(900.0, description="an estimate older than this is marked stale")
+
+
+class StoreSection(Section):
+    """Where estimates are kept."""
+
+    directory: Path = Field(Path("/var/lib/springscale"), description="folder of the database")
+    max_age_days: float = Field(400.0, gt=0.0, description="older records are removed")
+    max_size_mb: float = Field(512.0, ge=4.0, description="the oldest records are removed beyond this size")
+
+
+class LogSection(Section):
+    """What the service writes to its log."""
+
+    level: Literal["debug", "info", "warning", "error"] = Field("info", description="least level that is written")
+
+
+class Settings(BaseSettings):
+    """springscale.toml. Paths in it are relative to the file."""
+
+    model_config = SettingsConfigDict(
+        frozen=True,
+        extra="forbid",
+        env_prefix="SPRINGSCALE_",
+        env_nested_delimiter="__",
+        nested_model_default_partial_update=True,
+    )
+
+    signals: str = Field(description="signal map: a TOML file, or springscale:NAME for one that is shipped")
+    calibration: Path | None = Field(None, description="calibration file; without it batches carry spectra only")
+    estimator: EstimatorName = Field("cross_spectrum", description="which estimator answers")
+    vehicle: VehicleSection = VehicleSection()
+    bus: BusSection = BusSection()
+    batch: BatchSection = BatchSection()
+    web: WebSection = WebSection()
+    store: StoreSection = StoreSection()
+    log: LogSection = LogSection()
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """The environment wins over the file."""
+        return env_settings, init_settings
+
+
+def load_settings(path: Path) -> Settings:
+    """Settings of ``path`` and the environment, paths made absolute. Raises ConfigurationError naming every fault."""
+    tables = read_toml(path)
+    try:
+        settings = Settings(**tables)
+    except ValidationError as fault:
+        raise ConfigurationError(describe_faults(path, fault)) from None
+    return _with_absolute_paths(settings, path.resolve().parent)
+
+
+def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:
+    """Paths as seen from the folder of the configuration file."""
+    changed: dict[str, Any] = {
+        "store": settings.store.model_copy(update={"directory": folder / settings.store.directory})
+    }
+    if settings.calibration is not None:
+        changed["calibration"] = folder / settings.calibration
+    if not settings.signals.startswith("springscale:"):
+        changed["signals"] = str(folder / settings.signals)
+    return settings.model_copy(update=changed)

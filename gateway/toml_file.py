@@ -1,0 +1,58 @@
+"""TOML files that people write: read, checked against a model, every fault named with its file and key."""
+
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from gateway.errors import ConfigurationError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def read_toml(path: Path, error: type[ConfigurationError] = ConfigurationError) -> dict[str, Any]:
+    """The tables of ``path``. Raises ``error`` naming the file, and the line where its syntax breaks."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise error(f"{path}: no such file") from None
+    except IsADirectoryError:
+        raise error(f"{path}: is a folder, a file is wanted") from None
+    except PermissionError:
+        raise error(f"{path}: no permission to read it") from None
+    except UnicodeDecodeError as fault:
+        raise error(f"{path}: not UTF-8 text (byte {fault.start})") from None
+    except tomllib.TOMLDecodeError as fault:
+        raise error(f"{path}: not valid TOML: {fault}") from None
+
+
+def load_toml(path: Path, model: type[Model], error: type[ConfigurationError] = ConfigurationError) -> Model:
+    """``path`` as a ``model``. Raises ``error`` with one line for every fault."""
+    tables = read_toml(path, error)
+    try:
+        return model.model_validate(tables)
+    except ValidationError as fault:
+        raise error(describe_faults(path, fault)) from None
+
+
+def describe_faults(where: Path | str, fault: ValidationError) -> str:
+    """One line a fault: file, key, what is wrong and what stands there."""
+    return "\n".join(f"{where}: {_key(e['loc'])}: {_what(dict(e))}" for e in fault.errors(include_url=False))
+
+
+def _key(location: tuple[int | str, ...]) -> str:
+    key = ""
+    for part in location:
+        key += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if key else part
+    return key or "(file)"
+
+
+def _what(fault: dict[str, Any]) -> str:
+    if fault["type"] == "extra_forbidden":
+        return "unknown key; remove it or check its spelling"
+    if fault["type"] == "missing":
+        return "missing; it must be given"
+    message = fault["msg"].removeprefix("Value error, ")
+    shown = repr(fault.get("input"))
+    return message if fault["type"] == "value_error" or len(shown) > 60 else f"{message} (it says {shown})"
