@@ -25,6 +25,8 @@ class Vehicle:
     sensor_offset_left_m: float = 0.0
     unsprung_front_kg: float | None = None
     unsprung_rear_kg: float | None = None
+    kerb_front_axle_kg: float | None = None
+    kerb_rear_axle_kg: float | None = None
     wheel_radius_m: float | None = None
     front_axle_limit_kg: float | None = None
     rear_axle_limit_kg: float | None = None

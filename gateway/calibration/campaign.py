@@ -1,0 +1,119 @@
+"""The campaign file: which known-load drives were recorded, with which vehicle."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from gateway.core.vehicle import Vehicle, front_share_pct
+from gateway.errors import CampaignError
+from gateway.toml_file import load_toml
+
+Percent = Annotated[float, Field(gt=0.0, lt=100.0)]
+Kilograms = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Metres = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class VehicleTable(_Table):
+    """[vehicle]: masses and share are of the sprung mass."""
+
+    name: str = Field(min_length=1)
+    empty_mass_kg: float = Field(gt=0.0)
+    wheelbase_m: float = Field(gt=0.0)
+    empty_front_share_pct: Percent = 50.0
+    sensor_position_m: Metres
+    payload_range_kg: tuple[Kilograms, Kilograms] = (0.0, 450.0)
+    front_share_range_pct: tuple[Percent, Percent] = (40.0, 60.0)
+    sensor_position_std_m: float = Field(0.1, gt=0.0)
+    empty_front_share_std_pct: float = Field(0.5, gt=0.0)
+    sensor_offset_left_m: Metres = 0.0
+    unsprung_front_kg: float | None = Field(None, gt=0.0)
+    unsprung_rear_kg: float | None = Field(None, gt=0.0)
+    kerb_front_axle_kg: float | None = Field(None, gt=0.0)
+    kerb_rear_axle_kg: float | None = Field(None, gt=0.0)
+    wheel_radius_m: float | None = Field(None, gt=0.0)
+    front_axle_limit_kg: float | None = Field(None, gt=0.0)
+    rear_axle_limit_kg: float | None = Field(None, gt=0.0)
+    gross_limit_kg: float | None = Field(None, gt=0.0)
+
+    @model_validator(mode="after")
+    def _ranges_rise(self) -> "VehicleTable":
+        for name in ("payload_range_kg", "front_share_range_pct"):
+            low, high = getattr(self, name)
+            if low >= high:
+                raise ValueError(f"{name} must rise: [low, high]")
+        return self
+
+
+class RunTable(_Table):
+    """[[runs]]: one drive with a known load."""
+
+    log: Path
+    payload_kg: Kilograms
+    payload_position_m: Metres | None = None
+    front_share_pct: Percent | None = None
+    split: Literal["identification", "validation"] | None = None
+    start_s: float = Field(0.0, ge=0.0)
+    end_s: float | None = Field(None, gt=0.0)
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> "RunTable":
+        if self.payload_kg > 0.0 and self.payload_position_m is None and self.front_share_pct is None:
+            raise ValueError("a loaded run needs payload_position_m (metres behind the front axle) or front_share_pct")
+        if self.payload_position_m is not None and self.front_share_pct is not None:
+            raise ValueError("give payload_position_m or front_share_pct, not both")
+        if self.end_s is not None and self.end_s <= self.start_s:
+            raise ValueError("end_s must be after start_s")
+        return self
+
+
+class CampaignTable(_Table):
+    """The whole file."""
+
+    signals: str = Field(min_length=1)
+    identification_fraction: float = Field(0.667, ge=0.0, le=1.0)
+    vehicle: VehicleTable
+    runs: tuple[RunTable, ...] = Field(min_length=1)
+
+
+class Campaign:
+    """A campaign file with its paths resolved and its vehicle in the core's terms."""
+
+    def __init__(self, path: Path, table: CampaignTable) -> None:
+        self.path = path
+        self.runs = table.runs
+        self.identification_fraction = table.identification_fraction
+        self.vehicle = Vehicle(**table.vehicle.model_dump())
+        self._signals = table.signals
+
+    @property
+    def signals(self) -> str:
+        """The signal map: a path, or springscale:NAME."""
+        return self._signals if self._signals.startswith("springscale:") else str(self.path.parent / self._signals)
+
+    def log_of(self, run: RunTable) -> Path:
+        """Where the run's log lies."""
+        return self.path.parent / run.log
+
+    def front_share_pct(self, run: RunTable) -> float:
+        """The run's true share of the sprung mass on the front axle, equation (3)."""
+        if run.front_share_pct is not None:
+            return run.front_share_pct
+        return front_share_pct(self.vehicle, run.payload_kg, run.payload_position_m)
+
+
+def load_campaign(path: Path) -> Campaign:
+    """Raises CampaignError naming every fault of the file, and every log that is not there."""
+    campaign = Campaign(path, load_toml(path, CampaignTable, CampaignError))
+    missing = [
+        f"{path}: runs[{i}].log: {run.log}: no such file"
+        for i, run in enumerate(campaign.runs, 1)
+        if not campaign.log_of(run).is_file()
+    ]
+    if missing:
+        raise CampaignError("\n".join(missing))
+    return campaign
