@@ -1,0 +1,251 @@
+"""The calibration file: versioned JSON whose id is the hash of its content. Written by the tool, never by hand."""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError, WithJsonSchema
+
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.ratio_index import Band, RatioIndexCalibration
+from gateway.core.regression import TERMS, RegressionModel
+from gateway.core.vehicle import Vehicle
+from gateway.errors import CalibrationFileError
+from gateway.records import F64
+from gateway.toml_file import describe_faults
+
+FORMAT: Final = "springscale-calibration"
+VERSION: Final = 1
+
+
+def _array(numbers: Any) -> F64:
+    found = np.asarray(numbers, dtype=float)
+    if not np.all(np.isfinite(found)):
+        raise ValueError("holds a number that is not finite")
+    return found
+
+
+Array = Annotated[
+    F64,
+    BeforeValidator(_array),
+    PlainSerializer(lambda x: x.tolist(), return_type=list[Any]),
+    WithJsonSchema({"type": "array", "items": {"anyOf": [{"type": "number"}, {"type": "array"}]}}),
+]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+
+class RegressionPart(_Part):
+    """One regression (9), (10) or (11); see core.regression.RegressionModel."""
+
+    terms: tuple[str, ...]
+    lows: Array
+    highs: Array
+    coefficients: Array
+    gram_inverse: Array
+    residual_std: float = Field(gt=0.0)
+    dof: float = Field(gt=0.0)
+
+    def for_core(self) -> RegressionModel:
+        """The same in the core's terms. Raises CalibrationFileError for a term this version does not know."""
+        unknown = sorted(set(self.terms) - set(TERMS))
+        if unknown:
+            raise CalibrationFileError(f"regression terms {unknown} are not known to this version of springscale")
+        return RegressionModel(**dict(self))
+
+
+class RatioIndexPart(_Part):
+    """The ratio index of this vehicle; bands are [centre Hz, width Hz], numerator first."""
+
+    spectrum: Literal["amplitude", "power"]
+    n_segment: int = Field(ge=64)
+    acceleration_bands: tuple[tuple[float, float], tuple[float, float]] | None
+    pitch_rate_bands: tuple[tuple[float, float], tuple[float, float]] | None
+    payload: RegressionPart | None
+    front_share: RegressionPart | None
+    speed_range_mps: tuple[float, float]
+    speed_std_max_mps: float = Field(gt=0.0)
+
+    @classmethod
+    def of(cls, calibration: RatioIndexCalibration) -> "RatioIndexPart":
+        """The core's calibration as the file holds it."""
+        return cls(
+            spectrum=calibration.spectrum,
+            n_segment=calibration.n_segment,
+            acceleration_bands=_from_bands(calibration.acceleration_bands),
+            pitch_rate_bands=_from_bands(calibration.pitch_rate_bands),
+            payload=_regression_part(calibration.payload),
+            front_share=_regression_part(calibration.front_share),
+            speed_range_mps=calibration.speed_range_mps,
+            speed_std_max_mps=calibration.speed_std_max_mps,
+        )
+
+    def for_core(self) -> RatioIndexCalibration:
+        """The same in the core's terms."""
+        return RatioIndexCalibration(
+            spectrum=self.spectrum,
+            n_segment=self.n_segment,
+            acceleration_bands=_to_bands(self.acceleration_bands),
+            pitch_rate_bands=_to_bands(self.pitch_rate_bands),
+            payload=self.payload.for_core() if self.payload else None,
+            front_share=self.front_share.for_core() if self.front_share else None,
+            speed_range_mps=self.speed_range_mps,
+            speed_std_max_mps=self.speed_std_max_mps,
+        )
+
+
+def _from_bands(bands: tuple[Band, Band] | None) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    if bands is None:
+        return None
+    return (bands[0].centre_hz, bands[0].width_hz), (bands[1].centre_hz, bands[1].width_hz)
+
+
+def _to_bands(bands: tuple[tuple[float, float], tuple[float, float]] | None) -> tuple[Band, Band] | None:
+    return None if bands is None else (Band(*bands[0]), Band(*bands[1]))
+
+
+def _regression_part(model: RegressionModel | None) -> RegressionPart | None:
+    if model is None:
+        return None
+    return RegressionPart(**{name: getattr(model, name) for name in RegressionPart.model_fields})
+
+
+class VehiclePart(_Part):
+    """The vehicle as the campaign stated it."""
+
+    name: str
+    empty_mass_kg: float = Field(gt=0.0)
+    wheelbase_m: float = Field(gt=0.0)
+    empty_front_share_pct: float
+    sensor_position_m: float
+    payload_range_kg: tuple[float, float]
+    front_share_range_pct: tuple[float, float]
+    sensor_position_std_m: float
+    empty_front_share_std_pct: float
+    sensor_offset_left_m: float
+    unsprung_front_kg: float | None
+    unsprung_rear_kg: float | None
+    kerb_front_axle_kg: float | None
+    kerb_rear_axle_kg: float | None
+    wheel_radius_m: float | None
+    front_axle_limit_kg: float | None
+    rear_axle_limit_kg: float | None
+    gross_limit_kg: float | None
+
+
+class SeenPart(_Part):
+    """What the identification runs covered: the ranges of validity."""
+
+    payload_kg: tuple[float, float]
+    front_share_pct: tuple[float, float]
+    speed_mps: tuple[float, float]
+
+
+class RunPart(_Part):
+    """One known-load drive: where its numbers come from."""
+
+    number: int
+    log: str
+    sha256: str
+    payload_kg: float
+    front_share_pct: float
+    n_batches: int
+
+
+class ProvenancePart(_Part):
+    """Enough to repeat the calibration."""
+
+    software: str
+    command: str
+    campaign_sha256: str
+    runs: tuple[RunPart, ...]
+
+
+class ExpectedErrorsPart(_Part):
+    """Errors on runs left out of the fit, over the identification part (root mean square)."""
+
+    payload_rms_kg: float | None
+    front_share_rms_pct: float | None
+
+
+class CalibrationFile(_Part):
+    """The whole file but for its id."""
+
+    format: Literal["springscale-calibration"] = FORMAT
+    version: Literal[1] = VERSION
+    vehicle: VehiclePart
+    seen: SeenPart
+    ratio_index: RatioIndexPart | None = None
+    expected_errors: dict[str, ExpectedErrorsPart] = Field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    provenance: ProvenancePart
+
+    @property
+    def id(self) -> str:
+        """sha256 of the canonical JSON of everything in the file but the id itself."""
+        return content_id(self.model_dump(mode="json"))
+
+    def to_json(self) -> str:
+        """The file's text, id first."""
+        return json.dumps({"id": self.id, **self.model_dump(mode="json")}, indent=1, allow_nan=False) + "\n"
+
+    def for_core(self) -> CalibratedVehicle:
+        """What the estimators need of it."""
+        return CalibratedVehicle(
+            id=self.id,
+            vehicle=Vehicle(**dict(self.vehicle)),
+            payload_seen_kg=self.seen.payload_kg,
+            front_share_seen_pct=self.seen.front_share_pct,
+            ratio_index=self.ratio_index.for_core() if self.ratio_index else None,
+        )
+
+    @property
+    def estimators(self) -> tuple[str, ...]:
+        """Estimators that this file holds a calibration for, the better first."""
+        return ("ratio_index",) if self.ratio_index else ()
+
+
+def content_id(content: dict[str, Any]) -> str:
+    """sha256:... over the canonical JSON of ``content`` (keys sorted, no spaces), its own id left out."""
+    rest = {key: part for key, part in content.items() if key != "id"}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
+
+
+def load_calibration(path: Path) -> CalibrationFile:
+    """Reads, checks the version, the shape and the hash. Raises CalibrationFileError saying what to do."""
+    content = _read(path)
+    if content.get("format") != FORMAT:
+        raise CalibrationFileError(f"{path}: not a springscale calibration file (format is {content.get('format')!r})")
+    if content.get("version") != VERSION:
+        raise CalibrationFileError(
+            f"{path}: calibration file version {content.get('version')!r}, this springscale reads version {VERSION}: "
+            "calibrate again with `springscale calibrate`, or use the springscale that wrote it"
+        )
+    if content.get("id") != content_id(content):
+        raise CalibrationFileError(
+            f"{path}: content does not match its id: the file was changed after it was written; "
+            "restore it or calibrate again"
+        )
+    try:
+        return CalibrationFile.model_validate({key: part for key, part in content.items() if key != "id"})
+    except ValidationError as fault:
+        raise CalibrationFileError(describe_faults(path, fault)) from None
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise CalibrationFileError(f"{path}: no such calibration file") from None
+    except (OSError, UnicodeDecodeError) as fault:
+        raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
+    except json.JSONDecodeError as fault:
+        raise CalibrationFileError(f"{path}: not valid JSON: {fault}") from None
+    if not isinstance(content, dict):
+        raise CalibrationFileError(f"{path}: not a springscale calibration file")
+    return content

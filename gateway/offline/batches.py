@@ -1,0 +1,59 @@
+"""Logs in, batches out: the same decoder and scheduler as the live service, without its clock and threads."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gateway.bus.logs import motion_of_log
+from gateway.bus.signal_map import SignalMap
+from gateway.core.scheduler import Scheduler
+from gateway.core.settings import BatchSettings
+from gateway.records import Batch, Motion
+from gateway.units import NS_PER_S
+
+
+def batches_of_log(log: Path, signal_map: SignalMap, settings: BatchSettings) -> Iterator[Batch]:
+    """Every batch of one log, in order. Raises LogUnreadableError where nothing in it can be read."""
+    scheduler = Scheduler(settings, signal_map.traits)
+    motions, report, _ = motion_of_log(log, signal_map)
+    for motion in motions:
+        yield from scheduler.feed(motion)
+    report.require_frames()
+    yield from scheduler.flush()
+
+
+def motion_of_whole_log(log: Path, signal_map: SignalMap) -> Motion:
+    """All rows of one log at once. Raises LogUnreadableError where nothing in it can be read."""
+    motions, report, _ = motion_of_log(log, signal_map)
+    parts = list(motions)
+    report.require_frames()
+    return Motion(
+        parts[0].signals,
+        np.concatenate([part.t_ns for part in parts]),
+        np.concatenate([part.columns for part in parts]),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Part of a log, in seconds from its first frame; an open end is None."""
+
+    start_s: float = 0.0
+    end_s: float | None = None
+
+
+def rows_within(motion: Motion, stretch: Stretch) -> Motion:
+    """Rows whose stamps lie in [start, end) of the stretch."""
+    since_ns = motion.t_ns - motion.t_ns[0]
+    inside = since_ns >= round(stretch.start_s * NS_PER_S)
+    if stretch.end_s is not None:
+        inside &= since_ns < round(stretch.end_s * NS_PER_S)
+    return Motion(motion.signals, motion.t_ns[inside], motion.columns[inside])
+
+
+def batches_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSettings) -> tuple[Batch, ...]:
+    """Every batch of rows that are already there."""
+    scheduler = Scheduler(settings, signal_map.traits)
+    return (*scheduler.feed(motion), *scheduler.flush())

@@ -1,0 +1,158 @@
+"""From a campaign file to a calibration file, and from both to the error table of (12)."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import Any, Literal
+
+import numpy as np
+
+from gateway.calibration.campaign import Campaign
+from gateway.calibration.evaluation import Judged, error_table
+from gateway.calibration.file import (
+    CalibrationFile,
+    ExpectedErrorsPart,
+    ProvenancePart,
+    RatioIndexPart,
+    RunPart,
+    SeenPart,
+    VehiclePart,
+)
+from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.estimator import estimate
+from gateway.core.known_run import KnownRun
+from gateway.core.settings import BatchSettings
+from gateway.errors import CalibrationImpossibleError
+from gateway.offline.known_runs import OnRun, SplitRun, file_sha256, split_runs
+from gateway.records import F64
+
+Split = Literal["identification", "validation", "all"]
+
+
+def calibrate(
+    campaign: Campaign,
+    settings: BatchSettings,
+    *,
+    estimators: Sequence[str],
+    numbers: Sequence[int] | None = None,
+    command: str = "",
+    on_run: OnRun = lambda done, of: None,
+) -> CalibrationFile:
+    """Fits every named estimator on the identification parts of the chosen runs.
+
+    An estimator that these runs cannot carry is left out with a warning; raises
+    CalibrationImpossibleError when none is left, and where no identification batch counts.
+    """
+    split = split_runs(campaign, settings, numbers=numbers, on_run=on_run)
+    runs = [one.identification for one in split]
+    counted = [batch for run in runs for batch in run.batches if not batch.rejected]
+    if not counted:
+        raise CalibrationImpossibleError(f"{campaign.path}: no identification batch can be used: {_why_none(runs)}")
+    parts, warnings = _fit(estimators, runs, campaign)
+    with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
+    speeds = [batch.mean_speed_mps for batch in counted]
+    return CalibrationFile(
+        vehicle=VehiclePart(**asdict(campaign.vehicle)),
+        seen=SeenPart(
+            payload_kg=_span([run.payload_kg for run in with_batches]),
+            front_share_pct=_span([run.front_share_pct for run in with_batches]),
+            speed_mps=_span(speeds),
+        ),
+        ratio_index=RatioIndexPart.of(parts["ratio_index"].calibration) if "ratio_index" in parts else None,
+        expected_errors={name: _expected(fit) for name, fit in parts.items()},
+        warnings=tuple(warnings),
+        provenance=_provenance(campaign, split, command),
+    )
+
+
+def _fit(
+    estimators: Sequence[str], runs: Sequence[KnownRun], campaign: Campaign
+) -> tuple[dict[str, RatioIndexFit], list[str]]:
+    """Fits by name, and a warning for each estimator that could not be fitted."""
+    fits: dict[str, RatioIndexFit] = {}
+    warnings: list[str] = []
+    for name in estimators:
+        try:
+            fits[name] = fit_ratio_index(runs, campaign.vehicle)
+        except CalibrationImpossibleError as fault:
+            warnings.append(f"{name}: {fault}")
+    if not fits:
+        raise CalibrationImpossibleError(f"{campaign.path}: " + "; ".join(warnings))
+    return fits, warnings
+
+
+def _why_none(runs: Sequence[KnownRun]) -> str:
+    reasons = [str(why) for run in runs for batch in run.batches for why in batch.rejected]
+    if not reasons:
+        return "the identification part holds no batch (identification_fraction or split leave nothing)"
+    return ", ".join(f"{why} ({reasons.count(why)})" for why in sorted(set(reasons)))
+
+
+def _span(found: Sequence[float]) -> tuple[float, float]:
+    return min(found), max(found)
+
+
+def _expected(fit: RatioIndexFit) -> ExpectedErrorsPart:
+    return ExpectedErrorsPart(
+        payload_rms_kg=_rms(fit.payload_errors_kg), front_share_rms_pct=_rms(fit.front_share_errors_pct)
+    )
+
+
+def _rms(errors: F64 | None) -> float | None:
+    return None if errors is None else float(np.sqrt(np.mean(errors**2)))
+
+
+def _provenance(campaign: Campaign, split: Sequence[SplitRun], command: str) -> ProvenancePart:
+    return ProvenancePart(
+        software=f"springscale {version('springscale')}",
+        command=command,
+        campaign_sha256=file_sha256(campaign.path),
+        runs=tuple(
+            RunPart(
+                number=one.identification.number,
+                log=one.identification.name,
+                sha256=one.sha256,
+                payload_kg=one.identification.payload_kg,
+                front_share_pct=one.identification.front_share_pct,
+                n_batches=len([batch for batch in one.identification.batches if not batch.rejected]),
+            )
+            for one in split
+        ),
+    )
+
+
+def evaluate(
+    campaign: Campaign,
+    calibrated: CalibratedVehicle,
+    settings: BatchSettings,
+    *,
+    estimator: str,
+    split: Split = "validation",
+    on_run: OnRun = lambda done, of: None,
+) -> dict[str, Any]:
+    """The error table of (12) over one part of every run, normalised by the campaign's ranges.
+
+    Raises CalibrationImpossibleError where that part holds no batch, for then there is nothing to judge.
+    """
+    runs = split_runs(campaign, settings, on_run=on_run)
+    judged = [one for run in runs for part in _parts(run, split) for one in judge(part, calibrated, estimator)]
+    if not judged:
+        raise CalibrationImpossibleError(
+            f"{campaign.path}: the {split} part of its runs holds no batch: identification_fraction "
+            f"{campaign.identification_fraction:g} and the runs' split leave nothing to evaluate"
+        )
+    return error_table(judged, campaign.vehicle, estimator)
+
+
+def _parts(run: SplitRun, split: Split) -> list[KnownRun]:
+    parts = {"identification": [run.identification], "validation": [run.validation]}
+    return parts.get(split, [run.identification, run.validation])
+
+
+def judge(run: KnownRun, calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:
+    """Every batch of a known run with its estimate."""
+    return [
+        Judged(run.number, run.name, run.payload_kg, run.front_share_pct, estimate(batch, calibrated, estimator))
+        for batch in run.batches
+    ]
