@@ -1,0 +1,91 @@
+"""Where a signal lies in a payload, and how its bits become a number: for whole columns of frames at once."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.records import F64, U8
+
+U64 = NDArray[np.uint64]
+
+_FLOATS = {16: (np.uint16, np.float16), 32: (np.uint32, np.float32), 64: (np.uint64, np.float64)}
+
+
+class Coding(StrEnum):
+    """How raw bits stand for a number."""
+
+    UNSIGNED = "unsigned"
+    SIGNED = "signed"
+    FLOAT = "float"
+
+
+@dataclass(frozen=True)
+class BitField:
+    """A signal's place in the payload and its linear conversion, as a DBC states them.
+
+    ``start`` counts as in a DBC: bit 0 is the least significant bit of byte 0. For little-endian
+    (Intel, @1) it is the signal's least significant bit, for big-endian (Motorola, @0) its most
+    significant one. ``length`` is 1 to 64 bits; floats have 16, 32 or 64.
+    """
+
+    start: int
+    length: int
+    is_big_endian: bool = False
+    coding: Coding = Coding.UNSIGNED
+    scale: float = 1.0
+    offset: float = 0.0
+
+    @cached_property
+    def bytes_and_shifts(self) -> tuple[tuple[int, int], ...]:
+        """Every byte the field touches and how far left it moves in the raw number (negative: right)."""
+        if self.is_big_endian:
+            first_bit = self.start // 8 * 8 + 7 - self.start % 8
+            end_bit = first_bit + self.length
+            return tuple((byte, end_bit - 8 - 8 * byte) for byte in range(first_bit // 8, (end_bit + 7) // 8))
+        last_byte = (self.start + self.length - 1) // 8
+        return tuple((byte, 8 * byte - self.start) for byte in range(self.start // 8, last_byte + 1))
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes a payload needs to hold the field."""
+        return self.bytes_and_shifts[-1][0] + 1
+
+    @property
+    def raw_range(self) -> tuple[int, int]:
+        """Smallest and largest raw integer the bits can carry."""
+        if self.coding is Coding.SIGNED:
+            return -(1 << self.length - 1), (1 << self.length - 1) - 1
+        return 0, (1 << self.length) - 1
+
+    def bits(self, payload: U8) -> U64:
+        """The field's bits of every row, unsigned. payload (n, width) -> (n,)."""
+        raw = np.zeros(len(payload), np.uint64)
+        for byte, shift in self.bytes_and_shifts:
+            column = payload[:, byte].astype(np.uint64)
+            raw |= column << np.uint64(shift) if shift >= 0 else column >> np.uint64(-shift)
+        return raw & np.uint64((1 << self.length) - 1)
+
+    def numbers(self, bits: U64) -> F64:
+        """Bits (n,) as the numbers they stand for, before scale and offset."""
+        if self.coding is Coding.FLOAT:
+            as_integer, as_float = _FLOATS[self.length]
+            return bits.astype(as_integer).view(as_float).astype(np.float64)
+        if self.coding is Coding.SIGNED:
+            sign_bit = np.uint64(1 << self.length - 1)
+            return ((bits ^ sign_bit) - sign_bit).view(np.int64).astype(np.float64)
+        return bits.astype(np.float64)
+
+    def physical(self, bits: U64) -> F64:
+        """Bits (n,) in the unit of the DBC: number x scale + offset, in that order, as cantools does it."""
+        return self.numbers(bits) * self.scale + self.offset
+
+    @property
+    def physical_range(self) -> tuple[float, float]:
+        """Smallest and largest physical number the bits can carry; infinite for floats."""
+        if self.coding is Coding.FLOAT:
+            return -np.inf, np.inf
+        ends = [raw * self.scale + self.offset for raw in self.raw_range]
+        return min(ends), max(ends)

@@ -1,0 +1,121 @@
+"""Lines of one shape, read all at once: learned from one line, then checked byte by byte on every other."""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.bus.candump_line import LAST_SECOND
+from gateway.records import EXTENDED_ID, F64, I64, U8, U32, Bool, Frames
+from gateway.units import NS_PER_S
+
+_SHAPE = re.compile(
+    rb"\((\d{1,15})\.(\d{1,9})\) (\S{1,32}) ([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})(#|##[0-9A-Fa-f])"
+    rb"((?:[0-9A-Fa-f]{2})*)((?: [RT])?\r?\n)"
+)
+_NOT_HEX: Final = 0xFF
+_NIBBLES: Final = np.full(256, _NOT_HEX, np.uint8)
+for _digit in b"0123456789abcdefABCDEF":
+    _NIBBLES[_digit] = int(chr(_digit), 16)
+
+
+@dataclass(frozen=True)
+class LineShape:
+    """The widths of a line's parts and the bytes that never change within the shape."""
+
+    n_seconds: int
+    n_fraction: int
+    channel: bytes
+    n_id: int
+    is_fd: bool
+    n_payload: int
+    tail: bytes
+
+    @cached_property
+    def hash_at(self) -> int:
+        """Column of the first ``#``; column 0 is the newline before the line."""
+        return 1 + 1 + self.n_seconds + 1 + self.n_fraction + 2 + len(self.channel) + 1 + self.n_id
+
+    @cached_property
+    def template(self) -> U8:
+        """The whole line with NULs where digits stand."""
+        time = b"\0" * self.n_seconds + b"." + b"\0" * self.n_fraction
+        mark = b"##\0" if self.is_fd else b"#"
+        head = b"\n(" + time + b") " + self.channel + b" " + b"\0" * self.n_id + mark
+        return np.frombuffer(head + b"\0" * (2 * self.n_payload) + self.tail, np.uint8)
+
+    @cached_property
+    def literals(self) -> NDArray[np.intp]:
+        """Columns whose byte never changes."""
+        return np.flatnonzero(self.template)
+
+    @cached_property
+    def stamp_weights(self) -> tuple[F64, F64]:
+        """What each digit of the seconds and of the fraction counts, in s and ns. Both sums are exact in a double."""
+        return _powers_of_ten(self.n_seconds - 1, self.n_seconds), _powers_of_ten(8, self.n_fraction)
+
+    def read(self, text: U8, hashes: I64, width: int) -> tuple[Bool, Frames]:
+        """Which of the lines around ``hashes`` (n,) have this shape, and the frames of those that do.
+
+        Payload beyond ``width`` bytes is cut off; the length says what the line held.
+        """
+        columns = np.arange(len(self.template))[:, None] - self.hash_at
+        lines = text[hashes + columns]  # one row a column of the line: every step below runs along contiguous rows
+        fits = (lines[self.literals] == self.template[self.literals, None]).all(axis=0)
+        if not fits.all():
+            lines = lines[:, fits]
+        t_ns, has_stamp = self._stamps(lines)
+        can_id, has_id = self._identifiers(lines)
+        payload, has_payload = self._payloads(lines, width)
+        sound = has_stamp & has_id & has_payload
+        fits[fits] = sound
+        length = np.full(int(np.count_nonzero(sound)), self.n_payload, np.uint8)
+        if sound.all():
+            return fits, Frames(t_ns, can_id, length, payload)
+        return fits, Frames(t_ns[sound], can_id[sound], length, payload[sound])
+
+    def _stamps(self, lines: U8) -> tuple[I64, Bool]:
+        dot = 2 + self.n_seconds
+        digits = np.concatenate((lines[2:dot], lines[dot + 1 : dot + 1 + self.n_fraction])) - np.uint8(ord("0"))
+        seconds_weights, fraction_weights = self.stamp_weights
+        seconds = seconds_weights @ digits[: self.n_seconds].astype(np.float64)
+        fraction_ns = fraction_weights @ digits[self.n_seconds :].astype(np.float64)
+        t_ns = seconds.astype(np.int64) * NS_PER_S + fraction_ns.astype(np.int64)
+        return t_ns, (digits <= 9).all(axis=0) & (seconds <= LAST_SECOND)
+
+    def _identifiers(self, lines: U8) -> tuple[U32, Bool]:
+        nibbles = _NIBBLES[lines[self.hash_at - self.n_id : self.hash_at]]
+        can_id = np.zeros(lines.shape[1], np.uint32)
+        for row in nibbles:
+            can_id = (can_id << np.uint32(4)) | row
+        last = np.uint32(0x1FFF_FFFF if self.n_id == 8 else 0x7FF)
+        is_sound = (nibbles != _NOT_HEX).all(axis=0) & (can_id <= last)
+        return can_id | np.uint32(EXTENDED_ID if self.n_id == 8 else 0), is_sound
+
+    def _payloads(self, lines: U8, width: int) -> tuple[U8, Bool]:
+        first = self.hash_at + (3 if self.is_fd else 1)
+        nibbles = _NIBBLES[lines[first : first + 2 * self.n_payload]]
+        payload = np.zeros((lines.shape[1], width), np.uint8)
+        kept = min(self.n_payload, width)
+        payload[:, :kept] = ((nibbles[0::2] << np.uint8(4)) | nibbles[1::2])[:kept].T
+        is_sound: Bool = (nibbles != _NOT_HEX).all(axis=0)
+        return payload, is_sound
+
+
+def _powers_of_ten(highest: int, n: int) -> F64:
+    return np.array([10.0 ** (highest - i) for i in range(n)])
+
+
+def learn_shape(line: bytes) -> LineShape | None:
+    """The shape of a sound line (its newline included), or None where it needs the exact path."""
+    match = _SHAPE.fullmatch(line)
+    if match is None:
+        return None
+    seconds, fraction, channel, identifier, mark, payload, tail = match.groups()
+    is_fd = len(mark) > 1
+    if len(payload) > (128 if is_fd else 16):
+        return None
+    return LineShape(len(seconds), len(fraction), channel, len(identifier), is_fd, len(payload) // 2, tail)

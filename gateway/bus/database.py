@@ -1,0 +1,105 @@
+"""CAN databases through cantools, reduced to what decoding needs. The only room's corner that knows cantools."""
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cantools
+from cantools.database.can import Message as CantoolsMessage
+from cantools.database.can import Signal as CantoolsSignal
+from cantools.database.errors import UnsupportedDatabaseFormatError
+
+from gateway.bus.bit_field import BitField, Coding
+from gateway.errors import SignalMapError
+from gateway.records import EXTENDED_ID
+
+
+@dataclass(frozen=True, slots=True)
+class DatabaseSignal:
+    """One signal as its database states it; ``multiplexer`` names the signal whose ``multiplexer_ids`` select it."""
+
+    name: str
+    field: BitField
+    unit: str | None
+    minimum: float | None
+    maximum: float | None
+    choices: Mapping[str, int]
+    multiplexer: str | None
+    multiplexer_ids: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DatabaseMessage:
+    """One message; ``frame_id`` carries EXTENDED_ID for a 29-bit identifier."""
+
+    name: str
+    frame_id: int
+    length: int
+    signals: Mapping[str, DatabaseSignal]
+    source: Path
+
+
+def load_messages(map_path: Path, paths: Sequence[Path]) -> dict[str, DatabaseMessage]:
+    """Every message of the databases by name. Raises SignalMapError naming ``map_path`` and the file at fault."""
+    messages: dict[str, DatabaseMessage] = {}
+    for path in paths:
+        for message in _load(map_path, path):
+            name = str(message.name)
+            if name in messages:
+                raise SignalMapError(
+                    f"{map_path}: dbc: message {name!r} is in {messages[name].source.name} and in {path.name}; "
+                    "list only one of them"
+                )
+            messages[name] = _message(message, path)
+    return messages
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """A hint for a misspelt name."""
+    names = sorted(known)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    return f"did you mean {near[0]!r}?" if near else f"there are {shown or 'none'}"
+
+
+def _load(map_path: Path, path: Path) -> list[CantoolsMessage]:
+    if not path.is_file():
+        raise SignalMapError(f"{map_path}: dbc: no such file: {path}; paths are relative to the map")
+    try:
+        # not strict: vendors' databases with overlapping signals are common, and a field is checked when it is mapped
+        database = cantools.database.load_file(path, strict=False)
+    except (UnsupportedDatabaseFormatError, cantools.Error, UnicodeDecodeError) as fault:
+        raise SignalMapError(f"{map_path}: dbc: {path} cannot be read as a CAN database: {fault}") from None
+    if not isinstance(database, cantools.database.can.Database):
+        raise SignalMapError(f"{map_path}: dbc: {path} describes diagnostics; a DBC, KCD, ARXML or SYM is wanted")
+    return list(database.messages)
+
+
+def _message(message: CantoolsMessage, path: Path) -> DatabaseMessage:
+    frame_id = message.frame_id | (EXTENDED_ID if message.is_extended_frame else 0)
+    signals = {signal.name: _signal(signal) for signal in message.signals}
+    return DatabaseMessage(message.name, frame_id, message.length, signals, path)
+
+
+def _signal(signal: CantoolsSignal) -> DatabaseSignal:
+    conversion = signal.conversion
+    coding = Coding.FLOAT if conversion.is_float else Coding.SIGNED if signal.is_signed else Coding.UNSIGNED
+    field = BitField(
+        start=signal.start,
+        length=signal.length,
+        is_big_endian=signal.byte_order == "big_endian",
+        coding=coding,
+        scale=float(conversion.scale),
+        offset=float(conversion.offset),
+    )
+    return DatabaseSignal(
+        name=signal.name,
+        field=field,
+        unit=signal.unit,
+        minimum=signal.minimum,
+        maximum=signal.maximum,
+        choices={str(text): int(raw) for raw, text in (conversion.choices or {}).items()},
+        multiplexer=signal.multiplexer_signal,
+        multiplexer_ids=tuple(signal.multiplexer_ids or ()),
+    )

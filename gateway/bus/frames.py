@@ -1,0 +1,50 @@
+"""Columns of frames: taken apart, put together."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gateway.records import I64, Bool, Frames
+
+
+def empty_frames(width: int) -> Frames:
+    """No frame at all, with payload rows of ``width`` bytes."""
+    return Frames(np.empty(0, np.int64), np.empty(0, np.uint32), np.empty(0, np.uint8), np.empty((0, width), np.uint8))
+
+
+def take(frames: Frames, rows: I64 | Bool) -> Frames:
+    """The chosen rows: indices in the order wanted, or a mask (n,)."""
+    return Frames(frames.t_ns[rows], frames.can_id[rows], frames.length[rows], frames.payload[rows])
+
+
+def join(parts: Sequence[Frames], width: int) -> Frames:
+    """One after the other; all have payload rows of ``width`` bytes."""
+    if len(parts) == 1:
+        return parts[0]
+    if not parts:
+        return empty_frames(width)
+    return Frames(
+        np.concatenate([part.t_ns for part in parts]),
+        np.concatenate([part.can_id for part in parts]),
+        np.concatenate([part.length for part in parts]),
+        np.concatenate([part.payload for part in parts]),
+    )
+
+
+def in_order(places: Sequence[I64], parts: Sequence[Frames], width: int) -> Frames:
+    """Together, sorted by each frame's place (n,)."""
+    joined = join(parts, width)
+    return joined if len(parts) < 2 else take(joined, np.argsort(np.concatenate(places), kind="stable"))
+
+
+def merge_frames(parts: Sequence[Frames]) -> Frames:
+    """Together in order of time; of equal stamps, the earlier part comes first. Payload widths may differ."""
+    width = max((part.payload.shape[1] for part in parts), default=8)
+    return in_order([part.t_ns for part in parts], [_widened(part, width) for part in parts], width)
+
+
+def _widened(frames: Frames, width: int) -> Frames:
+    missing = width - frames.payload.shape[1]
+    if missing == 0:
+        return frames
+    return Frames(frames.t_ns, frames.can_id, frames.length, np.pad(frames.payload, ((0, 0), (0, missing))))

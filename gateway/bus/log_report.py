@@ -1,0 +1,109 @@
+"""What a log reader met on its way: counts, and the lines it could not read, by reason."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from gateway.errors import LogUnreadableError
+from gateway.records import I64
+
+KEPT_LINE_NUMBERS: Final = 5
+NAMED_CHANNELS: Final = 8
+
+
+class LogReject(StrEnum):
+    """Why a line of a log gave no frame."""
+
+    NO_FRAME = "no_frame"  # nothing of the form ID#PAYLOAD: cut before it, or not a candump -L line
+    NUL_BYTES = "nul_bytes"
+    BAD_TIME = "bad_time"
+    BAD_ID = "bad_id"
+    BAD_PAYLOAD = "bad_payload"
+    HALF_BYTE = "half_byte"
+    TOO_LONG = "too_long"  # more bytes than a frame can hold
+    GARBLED = "garbled"
+    OVERLONG_LINE = "overlong_line"
+
+
+@dataclass(slots=True)
+class RejectedLines:
+    """How many lines were refused for one reason, and the numbers of the first of them, counted from 1."""
+
+    count: int = 0
+    first_lines: list[int] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class LogReport:
+    """Fills while its reader goes through the log.
+
+    ``frames`` counts everything that looks like a frame, of any identifier; ``wanted`` what was handed
+    on. ``other_channel``, ``remote_frames`` and ``out_of_order`` are among the wanted identifiers.
+    ``lines`` stays 0 for binary formats, whose rejects carry no line numbers. ``ended_early`` says why
+    a damaged file could not be read to its end.
+    """
+
+    path: Path
+    lines: int = 0
+    frames: int = 0
+    wanted: int = 0
+    other_channel: int = 0
+    remote_frames: int = 0
+    error_frames: int = 0
+    out_of_order: int = 0
+    channels: set[str] = field(default_factory=set)
+    rejects: dict[LogReject, RejectedLines] = field(default_factory=dict)
+    ended_early: str | None = None
+    _last_t_ns: int | None = None
+
+    def reject(self, reason: LogReject, line: int | None = None) -> None:
+        """Count one refused line."""
+        lines = self.rejects.setdefault(reason, RejectedLines())
+        lines.count += 1
+        if line is not None and len(lines.first_lines) < KEPT_LINE_NUMBERS:
+            lines.first_lines.append(line)
+
+    def hand_on(self, t_ns: I64) -> None:
+        """Count frames handed on, by their stamps in order of arrival."""
+        if not len(t_ns):
+            return
+        before = t_ns[0] if self._last_t_ns is None else self._last_t_ns
+        self.out_of_order += int(np.count_nonzero(np.diff(t_ns, prepend=before) < 0))
+        self.wanted += len(t_ns)
+        self._last_t_ns = int(t_ns[-1])
+
+    @property
+    def n_rejected(self) -> int:
+        """Lines refused for any reason."""
+        return sum(lines.count for lines in self.rejects.values())
+
+    def to_json(self) -> dict[str, Any]:
+        """The counts for machines."""
+        counts = ("lines", "frames", "wanted", "other_channel", "remote_frames", "error_frames", "out_of_order")
+        rejects = {str(r): {"count": n.count, "first_lines": n.first_lines} for r, n in self.rejects.items()}
+        return {
+            "log": str(self.path),
+            **{name: getattr(self, name) for name in counts},
+            "rejects": rejects,
+            "ended_early": self.ended_early,
+        }
+
+    def require_frames(self) -> None:
+        """After reading: raise LogUnreadableError, saying why, where not one wanted frame was found."""
+        if self.wanted:
+            return
+        if self.other_channel:
+            seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
+            raise LogUnreadableError(
+                f"{self.path}: the mapped frames are on {seen} only; correct channel in the signal map"
+            )
+        if self.frames:
+            raise LogUnreadableError(
+                f"{self.path}: none of its {self.frames} frames has an identifier of the signal map; "
+                "is it the map of this vehicle?"
+            )
+        why = f" ({self.ended_early})" if self.ended_early else ""
+        raise LogUnreadableError(f"{self.path}: holds no CAN frame{why}; candump logs are recorded with candump -L")

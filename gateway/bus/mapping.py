@@ -1,0 +1,136 @@
+"""What a signal map says, resolved: which frames carry our signals, where their bits lie, what makes them valid."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from gateway.bus.bit_field import BitField, Coding
+from gateway.records import EXTENDED_ID, U32, Bool, SensorTraits, Signal
+
+CLASSIC_BYTES = 8
+CAN_FD_BYTES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class IdFilter:
+    """Frames with ``can_id & mask`` equal to ours, as SocketCAN filters them.
+
+    Both numbers hold EXTENDED_ID, so that a 29-bit identifier never passes for an 11-bit one.
+    """
+
+    can_id: int
+    mask: int
+
+    def matches(self, can_id: U32) -> Bool:
+        """Which identifiers (n,) pass."""
+        passes: Bool = (can_id & np.uint32(self.mask)) == np.uint32(self.can_id)
+        return passes
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A field of the same message and the raw bits it must hold: a multiplexer, or one entry of valid_when."""
+
+    field: BitField
+    allowed_bits: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MappedSignal:
+    """One of our signals: SI = (number x scale + offset) x to_si; the factor carries unit and sign.
+
+    ``minimum`` and ``maximum`` are SI, NaN where nothing limits. ``rejects_j1939_codes`` is true where
+    SAE J1939-71 reserves the highest raw numbers for "error" and "not available".
+    """
+
+    signal: Signal
+    dbc_signal: str
+    field: BitField
+    to_si: float
+    minimum: float
+    maximum: float
+    latency_s: float
+    multiplexed_by: tuple[Condition, ...]
+    valid_when: tuple[Condition, ...]
+    rejects_j1939_codes: bool
+
+    @property
+    def resolution(self) -> float:
+        """The least step, in SI; NaN for a float."""
+        return math.nan if self.field.coding is Coding.FLOAT else abs(self.field.scale * self.to_si)
+
+    @property
+    def traits(self) -> SensorTraits:
+        """What the rooms beyond the bus need to know of it."""
+        return SensorTraits(self.latency_s, self.minimum, self.maximum, self.resolution)
+
+
+@dataclass(frozen=True, slots=True)
+class MappedMessage:
+    """A message that carries at least one of our signals; its frames hold exactly ``length`` bytes.
+
+    ``frame_id`` is the database's own, with EXTENDED_ID. ``fields`` are all its signals by their DBC names.
+    """
+
+    name: str
+    frame_id: int
+    id_filter: IdFilter
+    length: int
+    signals: tuple[MappedSignal, ...]
+    fields: Mapping[str, BitField]
+
+
+@dataclass(frozen=True)
+class SignalMap:
+    """A signal map and its databases, resolved.
+
+    ``channel`` filters log files (a live channel comes from the service's configuration); None takes
+    every channel.
+    """
+
+    name: str
+    channel: str | None
+    j1939: bool
+    messages: tuple[MappedMessage, ...]
+
+    @cached_property
+    def signals(self) -> tuple[Signal, ...]:
+        """The mapped signals in the order of Signal: the columns of Motion."""
+        mapped = {m.signal for message in self.messages for m in message.signals}
+        return tuple(signal for signal in Signal if signal in mapped)
+
+    @cached_property
+    def traits(self) -> Mapping[Signal, SensorTraits]:
+        """Latency, valid range and resolution of every mapped signal."""
+        return MappingProxyType({m.signal: m.traits for message in self.messages for m in message.signals})
+
+    @cached_property
+    def filters(self) -> tuple[IdFilter, ...]:
+        """The identifiers to ask the kernel for."""
+        return tuple(message.id_filter for message in self.messages)
+
+    @property
+    def payload_width(self) -> int:
+        """Bytes a frame's row must hold: 8, or 64 where a mapped message needs CAN FD."""
+        longest = max((message.length for message in self.messages), default=0)
+        return CLASSIC_BYTES if longest <= CLASSIC_BYTES else CAN_FD_BYTES
+
+
+def exact_filter(frame_id: int) -> IdFilter:
+    """This identifier (EXTENDED_ID set for 29 bits) and no other."""
+    return IdFilter(frame_id, EXTENDED_ID | (0x1FFF_FFFF if frame_id & EXTENDED_ID else 0x7FF))
+
+
+def j1939_filter(frame_id: int) -> IdFilter:
+    """The parameter group of a 29-bit identifier, whatever its priority and source address.
+
+    SAE J1939-21: bits 8 to 25 are the group; with a PDU format (bits 16 to 23) below 240, bits 8 to 15
+    are a destination address and belong to no group.
+    """
+    is_addressed = (frame_id >> 16 & 0xFF) < 240
+    group_mask = 0x03FF_0000 if is_addressed else 0x03FF_FF00
+    return IdFilter(frame_id & group_mask | EXTENDED_ID, group_mask | EXTENDED_ID)

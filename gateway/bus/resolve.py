@@ -1,0 +1,150 @@
+"""One entry of a signal map against its database message: bits, unit, range, conditions, each fault named."""
+
+import math
+from collections.abc import Mapping
+from typing import Final, Protocol
+
+from gateway.bus.bit_field import BitField, Coding
+from gateway.bus.database import DatabaseMessage, DatabaseSignal, closest
+from gateway.bus.mapping import Condition, MappedSignal
+from gateway.errors import SignalMapError
+from gateway.records import EXTENDED_ID, Signal
+from gateway.units import si_factor
+
+_QUANTITIES: Final[Mapping[Signal, str]] = {
+    Signal.VERTICAL_ACCELERATION: "acceleration",
+    Signal.PITCH_RATE: "angular_rate",
+    Signal.SPEED: "speed",
+    Signal.LONGITUDINAL_ACCELERATION: "acceleration",
+    Signal.WHEEL_SPEED: "speed",
+    Signal.IGNITION: "state",
+    Signal.AMBIENT_TEMPERATURE: "temperature",
+    Signal.AXLE_WEIGHT: "mass",
+}
+_EXACT_INTEGERS: Final = 1 << 53  # a double holds every integer up to here
+
+Accepted = int | float | str
+
+
+class Entry(Protocol):
+    """What a map says of one signal (SignalEntry of the file)."""
+
+    @property
+    def signal(self) -> str: ...
+    @property
+    def sign(self) -> int: ...
+    @property
+    def unit(self) -> str | None: ...
+    @property
+    def latency_s(self) -> float: ...
+    @property
+    def valid_when(self) -> Mapping[str, Accepted | list[Accepted]]: ...
+    @property
+    def minimum(self) -> float | None: ...
+    @property
+    def maximum(self) -> float | None: ...
+
+
+def resolve_signal(where: str, signal: Signal, entry: Entry, message: DatabaseMessage, j1939: bool) -> MappedSignal:
+    """The signal an entry means. ``where`` begins every SignalMapError."""
+    found = _find(f"{where}.signal", entry.signal, message)
+    _require_decodable(f"{where}.signal", found, message)
+    to_si = entry.sign * _unit_factor(f"{where}.unit", signal, entry, found)
+    minimum, maximum = _valid_range(where, entry, found, to_si)
+    return MappedSignal(
+        signal=signal,
+        dbc_signal=found.name,
+        field=found.field,
+        to_si=to_si,
+        minimum=minimum,
+        maximum=maximum,
+        latency_s=entry.latency_s,
+        multiplexed_by=_multiplexers(where, found, message),
+        valid_when=tuple(_condition(where, name, allowed, message) for name, allowed in entry.valid_when.items()),
+        rejects_j1939_codes=(j1939 and bool(message.frame_id & EXTENDED_ID) and found.field.coding is Coding.UNSIGNED),
+    )
+
+
+def _find(where: str, name: str, message: DatabaseMessage) -> DatabaseSignal:
+    if name in message.signals:
+        return message.signals[name]
+    raise SignalMapError(f"{where}: message {message.name!r} has no signal {name!r}; {closest(name, message.signals)}")
+
+
+def _require_decodable(where: str, signal: DatabaseSignal, message: DatabaseMessage) -> None:
+    field = signal.field
+    if field.coding is Coding.FLOAT and field.length not in (16, 32, 64):
+        raise SignalMapError(f"{where}: {signal.name!r} is a float of {field.length} bits; 16, 32 or 64 are possible")
+    if not 1 <= field.length <= 64:
+        raise SignalMapError(f"{where}: {signal.name!r} has {field.length} bits; 1 to 64 are possible")
+    if field.n_bytes > message.length:
+        raise SignalMapError(
+            f"{where}: {signal.name!r} ends in byte {field.n_bytes}, but {message.name!r} has {message.length}; "
+            f"correct {message.source.name}"
+        )
+    if field.scale == 0.0:
+        raise SignalMapError(f"{where}: {signal.name!r} has scale 0; correct {message.source.name}")
+    if _loses_integers(field):
+        raise SignalMapError(f"{where}: {signal.name!r} counts beyond 2^53, which a double cannot hold exactly")
+
+
+def _loses_integers(field: BitField) -> bool:
+    is_integer = field.coding is not Coding.FLOAT and field.scale.is_integer() and field.offset.is_integer()
+    return is_integer and max(map(abs, (*field.raw_range, *field.physical_range))) > _EXACT_INTEGERS
+
+
+def _unit_factor(where: str, signal: Signal, entry: Entry, found: DatabaseSignal) -> float:
+    try:
+        return si_factor(_QUANTITIES[signal], found.unit if entry.unit is None else entry.unit)
+    except SignalMapError as fault:
+        raise SignalMapError(f"{where}: {fault}") from None
+
+
+def _valid_range(where: str, entry: Entry, found: DatabaseSignal, to_si: float) -> tuple[float, float]:
+    """Least and greatest valid SI: the entry's word, else the database's, else what the bits can carry."""
+    low, high = found.field.physical_range
+    if found.minimum is not None and found.maximum is not None and found.minimum < found.maximum:
+        low, high = float(found.minimum), float(found.maximum)
+    ends = sorted((low * to_si, high * to_si))
+    minimum = ends[0] if entry.minimum is None else entry.minimum
+    maximum = ends[1] if entry.maximum is None else entry.maximum
+    if minimum >= maximum:
+        raise SignalMapError(f"{where}: minimum {minimum:g} is not below maximum {maximum:g} (both in SI)")
+    return (minimum if math.isfinite(minimum) else math.nan), (maximum if math.isfinite(maximum) else math.nan)
+
+
+def _multiplexers(where: str, signal: DatabaseSignal, message: DatabaseMessage) -> tuple[Condition, ...]:
+    """The chain of multiplexers that put ``signal`` into a frame, outermost last."""
+    if signal.multiplexer is None:
+        return ()
+    selector = _find(where, signal.multiplexer, message)
+    selected = Condition(selector.field, tuple(_bits_of(raw, selector.field) for raw in signal.multiplexer_ids))
+    return (selected, *_multiplexers(where, selector, message))
+
+
+def _condition(where: str, name: str, allowed: Accepted | list[Accepted], message: DatabaseMessage) -> Condition:
+    key = f"{where}.valid_when"
+    judged = _find(key, name, message)
+    _require_decodable(key, judged, message)
+    choices = allowed if isinstance(allowed, list) else [allowed]
+    return Condition(judged.field, tuple(_allowed_bits(f"{key}.{name}", choice, judged) for choice in choices))
+
+
+def _allowed_bits(where: str, allowed: Accepted, signal: DatabaseSignal) -> int:
+    """The raw bits that stand for a physical number, or for a named choice of the database."""
+    field = signal.field
+    if isinstance(allowed, str):
+        if allowed not in signal.choices:
+            raise SignalMapError(f"{where}: no value is called {allowed!r}; {closest(allowed, signal.choices)}")
+        return _bits_of(signal.choices[allowed], field)
+    if field.coding is Coding.FLOAT:
+        raise SignalMapError(f"{where}: {signal.name!r} is a float, which cannot be compared for equality")
+    raw = round((allowed - field.offset) / field.scale)
+    low, high = field.raw_range
+    if not low <= raw <= high or not math.isclose(raw * field.scale + field.offset, allowed, abs_tol=1e-9):
+        raise SignalMapError(f"{where}: {signal.name!r} can never be {allowed!r}")
+    return _bits_of(raw, field)
+
+
+def _bits_of(raw: int, field: BitField) -> int:
+    return raw & ((1 << field.length) - 1)

@@ -1,0 +1,102 @@
+"""Signal maps: the TOML file that tells which DBC signals are ours, checked and resolved against its databases."""
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from gateway.bus.database import DatabaseMessage, closest, load_messages
+from gateway.bus.mapping import MappedMessage, MappedSignal, SignalMap, exact_filter, j1939_filter
+from gateway.bus.resolve import resolve_signal
+from gateway.errors import SignalMapError
+from gateway.records import EXTENDED_ID, Signal
+from gateway.toml_file import load_toml
+
+__all__ = ["SignalEntry", "SignalMap", "SignalMapFile", "load_signal_map", "shipped_map", "shipped_maps"]
+
+SHIPPED_PREFIX: Final = "springscale:"
+
+Accepted = int | float | str
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class SignalEntry(BaseModel):
+    """[signals.NAME]: where one of our signals comes from."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    message: str = Field(description="name of the message in the DBC")
+    signal: str = Field(description="name of the signal in that message")
+    sign: Literal[-1, 1] = Field(1, description="-1 where the device counts against our axis (ISO 8855)")
+    unit: str | None = Field(None, description="unit of the DBC's physical values; overrides the DBC's own")
+    latency_s: float = Field(0.0, ge=0.0, le=10.0, description="how late the device sends what it measured")
+    valid_when: dict[str, Accepted | list[Accepted]] = Field(
+        default_factory=dict, description="signals of the same message and the values under which this one counts"
+    )
+    minimum: Finite | None = Field(None, description="least valid value in SI; overrides the DBC's range")
+    maximum: Finite | None = Field(None, description="greatest valid value in SI; overrides the DBC's range")
+
+
+class SignalMapFile(BaseModel):
+    """The whole file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    dbc: list[str] = Field(min_length=1, description="databases (DBC, KCD, ARXML, SYM), relative to this file")
+    channel: str | None = Field(None, description="read only frames of this channel from log files")
+    j1939: bool = Field(False, description="match 29-bit identifiers by PGN, whatever the source address")
+    signals: dict[Signal, SignalEntry] = Field(min_length=1, description="our signals")
+
+
+def load_signal_map(path: Path | str) -> SignalMap:
+    """Read and resolve a signal map; ``springscale:NAME`` is one of those that come with the package.
+
+    Raises SignalMapError naming the file, the key, what is wrong with it and how to mend it.
+    """
+    name = str(path)
+    file_path = shipped_map(name.removeprefix(SHIPPED_PREFIX)) if name.startswith(SHIPPED_PREFIX) else Path(path)
+    wanted = load_toml(file_path, SignalMapFile, SignalMapError)
+    databases = load_messages(file_path, [file_path.parent / dbc for dbc in wanted.dbc])
+    mapped: dict[str, list[MappedSignal]] = {}
+    for signal, entry in wanted.signals.items():
+        where = f"{file_path}: signals.{signal}"
+        if entry.message not in databases:
+            hint = closest(entry.message, databases)
+            raise SignalMapError(f"{where}.message: the databases have no message {entry.message!r}; {hint}")
+        resolved = resolve_signal(where, signal, entry, databases[entry.message], wanted.j1939)
+        mapped.setdefault(entry.message, []).append(resolved)
+    messages = tuple(_mapped_message(databases[m], tuple(signals), wanted.j1939) for m, signals in mapped.items())
+    _require_distinct(messages, file_path)
+    return SignalMap(str(path), wanted.channel, wanted.j1939, messages)
+
+
+def shipped_maps() -> tuple[str, ...]:
+    """Names of the signal maps that come with the package."""
+    names = (Path(entry.name) for entry in files("gateway.dbc").iterdir())
+    return tuple(sorted(name.stem for name in names if name.suffix == ".toml"))
+
+
+def shipped_map(name: str) -> Path:
+    """Path of a signal map that comes with the package. Raises SignalMapError naming those there are."""
+    if name not in shipped_maps():
+        raise SignalMapError(f"{SHIPPED_PREFIX}{name}: no such map; there are {', '.join(shipped_maps())}")
+    return Path(str(files("gateway.dbc") / f"{name}.toml"))
+
+
+def _mapped_message(message: DatabaseMessage, signals: tuple[MappedSignal, ...], j1939: bool) -> MappedMessage:
+    by_group = j1939 and bool(message.frame_id & EXTENDED_ID)
+    id_filter = j1939_filter(message.frame_id) if by_group else exact_filter(message.frame_id)
+    fields = {name: signal.field for name, signal in message.signals.items()}
+    return MappedMessage(message.name, message.frame_id, id_filter, message.length, signals, fields)
+
+
+def _require_distinct(messages: tuple[MappedMessage, ...], path: Path) -> None:
+    for i, one in enumerate(messages):
+        for other in messages[i + 1 :]:
+            common = one.id_filter.mask & other.id_filter.mask
+            if (one.id_filter.can_id ^ other.id_filter.can_id) & common == 0:
+                raise SignalMapError(
+                    f"{path}: messages {one.name!r} and {other.name!r} are the same frames on the bus; "
+                    "map all their signals from one of them"
+                )
