@@ -62,8 +62,10 @@ class LineShape:
 
         Payload beyond ``width`` bytes is cut off; the length says what the line held.
         """
-        columns = np.arange(len(self.template))[:, None] - self.hash_at
-        lines = text[hashes + columns]  # one row a column of the line: every step below runs along contiguous rows
+        n_columns = len(self.template)
+        starts = np.ndarray(len(text) - n_columns + 1, f"V{n_columns}", buffer=text, strides=(1,))
+        rows = starts[hashes - self.hash_at].view(np.uint8).reshape(-1, n_columns)
+        lines = np.ascontiguousarray(rows.T)  # one row a column of the line: every step below runs along one
         fits = (lines[self.literals] == self.template[self.literals, None]).all(axis=0)
         if not fits.all():
             lines = lines[:, fits]

@@ -17,7 +17,7 @@ from gateway.records import U8
 BLOCK_BYTES: Final = 1 << 20  # stays in the cache; reading a file whole costs three times the decode in page faults
 MARGIN: Final = 512  # lets a reader look this far around any byte of a block
 _GZIP_MAGIC: Final = b"\x1f\x8b"
-_DAMAGE: Final[tuple[type[Exception], ...]] = (EOFError, OSError, zlib.error, isal_zlib.error)
+_IsalError = cast(type[Exception], isal_zlib.error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ def open_maybe_gzip(path: Path) -> AbstractContextManager[BinaryIO]:
     try:
         with path.open("rb") as file:
             is_gzip = file.read(2) == _GZIP_MAGIC
-        return cast(BinaryIO, igzip.IGzipFile(path)) if is_gzip else path.open("rb")
+        return cast(BinaryIO, igzip.IGzipFile(path)) if is_gzip else path.open("rb")  # type: ignore[no-untyped-call] # isal has no types
     except OSError as fault:
         raise LogUnreadableError(f"{path}: cannot be read: {fault.strerror or fault}") from None
 
@@ -83,6 +83,6 @@ def _fill(stream: BinaryIO, free: memoryview, report: LogReport) -> int:
     try:
         while n_read < len(free) and (n := stream.readinto1(free[n_read:])):  # type: ignore[attr-defined] # BufferedIOBase has it
             n_read += n
-    except _DAMAGE as fault:
+    except (EOFError, OSError, zlib.error, _IsalError) as fault:
         report.ended_early = f"the file is damaged: {fault}"
     return n_read

@@ -1,0 +1,56 @@
+"""Any log file as the wanted frames of a signal map."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from gateway.bus.candump import read_candump
+from gateway.bus.decode import Decoder
+from gateway.bus.log_report import LogReport
+from gateway.bus.message_log import MESSAGE_SUFFIXES, read_message_log
+from gateway.bus.signal_map import SignalMap
+from gateway.errors import LogUnreadableError
+from gateway.records import Frames, Motion
+
+CANDUMP_SUFFIXES: Final = (".log", ".txt", ".candump", "")
+
+
+def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames], LogReport]:
+    """The map's frames of a log in order of arrival, and a report that fills while they are read.
+
+    candump text (.log, .txt, .candump, gzip or not) goes through the fast reader, .asc .blf .mf4 .trc
+    .csv .db through python-can's. Raises LogUnreadableError where the file is missing or of an unknown kind.
+    """
+    path = Path(path)
+    report = LogReport(path)
+    suffix = log_suffix(path)
+    _require_file(path)
+    filters, channel, width = signal_map.filters, signal_map.channel, signal_map.payload_width
+    if suffix in CANDUMP_SUFFIXES:
+        return read_candump(path, filters, channel, width=width, report=report), report
+    if suffix in MESSAGE_SUFFIXES:
+        return read_message_log(path, suffix, filters, channel, width, report), report
+    known = " ".join((*CANDUMP_SUFFIXES[:-1], *MESSAGE_SUFFIXES))
+    raise LogUnreadableError(
+        f"{path}: cannot tell the kind of log from {suffix!r}; known are {known}, and each with .gz"
+    )
+
+
+def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Motion], LogReport, Decoder]:
+    """A log decoded: motion in chunks, the reader's report and the decoder with its counts."""
+    chunks, report = open_log(path, signal_map)
+    decoder = Decoder(signal_map)
+    return map(decoder.decode, chunks), report, decoder
+
+
+def log_suffix(path: Path) -> str:
+    """Lower-case suffix of the log's kind, without ``.gz``."""
+    name = path.with_suffix("") if path.suffix.lower() == ".gz" else path
+    return name.suffix.lower()
+
+
+def _require_file(path: Path) -> None:
+    if path.is_dir():
+        raise LogUnreadableError(f"{path}: is a folder, a log file is wanted")
+    if not path.exists():
+        raise LogUnreadableError(f"{path}: no such file")
