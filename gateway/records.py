@@ -5,6 +5,7 @@ integer nanoseconds since 1970-01-01 UTC.
 """
 
 import hashlib
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -281,6 +282,11 @@ def estimate_to_json(estimate: Estimate) -> dict[str, Any]:
             "phase_rad": _numbers(e.spectra.phase_rad, 5),
         }
     return record
+
+
+def json_line(record: Mapping[str, Any]) -> str:
+    """The record as compact JSON on one line: the text that is printed, stored and sent."""
+    return json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def _interval(bounds: tuple[float, float]) -> list[float] | None:

@@ -1,0 +1,120 @@
+"""The bounded waiting room between the pipeline and the disk."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+from gateway.store.rows import EstimateRow, Row
+
+SEQ_STRIDE: Final = 1 << 20  # each opening of a database begins a new stride
+
+
+class Held:
+    """Rows accepted but not yet on disk, oldest first, and the numbering of estimates.
+
+    While the disk works a row stays here for milliseconds; while it refuses, this is the memory the
+    store degrades to. Over ``capacity`` the oldest row that is not just being written gives way and is
+    counted. Thread-safe.
+
+    ``epoch`` and ``seq`` make the cursor of an estimate. Numbers go up and are never used twice within
+    an epoch, not even after a kill that lost rows somebody has read: each opening jumps to a new stride.
+    """
+
+    def __init__(self, capacity: int, epoch: str, last_seq: int = 0) -> None:
+        self._capacity = capacity
+        self._changed = threading.Condition()
+        self._waiting: deque[Row] = deque()
+        self._in_flight: tuple[Row, ...] = ()
+        self._epoch = epoch
+        self._next_seq = _after(last_seq)
+        self.n_dropped = 0
+
+    @property
+    def epoch(self) -> str:
+        return self._epoch
+
+    def rebase(self, epoch: str, last_seq: int) -> None:
+        """Go on in a database that was found later, behind what it already holds."""
+        with self._changed:
+            self._epoch, self._next_seq = epoch, _after(last_seq)
+            self._waiting = deque(self._renumbered(row) for row in self._waiting)
+
+    def add(self, row: Row) -> None:
+        """Accept an event or a calibration."""
+        with self._changed:
+            self._append(row)
+
+    def add_estimate(self, make_row: Callable[[int], EstimateRow]) -> str:
+        """Accept an estimate made with the number it gets here; its cursor."""
+        with self._changed:
+            seq = self._take_number()
+            self._append(make_row(seq))
+            return f"{self._epoch}-{seq}"
+
+    def wait_for_rows(self, timeout_s: float, has_other_work: Callable[[], bool]) -> None:
+        """Sleep until a row waits, ``wake`` finds other work, or the time is out."""
+        with self._changed:
+            self._changed.wait_for(lambda: bool(self._waiting) or has_other_work(), timeout_s)
+
+    def take(self) -> tuple[Row, ...]:
+        """All that waits, now in flight: end with ``settle`` or ``give_back``."""
+        with self._changed:
+            self._in_flight = tuple(self._waiting)
+            self._waiting.clear()
+            return self._in_flight
+
+    def settle(self) -> None:
+        """What was in flight is on disk."""
+        with self._changed:
+            self._in_flight = ()
+            self._changed.notify_all()
+
+    def give_back(self) -> None:
+        """What was in flight could not be written: it waits again, in its old order."""
+        with self._changed:
+            self._waiting.extendleft(reversed(self._in_flight))
+            self._in_flight = ()
+            self._drop_over_capacity()
+
+    def wake(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def wait_until_empty(self, timeout_s: float) -> bool:
+        with self._changed:
+            return self._changed.wait_for(lambda: not self._waiting and not self._in_flight, timeout_s)
+
+    def estimates(self) -> tuple[str, tuple[EstimateRow, ...]]:
+        """The epoch and the estimates not yet on disk, oldest first."""
+        with self._changed:
+            rows = (*self._in_flight, *self._waiting)
+            return self._epoch, tuple(row for row in rows if isinstance(row, EstimateRow))
+
+    def __len__(self) -> int:
+        with self._changed:
+            return len(self._in_flight) + len(self._waiting)
+
+    def _append(self, row: Row) -> None:
+        self._waiting.append(row)
+        self._drop_over_capacity()
+        self._changed.notify_all()
+
+    def _drop_over_capacity(self) -> None:
+        while self._waiting and len(self._in_flight) + len(self._waiting) > self._capacity:
+            self._waiting.popleft()
+            self.n_dropped += 1
+
+    def _take_number(self) -> int:
+        seq = self._next_seq
+        self._next_seq += 1
+        return seq
+
+    def _renumbered(self, row: Row) -> Row:
+        return replace(row, seq=self._take_number()) if isinstance(row, EstimateRow) else row
+
+
+def _after(last_seq: int) -> int:
+    """The first number of the stride behind ``last_seq``."""
+    return (last_seq // SEQ_STRIDE + 1) * SEQ_STRIDE

@@ -1,0 +1,233 @@
+"""Answers from the store: read-only, bounded in time, blind to nothing that was accepted."""
+
+import json
+import sqlite3
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.errors import StoreError
+from gateway.records import json_line
+from gateway.store.database import is_damaged
+from gateway.store.rows import EstimateRow
+from gateway.store.schema import connect_reader
+from gateway.units import NS_PER_S
+
+QUERY_LIMIT_S: Final = 2.0
+_STEPS_PER_LOOK: Final = 10_000  # SQLite instructions between two looks at the clock
+_FIRST_NS: Final = -(1 << 63)
+_LAST_NS: Final = (1 << 63) - 1
+
+HeldEstimates = Callable[[], tuple[str, tuple[EstimateRow, ...]]]
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A piece of the history: JSON texts in order.
+
+    ``next_cursor`` asks for more, None where there is no more now; ``last_cursor`` is the newest row
+    of this page: the place to go on from when more arrives (None while there is nothing at all).
+    """
+
+    items: tuple[str, ...]
+    next_cursor: str | None
+    last_cursor: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Latest:
+    """The last answer and the last rejection, as JSON; age_s of the answer by the wall clock."""
+
+    estimate: str | None
+    rejection: str | None
+    age_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened to the service; ``detail`` is JSON."""
+
+    t_ns: int
+    kind: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Window:
+    """Which rows are asked for."""
+
+    after_seq: int | None
+    since_ns: int
+    until_ns: int
+    newest_first: bool
+
+    def holds(self, row: EstimateRow) -> bool:
+        if not self.since_ns <= row.t_end_ns < self.until_ns:
+            return False
+        if self.after_seq is None:
+            return True
+        return row.seq < self.after_seq if self.newest_first else row.seq > self.after_seq
+
+
+class StoreReader:
+    """Read-only view of a store, safe in any thread.
+
+    Each question opens its own connection, so no handle outlives a database that was set aside. A
+    question that takes longer than ``limit_s`` raises TimeoutError; a database that cannot be read
+    raises StoreError.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        held: HeldEstimates,
+        clock_ns: Callable[[], int],
+        on_damage: Callable[[], None],
+        limit_s: float = QUERY_LIMIT_S,
+    ) -> None:
+        self._path = path
+        self._held = held
+        self._clock_ns = clock_ns
+        self._on_damage = on_damage
+        self._limit_s = limit_s
+
+    def estimates(
+        self,
+        *,
+        since_ns: int | None = None,
+        until_ns: int | None = None,
+        limit: int = 100,
+        cursor: str | None = None,
+        newest_first: bool = False,
+        with_spectra: bool = True,
+    ) -> Page:
+        """Estimates and rejections with since_ns <= t_end_ns < until_ns, in the order of their arrival.
+
+        Following ``next_cursor`` misses nothing and repeats nothing while rows arrive. A cursor of a
+        database that is gone begins from the first row. Raises ValueError for a cursor we never gave.
+        """
+        # What is held must be read before the file: a row that moves to disk meanwhile is then seen twice
+        # and merged by its number, instead of not at all.
+        epoch, held = self._held()
+        window = _Window(
+            _seq_after(cursor, epoch),
+            _FIRST_NS if since_ns is None else max(since_ns, _FIRST_NS),
+            _LAST_NS if until_ns is None else min(until_ns, _LAST_NS),
+            newest_first,
+        )
+        with self._connection() as connection:
+            rows = {} if connection is None else _stored(connection, window, limit + 1, with_spectra)
+            fresh = [row for row in held if window.holds(row) and not _is_stored(connection, row)]
+        rows |= {row.seq: row.text if with_spectra else _without_spectra(row.text) for row in fresh}
+        seqs = sorted(rows, reverse=newest_first)
+        shown = seqs[:limit]
+        return Page(
+            items=tuple(rows[seq] for seq in shown),
+            next_cursor=f"{epoch}-{shown[-1]}" if len(seqs) > limit else None,
+            last_cursor=f"{epoch}-{max(shown)}" if shown else cursor,
+        )
+
+    def latest(self) -> Latest:
+        """The last answer and the last rejection ever accepted."""
+        _, held = self._held()
+        with self._connection() as connection:
+            found = [_newest(connection, held, is_rejected) for is_rejected in (False, True)]
+        answer, rejection = found
+        return Latest(
+            estimate=None if answer is None else answer[1],
+            rejection=None if rejection is None else rejection[1],
+            age_s=None if answer is None else max(0.0, (self._clock_ns() - answer[0]) / NS_PER_S),
+        )
+
+    def events(self, limit: int = 100) -> list[Event]:
+        """The last things that happened to the service and are on disk, newest first."""
+        rows = self._ask("SELECT t_ns, kind, text FROM events ORDER BY seq DESC LIMIT ?", (limit,))
+        return [Event(*row) for row in rows]
+
+    def calibration(self, calibration_id: str) -> str | None:
+        """A calibration's JSON by its hash."""
+        rows = self._ask("SELECT text FROM calibrations WHERE id = ?", (calibration_id,))
+        return rows[0][0] if rows else None
+
+    def _ask(self, sql: str, parameters: tuple[Any, ...]) -> list[tuple[Any, ...]]:
+        with self._connection() as connection:
+            return [] if connection is None else connection.execute(sql, parameters).fetchall()
+
+    @contextmanager
+    def _connection(self) -> Iterator[sqlite3.Connection | None]:
+        """A connection under the time limit; None where there is no database (yet)."""
+        if not self._path.exists():
+            yield None
+            return
+        try:
+            with closing(connect_reader(self._path)) as connection:
+                self._limit_time(connection)
+                connection.execute("BEGIN")  # one snapshot for all that one question looks at
+                yield connection
+        except sqlite3.Error as error:
+            raise self._explained(error) from error
+
+    def _limit_time(self, connection: sqlite3.Connection) -> None:
+        end_s = time.monotonic() + self._limit_s
+        connection.set_progress_handler(lambda: time.monotonic() > end_s, _STEPS_PER_LOOK)
+
+    def _explained(self, error: sqlite3.Error) -> Exception:
+        if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
+            return TimeoutError(f"the question took longer than {self._limit_s:g} s: ask for less at a time")
+        if is_damaged(error):
+            self._on_damage()
+        return StoreError(f"{self._path} cannot be read: {error}")
+
+
+def _seq_after(cursor: str | None, epoch: str) -> int | None:
+    if cursor is None:
+        return None
+    of_epoch, _, digits = cursor.partition("-")
+    if not (of_epoch.isalnum() and digits.isascii() and digits.isdigit() and len(digits) < 19):
+        raise ValueError(f"{cursor!r} is not a cursor: take next_cursor of an earlier answer as it is")
+    return int(digits) if of_epoch == epoch else None
+
+
+def _stored(connection: sqlite3.Connection, window: _Window, limit: int, with_spectra: bool) -> dict[int, str]:
+    text = "text" if with_spectra else "json_remove(text, '$.spectra')"
+    beyond, order = ("<", "DESC") if window.newest_first else (">", "ASC")
+    is_timed = window.since_ns > _FIRST_NS or window.until_ns < _LAST_NS
+    index = "INDEXED BY estimates_by_time" if is_timed else "NOT INDEXED"
+    start = window.after_seq if window.after_seq is not None else (_LAST_NS if window.newest_first else _FIRST_NS)
+    sql = f"""
+        SELECT seq, {text} FROM estimates WHERE seq IN (
+            SELECT seq FROM estimates {index}
+            WHERE seq {beyond} ? AND t_end_ns >= ? AND t_end_ns < ? ORDER BY seq {order} LIMIT ?
+        )
+        """
+    return dict(connection.execute(sql, (start, window.since_ns, window.until_ns, limit)).fetchall())
+
+
+def _is_stored(connection: sqlite3.Connection | None, row: EstimateRow) -> bool:
+    if connection is None:
+        return False
+    return connection.execute("SELECT 1 FROM estimates WHERE id = ?", (row.id,)).fetchone() is not None
+
+
+def _newest(
+    connection: sqlite3.Connection | None, held: tuple[EstimateRow, ...], is_rejected: bool
+) -> tuple[int, str] | None:
+    """(received_ns, text) of the newest row of one outcome."""
+    of_outcome = [row for row in held if row.is_rejected is is_rejected]
+    if of_outcome:
+        return of_outcome[-1].received_ns, of_outcome[-1].text
+    if connection is None:
+        return None
+    found: tuple[int, str] | None = connection.execute(
+        "SELECT received_ns, text FROM estimates WHERE is_rejected = ? ORDER BY seq DESC LIMIT 1", (is_rejected,)
+    ).fetchone()
+    return found
+
+
+def _without_spectra(text: str) -> str:
+    record = json.loads(text)
+    record.pop("spectra", None)
+    return json_line(record)

@@ -1,0 +1,56 @@
+"""The rows the database holds, each knowing its own INSERT."""
+
+from dataclasses import astuple, dataclass
+from typing import Any, ClassVar
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateRow:
+    """One batch: an estimate or a rejection. ``text`` is its JSON, compact; ``seq`` orders and never repeats."""
+
+    INSERT: ClassVar[str] = (
+        "INSERT INTO estimates (seq, id, t_end_ns, vehicle_id, estimator, calibration_id, is_rejected, received_ns,"
+        " text) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING"
+    )
+
+    seq: int
+    id: str
+    t_end_ns: int
+    vehicle_id: str | None
+    estimator: str
+    calibration_id: str | None
+    is_rejected: bool
+    received_ns: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class EventRow:
+    """Something that happened to the service: start, stop, bus lost, disk full."""
+
+    INSERT: ClassVar[str] = "INSERT INTO events (t_ns, kind, text) VALUES (?, ?, ?)"
+
+    t_ns: int
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationRow:
+    """A calibration file's content under its hash, so that every estimate can be traced to it."""
+
+    INSERT: ClassVar[str] = (
+        "INSERT INTO calibrations (id, received_ns, text) VALUES (?, ?, ?) ON CONFLICT (id) DO NOTHING"
+    )
+
+    id: str
+    received_ns: int
+    text: str
+
+
+Row = EstimateRow | EventRow | CalibrationRow
+
+
+def bound(row: Row) -> tuple[Any, ...]:
+    """The row's fields in the order of its INSERT."""
+    return astuple(row)

@@ -1,0 +1,93 @@
+"""The shape of the database and how an older one is brought up to it."""
+
+import sqlite3
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from gateway.errors import StoreError
+
+APPLICATION_ID: Final = 0x53505253  # "SPRS" in the file's header
+
+# Entry i turns schema i into schema i + 1. Entries are never edited, only added.
+MIGRATIONS: Final[tuple[str, ...]] = (
+    """
+    CREATE TABLE epochs (id TEXT NOT NULL) STRICT;
+    CREATE TABLE estimates (
+        seq INTEGER PRIMARY KEY AUTOINCREMENT,
+        id TEXT NOT NULL UNIQUE,
+        t_end_ns INTEGER NOT NULL,
+        vehicle_id TEXT,
+        estimator TEXT NOT NULL,
+        calibration_id TEXT,
+        is_rejected INTEGER NOT NULL,
+        received_ns INTEGER NOT NULL,
+        text TEXT NOT NULL
+    ) STRICT;
+    CREATE INDEX estimates_by_time ON estimates (t_end_ns);
+    CREATE INDEX estimates_by_outcome ON estimates (is_rejected, seq);
+    CREATE TABLE events (
+        seq INTEGER PRIMARY KEY AUTOINCREMENT,
+        t_ns INTEGER NOT NULL,
+        kind TEXT NOT NULL,
+        text TEXT NOT NULL
+    ) STRICT;
+    CREATE TABLE calibrations (
+        id TEXT PRIMARY KEY,
+        received_ns INTEGER NOT NULL,
+        text TEXT NOT NULL
+    ) STRICT;
+    """,
+)
+
+
+def connect_writer(path: Path, migrations: Sequence[str] = MIGRATIONS) -> sqlite3.Connection:
+    """The one connection that writes, its schema brought up to date; every commit reaches the disk.
+
+    Raises StoreError for a file of a newer Springscale or of another program, sqlite3.Error for what
+    the disk refuses.
+    """
+    connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=5.0)
+    try:
+        _refuse_foreign(connection, path, len(migrations))
+        connection.execute("PRAGMA auto_vacuum = INCREMENTAL")  # counts for a new file only
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA journal_size_limit = 4194304")
+        _migrate(connection, migrations)
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def connect_reader(path: Path) -> sqlite3.Connection:
+    """A connection that can only read. Raises sqlite3.OperationalError where there is no file."""
+    connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, isolation_level=None, timeout=1.0)
+    connection.execute("PRAGMA query_only = ON")
+    return connection
+
+
+def pragma(connection: sqlite3.Connection, name: str) -> int:
+    """One of SQLite's numbers about the file."""
+    return int(connection.execute(f"PRAGMA {name}").fetchone()[0])
+
+
+def _refuse_foreign(connection: sqlite3.Connection, path: Path, newest: int) -> None:
+    version = pragma(connection, "user_version")
+    is_empty = connection.execute("SELECT 1 FROM sqlite_schema LIMIT 1").fetchone() is None
+    if pragma(connection, "application_id") != APPLICATION_ID and not (is_empty and version == 0):
+        raise StoreError(f"{path} is a database of another program: give [store] directory a place of its own")
+    if version > newest:
+        raise StoreError(
+            f"{path} has schema {version}, this Springscale knows {newest}: "
+            "install the newer Springscale again or move the file away"
+        )
+
+
+def _migrate(connection: sqlite3.Connection, migrations: Sequence[str]) -> None:
+    for version in range(pragma(connection, "user_version"), len(migrations)):
+        connection.executescript(
+            f"BEGIN IMMEDIATE; {migrations[version]};"
+            f"PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {version + 1}; COMMIT;"
+        )

@@ -1,0 +1,235 @@
+"""The store: one thread writes, nobody waits for the disk, nothing is lost without being counted."""
+
+import logging
+import secrets
+import sqlite3
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.errors import StoreError
+from gateway.records import json_line
+from gateway.store.database import FILE_NAME, Database, Retention, is_damaged
+from gateway.store.held import Held
+from gateway.store.reader import StoreReader
+from gateway.store.rows import CalibrationRow, EstimateRow, EventRow
+
+_log = logging.getLogger(__name__)
+
+IDLE_S: Final = 60.0  # without new rows: how often age is looked at
+RETRY_FIRST_S: Final = 0.5
+RETRY_LAST_S: Final = 30.0
+
+
+class StoreState(StrEnum):
+    OK = "ok"
+    DEGRADED = "degraded"
+
+
+@dataclass(frozen=True, slots=True)
+class StoreHealth:
+    """What the store tells of itself. ``reason`` says what the disk refuses while degraded.
+
+    ``n_held`` rows wait in memory; ``n_dropped`` had to give way there; ``set_aside`` names the last
+    damaged database that was renamed out of the way.
+    """
+
+    state: StoreState
+    reason: str | None
+    n_written: int
+    n_held: int
+    n_dropped: int
+    n_duplicates: int
+    n_pruned: int
+    size_bytes: int
+    set_aside: str | None
+
+
+class Store:
+    """Estimates, events and calibrations in one directory. Every method may be called from any thread.
+
+    A disk that is full, read-only or gone degrades the store to memory, with a warning in ``health``
+    and in the log; it comes back by itself and then writes what it held.
+    """
+
+    def __init__(self, directory: Path, retention: Retention, clock_ns: Callable[[], int]) -> None:
+        self._path = directory / FILE_NAME
+        self._database = Database(directory, retention)
+        self._clock_ns = clock_ns
+        self._held = Held(retention.max_held, epoch=secrets.token_hex(4))
+        self._closing = threading.Event()
+        self._suspect = threading.Event()
+        self._reason: str | None = None
+        self._set_aside: str | None = None
+        self._n_written = self._n_duplicates = self._n_pruned = self._size_bytes = 0
+        self._has_numbers = False  # whether the numbering is that of a database
+        self._thread = threading.Thread(target=self._write_until_closed, name="store-writer", daemon=True)
+
+    @classmethod
+    def open(
+        cls, directory: Path, retention: Retention | None = None, clock_ns: Callable[[], int] = time.time_ns
+    ) -> "Store":
+        """Open or create the database in ``directory`` and start its writer.
+
+        Raises StoreError where going on would do harm: a newer schema, another program's file, another
+        Springscale at work there. A disk that refuses is no error: the store starts degraded.
+        """
+        store = cls(directory, retention or Retention(), clock_ns)
+        try:
+            store._attempt()
+        except StoreError:
+            store._database.close()
+            raise
+        store._thread.start()
+        return store
+
+    def write_estimate(self, record: Mapping[str, Any]) -> str:
+        """Accept an estimate or a rejection, the object of ``estimate_to_json`` -> its cursor.
+
+        Returns at once; an id the database already has is counted and not stored again.
+        """
+        if record.get("provisional"):
+            raise ValueError("provisional estimates go to latest and the stream, not into the store")
+        text, received_ns = json_line(record), self._clock_ns()
+        return self._held.add_estimate(
+            lambda seq: EstimateRow(
+                seq=seq,
+                id=record["id"],
+                t_end_ns=record["t_end_ns"],
+                vehicle_id=record["vehicle_id"],
+                estimator=record["estimator"],
+                calibration_id=record["calibration_id"],
+                is_rejected=bool(record["rejected"]),
+                received_ns=received_ns,
+                text=text,
+            )
+        )
+
+    def write_event(self, kind: str, detail: Mapping[str, Any]) -> None:
+        """Accept something that happened to the service."""
+        self._held.add(EventRow(self._clock_ns(), kind, json_line(detail)))
+
+    def write_calibration(self, calibration_id: str, text: str) -> None:
+        """Keep the calibration that estimates will name."""
+        self._held.add(CalibrationRow(calibration_id, self._clock_ns(), text))
+
+    def flush(self, timeout_s: float) -> bool:
+        """Wait until all that was accepted is on disk; False where the time did not suffice."""
+        return self._held.wait_until_empty(timeout_s)
+
+    def reader(self) -> StoreReader:
+        """Answers questions from any thread, from what is on disk and what is held."""
+        return StoreReader(self._path, self._held.estimates, self._clock_ns, self._suspect_damage)
+
+    def health(self) -> StoreHealth:
+        return StoreHealth(
+            state=StoreState.OK if self._reason is None else StoreState.DEGRADED,
+            reason=self._reason,
+            n_written=self._n_written,
+            n_held=len(self._held),
+            n_dropped=self._held.n_dropped,
+            n_duplicates=self._n_duplicates,
+            n_pruned=self._n_pruned,
+            size_bytes=self._size_bytes,
+            set_aside=self._set_aside,
+        )
+
+    def is_alive(self) -> bool:
+        """False once the writer has ended, whether closed or dead."""
+        return self._thread.is_alive()
+
+    def close(self, timeout_s: float = 1.0) -> int:
+        """Write what is held, end the writer -> rows that could not be stored."""
+        self._closing.set()
+        self._held.wake()
+        self._thread.join(timeout_s)
+        n_lost = len(self._held)
+        if n_lost:
+            _log.error("store closed with %d rows that could not be written: %s", n_lost, self._reason or "no time")
+        return n_lost
+
+    def _suspect_damage(self) -> None:
+        self._suspect.set()
+        self._held.wake()
+
+    def _write_until_closed(self) -> None:
+        pause_s = RETRY_FIRST_S
+        while True:
+            is_last = self._closing.is_set()
+            if self._try():
+                pause_s = RETRY_FIRST_S
+                if is_last and not len(self._held):
+                    break
+                self._held.wait_for_rows(IDLE_S, self._has_other_work)
+            elif is_last:
+                break
+            else:
+                self._closing.wait(pause_s)
+                pause_s = min(2 * pause_s, RETRY_LAST_S)
+        self._database.close()
+
+    def _has_other_work(self) -> bool:
+        return self._closing.is_set() or self._suspect.is_set()
+
+    def _try(self) -> bool:
+        try:
+            return self._attempt()
+        except StoreError as error:  # since the start somebody put a foreign file there
+            return self._degrade(str(error))
+
+    def _attempt(self) -> bool:
+        """Bring to disk what is held; False where the disk refuses, and then it is still held."""
+        try:
+            self._open_if_closed()
+            if self._suspect.is_set():
+                self._suspect.clear()
+                self._database.check()
+            self._commit()
+        except sqlite3.Error as error:
+            self._held.give_back()
+            return self._set_damaged_aside(error) if is_damaged(error) else self._degrade(f"{self._path}: {error}")
+        except OSError as error:
+            self._held.give_back()
+            return self._degrade(str(error))
+        return True
+
+    def _open_if_closed(self) -> None:
+        if self._database.is_open:
+            return
+        opened = self._database.open(self._held.epoch)
+        if not self._has_numbers:
+            self._held.rebase(opened.epoch, opened.last_seq)
+            self._has_numbers = True
+
+    def _commit(self) -> None:
+        rows = self._held.take()
+        if rows:
+            n_new, n_known = self._database.add(rows)
+            self._n_written += n_new
+            self._n_duplicates += n_known
+        if self._reason is not None:
+            _log.warning("store is on disk again, %d rows had been held", len(rows))
+            self._reason = None
+        self._held.settle()  # whoever waits in flush finds the counters and the state as they are now
+        self._n_pruned += self._database.prune(self._clock_ns())
+        self._size_bytes = self._database.size_bytes()
+
+    def _degrade(self, reason: str) -> bool:
+        """Note what the disk refuses. The connection stays: as long as it lives, readers need no new file."""
+        if self._reason != reason:
+            _log.warning("store keeps estimates in memory: %s", reason)
+        self._reason = reason
+        return False
+
+    def _set_damaged_aside(self, error: sqlite3.Error) -> bool:
+        """Rename a damaged file; the next attempt starts a new one with the same numbering."""
+        try:
+            self._set_aside = self._database.set_aside()
+        except OSError as refusal:
+            return self._degrade(f"{self._path} is damaged ({error}) and cannot be set aside: {refusal}")
+        _log.error("%s is damaged (%s): set aside as %s, a new one begins", self._path, error, self._set_aside)
+        return self._degrade(f"{self._path} was damaged and set aside as {self._set_aside}, a new one is on its way")

@@ -1,0 +1,206 @@
+"""A disk that refuses, a file that is damaged, a directory that is taken: the store goes on or says why not."""
+
+import json
+import os
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from support.estimates import make_record, texts
+
+from gateway.errors import StoreError
+from gateway.store import Retention, Store, StoreReader, StoreState, schema
+
+
+def test_a_full_disk_degrades_to_memory_and_heals(tmp_path: Path) -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "support.full_disk", tmp_path],
+        capture_output=True,
+        check=False,
+        text=True,
+        timeout=60.0,
+        cwd=Path(__file__).parents[1],
+    )
+    assert run.returncode == 0, run.stderr
+    said = json.loads(run.stdout)
+    assert said["is_written"] == [True, False, True]
+    assert said["full"] == said["full"] | {"state": "degraded", "n_held": 6, "n_dropped": 0}
+    assert "springscale.db" in said["full"]["reason"]
+    assert said["healed"] == said["healed"] | {"state": "ok", "reason": None, "n_held": 0, "n_written": 9}
+    assert said["n_lost"] == 0
+    everything = list(texts(*(make_record(n) for n in range(9))))
+    assert said["seen_while_full"] == everything
+    assert said["seen_afterwards"] == everything
+
+
+def blocked_directory(tmp_path: Path) -> Path:
+    """A place where no directory can be made, not even by root: its parent is a file."""
+    (tmp_path / "mount").write_text("not a directory")
+    return tmp_path / "mount" / "springscale"
+
+
+def test_a_directory_that_cannot_be_made_is_waited_for(tmp_path: Path) -> None:
+    directory = blocked_directory(tmp_path)
+    store = Store.open(directory)
+    assert store.health().state is StoreState.DEGRADED
+    held_cursor = store.write_estimate(make_record(0))
+    reader = store.reader()
+    assert reader.estimates().items == texts(make_record(0))
+    assert reader.latest().estimate == texts(make_record(0))[0]
+
+    directory.parent.unlink()
+    assert store.flush(10.0)
+    store.write_estimate(make_record(1))
+    assert store.flush(10.0)
+    assert store.health().state is StoreState.OK
+    assert reader.estimates(cursor=held_cursor).items == texts(make_record(1))
+    assert store.close() == 0
+
+
+def test_what_is_held_goes_behind_what_an_earlier_run_stored(tmp_path: Path) -> None:
+    earlier = Store.open(tmp_path / "volume")
+    earlier.write_estimate(make_record(0))
+    assert earlier.close() == 0
+
+    directory = blocked_directory(tmp_path)
+    store = Store.open(directory)
+    cursor = store.write_estimate(make_record(1))
+    (tmp_path / "mount").unlink()
+    (tmp_path / "volume").rename(tmp_path / "arrived")
+    directory.parent.mkdir()
+    (tmp_path / "arrived").rename(directory)
+    assert store.flush(10.0)
+    assert store.reader().estimates().items == texts(make_record(0), make_record(1))
+    # the cursor was of the memory alone: rather all again than a row missed
+    assert len(store.reader().estimates(cursor=cursor).items) == 2
+    store.close()
+
+
+def test_memory_is_bounded_and_what_gives_way_is_counted(tmp_path: Path) -> None:
+    store = Store.open(blocked_directory(tmp_path), Retention(max_held=3))
+    for n in range(5):
+        store.write_estimate(make_record(n))
+    assert store.health().n_dropped == 2
+    assert store.reader().estimates().items == texts(*(make_record(n) for n in (2, 3, 4)))
+    assert store.close() == 3
+
+
+def test_a_database_deleted_under_the_running_store_begins_anew(tmp_path: Path) -> None:
+    store = Store.open(tmp_path)
+    cursor = store.write_estimate(make_record(0))
+    assert store.flush(10.0)
+    for leftover in tmp_path.glob("springscale.db*"):
+        leftover.unlink()
+    store.write_estimate(make_record(1))
+    assert store.flush(10.0)
+    assert store.reader().estimates(cursor=cursor).items == texts(make_record(1))
+    assert store.close() == 0
+    assert (tmp_path / "springscale.db").exists()
+
+
+def damage(path: Path) -> None:
+    """Overwrite all but the header: what a dying flash card does."""
+    content = bytearray(path.read_bytes())
+    content[100:] = os.urandom(len(content) - 100)
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("how", ["overwritten", "not a database"])
+def test_a_damaged_database_is_set_aside(tmp_path: Path, how: str) -> None:
+    first = Store.open(tmp_path)
+    first.write_estimate(make_record(0))
+    assert first.close() == 0
+    path = tmp_path / "springscale.db"
+    if how == "overwritten":
+        damage(path)
+    else:
+        path.write_bytes(b"these are not the bytes of a database" * 200)
+    kept = path.read_bytes()
+
+    store = Store.open(tmp_path)
+    store.write_estimate(make_record(1))
+    assert store.flush(10.0)
+    health = store.health()
+    assert health.state is StoreState.OK
+    assert health.set_aside is not None
+    assert (tmp_path / health.set_aside).read_bytes() == kept
+    assert store.reader().estimates().items == texts(make_record(1))
+    store.close()
+
+
+def test_damage_found_while_reading_sets_the_file_aside_and_keeps_the_numbering(tmp_path: Path) -> None:
+    store = Store.open(tmp_path)
+    cursors = [store.write_estimate(make_record(n)) for n in range(50)]
+    assert store.flush(10.0)
+    with closing(sqlite3.connect(tmp_path / "springscale.db")) as other:
+        other.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    damage(tmp_path / "springscale.db")
+    with pytest.raises(StoreError, match="cannot be read"):
+        store.reader().estimates()
+    store.write_estimate(make_record(50))
+    assert store.flush(10.0)
+    assert store.health().set_aside is not None
+    assert store.reader().estimates(cursor=cursors[-1]).items == texts(make_record(50))
+    store.close()
+
+
+def test_a_newer_schema_is_refused_and_untouched(tmp_path: Path) -> None:
+    Store.open(tmp_path).close()
+    path = tmp_path / "springscale.db"
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("PRAGMA user_version = 99")
+    with pytest.raises(StoreError, match="schema 99"):
+        Store.open(tmp_path)
+    with closing(sqlite3.connect(path)) as database:
+        assert database.execute("PRAGMA user_version").fetchone()[0] == 99
+
+
+def test_an_older_schema_is_brought_up_to_date(tmp_path: Path) -> None:
+    path = tmp_path / "springscale.db"
+    with closing(schema.connect_writer(path)) as old:
+        old.execute("INSERT INTO events (t_ns, kind, text) VALUES (1, 'kept', '{}')")
+    later = (*schema.MIGRATIONS, "ALTER TABLE events ADD COLUMN origin TEXT DEFAULT 'gateway'")
+    with closing(schema.connect_writer(path, later)) as new:
+        assert new.execute("SELECT kind, origin FROM events").fetchall() == [("kept", "gateway")]
+        assert schema.pragma(new, "user_version") == len(later)
+
+
+def test_a_migration_that_fails_leaves_the_old_schema(tmp_path: Path) -> None:
+    path = tmp_path / "springscale.db"
+    schema.connect_writer(path).close()
+    broken = (*schema.MIGRATIONS, "CREATE TABLE half (x) STRICT; nonsense")
+    with pytest.raises(sqlite3.OperationalError):
+        schema.connect_writer(path, broken)
+    with closing(schema.connect_writer(path)) as database:
+        assert database.execute("SELECT 1 FROM sqlite_schema WHERE name = 'half'").fetchone() is None
+
+
+def test_another_programs_database_is_refused(tmp_path: Path) -> None:
+    with closing(sqlite3.connect(tmp_path / "springscale.db")) as database:
+        database.execute("CREATE TABLE songs (title)")
+    with pytest.raises(StoreError, match="another program"):
+        Store.open(tmp_path)
+
+
+def test_a_directory_in_use_is_refused(tmp_path: Path) -> None:
+    store = Store.open(tmp_path)
+    with pytest.raises(StoreError, match="another Springscale"):
+        Store.open(tmp_path)
+    store.close()
+    Store.open(tmp_path).close()
+
+
+def test_a_question_that_takes_too_long_is_ended(tmp_path: Path) -> None:
+    store = Store.open(tmp_path)
+    for n in range(5000):
+        store.write_estimate(make_record(n))
+    assert store.flush(20.0)
+    reader = StoreReader(
+        tmp_path / "springscale.db", held=lambda: ("ab", ()), clock_ns=lambda: 0, on_damage=lambda: None, limit_s=-1.0
+    )
+    with pytest.raises(TimeoutError, match="ask for less"):
+        reader.estimates(limit=5000, with_spectra=False)
+    store.close()

@@ -1,0 +1,61 @@
+"""kill -9 at any moment: every estimate that was reported as committed is there afterwards."""
+
+import json
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from gateway.store import Store
+
+WRITER = """
+import itertools, pathlib, sys
+from gateway.store import Store
+from support.estimates import make_record
+
+store = Store.open(pathlib.Path(sys.argv[1]))
+first = int(sys.argv[2])
+for n in itertools.count(first):
+    record = make_record(n, with_spectra=True)
+    store.write_estimate(record)
+    if n % 3 == 0 and store.flush(10.0):  # groups of three: a kill also falls between accept and commit
+        print(n, flush=True)
+"""
+
+
+def write_until_killed(directory: Path, first: int, after_s: float) -> list[int]:
+    """Numbers known to be committed when the writer was killed ``after_s`` after its first commit."""
+    tests = Path(__file__).parents[1]
+    writer = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(directory), str(first)], stdout=subprocess.PIPE, text=True, cwd=tests
+    )
+    assert writer.stdout is not None
+    committed = [int(writer.stdout.readline())]
+    time.sleep(after_s)
+    writer.send_signal(signal.SIGKILL)
+    rest, _ = writer.communicate(timeout=10.0)
+    return committed + [int(line) for line in rest.splitlines(keepends=True) if line.endswith("\n")]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_kill_loses_no_committed_estimate(tmp_path: Path, seed: int) -> None:
+    moments = random.Random(seed)
+    first, known = 0, set[int]()
+    for _ in range(3):
+        committed = write_until_killed(tmp_path, first, moments.uniform(0.0, 0.08))
+        known |= set(range(first, committed[-1] + 1))
+        first = committed[-1] + 1
+    with closing(sqlite3.connect(tmp_path / "springscale.db")) as database:
+        assert database.execute("PRAGMA integrity_check").fetchone()[0] == "ok"
+    store = Store.open(tmp_path)
+    assert store.health().set_aside is None
+    stored = [round(json.loads(text)["payload_kg"]) - 100 for text in store.reader().estimates(limit=100_000).items]
+    store.close()
+    assert stored == sorted(set(stored))
+    assert known <= set(stored)

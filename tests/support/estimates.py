@@ -1,0 +1,40 @@
+"""Estimates to store, publish and ask for."""
+
+from typing import Any
+
+import numpy as np
+
+from gateway.records import Estimate, Spectra, Why, estimate_to_json, json_line
+from gateway.units import NS_PER_S
+
+WINDOW_NS = 300 * NS_PER_S
+
+
+def make_estimate(n: int, *rejected: Why, with_spectra: bool = False, is_provisional: bool = False) -> Estimate:
+    """The n-th 5-minute batch since 1970: an answer of 100 + n kg, or a rejection."""
+    has_answer = not rejected
+    payload_kg = 100.0 + n if has_answer else float("nan")
+    return Estimate(
+        t_start_ns=n * WINDOW_NS,
+        t_end_ns=(n + 1) * WINDOW_NS,
+        estimator="ratio_index",
+        calibration_id="sha256:ab",
+        payload_kg=payload_kg,
+        payload_std_kg=6.0 if has_answer else float("nan"),
+        payload_interval95_kg=(payload_kg - 12.0, payload_kg + 12.0),
+        front_share_pct=50.5 if has_answer else float("nan"),
+        mean_speed_mps=14.0,
+        gap_share=0.0,
+        rejected=rejected,
+        is_provisional=is_provisional,
+        spectra=Spectra(*(np.linspace(0.1 * k, 1.0, 4) for k in range(5))) if with_spectra else None,
+        vehicle_id="van-17",
+    )
+
+
+def make_record(n: int, *rejected: Why, **kind: bool) -> dict[str, Any]:
+    return estimate_to_json(make_estimate(n, *rejected, **kind))
+
+
+def texts(*records: dict[str, Any]) -> tuple[str, ...]:
+    return tuple(json_line(record) for record in records)
