@@ -12,8 +12,8 @@ def empty_frames(width: int) -> Frames:
     return Frames(np.empty(0, np.int64), np.empty(0, np.uint32), np.empty(0, np.uint8), np.empty((0, width), np.uint8))
 
 
-def take(frames: Frames, rows: I64 | Bool) -> Frames:
-    """The chosen rows: indices in the order wanted, or a mask (n,)."""
+def take(frames: Frames, rows: I64 | Bool | slice) -> Frames:
+    """The chosen rows: indices in the order wanted, a mask (n,), or a piece."""
     return Frames(frames.t_ns[rows], frames.can_id[rows], frames.length[rows], frames.payload[rows])
 
 

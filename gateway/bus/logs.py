@@ -1,17 +1,19 @@
 """Any log file as the wanted frames of a signal map."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
 from gateway.bus.candump import read_candump
 from gateway.bus.decode import Decoder
 from gateway.bus.log_report import LogReport
+from gateway.bus.mapping import CAN_FD_BYTES, IdFilter
 from gateway.bus.message_log import MESSAGE_SUFFIXES, read_message_log
 from gateway.bus.signal_map import SignalMap
 from gateway.errors import LogUnreadableError
-from gateway.records import Frames, Motion
+from gateway.records import EXTENDED_ID, Frames, Motion
 
+EVERY_FRAME: Final = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))
 CANDUMP_SUFFIXES: Final = (".log", ".txt", ".candump", "")
 
 
@@ -21,11 +23,20 @@ def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames],
     candump text (.log, .txt, .candump, gzip or not) goes through the fast reader, .asc .blf .mf4 .trc
     .csv .db through python-can's. Raises LogUnreadableError where the file is missing or of an unknown kind.
     """
-    path = Path(path)
+    return _open(Path(path), signal_map.filters, signal_map.channel, signal_map.payload_width)
+
+
+def open_whole_log(path: Path | str, channel: str | None = None) -> tuple[Iterator[Frames], LogReport]:
+    """As open_log, with every data frame of any identifier, CAN FD included."""
+    return _open(Path(path), EVERY_FRAME, channel, CAN_FD_BYTES)
+
+
+def _open(
+    path: Path, filters: Sequence[IdFilter], channel: str | None, width: int
+) -> tuple[Iterator[Frames], LogReport]:
     report = LogReport(path)
     suffix = log_suffix(path)
     _require_file(path)
-    filters, channel, width = signal_map.filters, signal_map.channel, signal_map.payload_width
     if suffix in CANDUMP_SUFFIXES:
         return read_candump(path, filters, channel, width=width, report=report), report
     if suffix in MESSAGE_SUFFIXES:

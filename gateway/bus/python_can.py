@@ -1,0 +1,98 @@
+"""Any python-can interface but SocketCAN (slcan, pcan, virtual, ...), only listened to."""
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import can
+
+from gateway.bus.mapping import IdFilter
+from gateway.bus.messages import ExactStamp, frames_of
+from gateway.bus.receiver import Burst
+from gateway.errors import BusError
+from gateway.records import EXTENDED_ID
+
+BURST_FRAMES: Final = 1024
+VIRTUAL_QUEUE_FRAMES: Final = 4096  # an in-process sender waits when it is full
+
+# What makes an interface acknowledge nothing and send nothing, where python-can has a name for it
+_LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
+    "slcan": {"listen_only": True},
+    "vector": {"listen_only": True},
+    "nixnet": {"listen_only": True},
+    "virtual": {"rx_queue_size": VIRTUAL_QUEUE_FRAMES},
+}
+
+
+class PythonCanReceiver:
+    """Messages of an open python-can bus as bursts of frames."""
+
+    dropped_kernel = 0  # python-can does not tell
+
+    def __init__(self, bus: can.BusABC, width: int) -> None:
+        self._bus = bus
+        self._width = width
+
+    def receive(self, timeout_s: float) -> Burst:
+        """What has come, waiting up to ``timeout_s`` for a first message. Raises can.CanError or OSError."""
+        messages: list[can.Message] = []
+        message = self._bus.recv(timeout_s)
+        while message is not None:
+            messages.append(message)
+            message = self._bus.recv(0.0) if len(messages) < BURST_FRAMES else None
+        return self._burst(messages)
+
+    def _burst(self, messages: Sequence[can.Message]) -> Burst:
+        data = [m for m in messages if not (m.is_error_frame or m.is_remote_frame)]
+        errors = [m for m in messages if m.is_error_frame]
+        unstamped = [m for m in data if m.timestamp == 0.0]
+        for message in unstamped:
+            message.timestamp = ExactStamp(time.time_ns())
+        return Burst(
+            frames=frames_of(data, self._width),
+            error_classes={"unspecified": len(errors)} if errors else {},
+            error_frames=len(errors),
+            remote_frames=len(messages) - len(data) - len(errors),
+            stamped_at_receipt=len(unstamped),
+        )
+
+    def close(self) -> None:
+        """Shut the bus down."""
+        self._bus.shutdown()
+
+
+def open_python_can(
+    interface: str, channel: str, filters: Sequence[IdFilter], width: int, options: Mapping[str, Any]
+) -> PythonCanReceiver:
+    """Open a python-can bus for listening, filtered as far as the interface can.
+
+    Raises BusError where its driver or an option is not to be had, can.CanError or OSError where the
+    device is absent or busy.
+    """
+    arguments = {**_LISTEN_ONLY.get(interface, {}), **options}
+    try:
+        bus = can.Bus(
+            interface=interface, channel=channel, can_filters=_can_filters(filters), ignore_config=True, **arguments
+        )
+    except can.CanInterfaceNotImplementedError as fault:
+        raise BusError(f"interface {interface!r} cannot be used here: {fault}; is its driver installed?") from fault
+    except (TypeError, ValueError) as fault:
+        raise BusError(f"interface {interface!r} does not take these [bus] options: {fault}") from fault
+    return PythonCanReceiver(bus, width)
+
+
+def require_known_interface(interface: str) -> None:
+    """Raise BusError, naming those there are, for an interface python-can does not know."""
+    if interface not in can.VALID_INTERFACES:
+        raise BusError(f"[bus] interface {interface!r} is unknown; there are {', '.join(sorted(can.VALID_INTERFACES))}")
+
+
+def _can_filters(filters: Sequence[IdFilter]) -> list[dict[str, Any]]:
+    return [
+        {
+            "can_id": f.can_id & ~EXTENDED_ID,
+            "can_mask": f.mask & ~EXTENDED_ID,
+            "extended": bool(f.can_id & EXTENDED_ID),
+        }
+        for f in filters
+    ]

@@ -1,0 +1,132 @@
+"""The sending side, for replay and simulation only: frames onto a bus, paced by their stamps."""
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Literal
+
+import can
+
+from gateway.bus.frames import take
+from gateway.bus.log_report import LogReport
+from gateway.bus.logs import open_whole_log
+from gateway.bus.messages import message_of
+from gateway.bus.python_can import require_known_interface
+from gateway.errors import BusError
+from gateway.records import Frames
+from gateway.units import NS_PER_S
+
+SEND_TIMEOUT_S: Final = 5.0  # a full transmit queue, or an in-process receiver that is busy, gets this long
+LONGEST_SLEEP_S: Final = 0.1  # how soon a stop is heeded
+PIECE_FRAMES: Final = 512  # between two reports of progress at full speed
+
+Speed = float | Literal["max"]
+
+
+class BusSink(AbstractContextManager["BusSink"]):
+    """An open channel to send on. On an in-process bus the recorded stamps travel with the frames."""
+
+    def __init__(self, interface: str, channel: str, **options: Any) -> None:
+        """Raises BusError where the channel cannot be opened."""
+        require_known_interface(interface)
+        if interface == "virtual":
+            options = {"preserve_timestamps": True, **options}
+        try:
+            self._bus = can.Bus(interface=interface, channel=channel, ignore_config=True, **options)
+        except (OSError, can.CanError, TypeError, ValueError) as fault:
+            raise BusError(f"cannot send on {interface} {channel}: {fault}") from fault
+        self._name = f"{interface} {channel}"
+
+    def send(self, frames: Frames) -> None:
+        """Send every frame at once, in order. Raises BusError where the bus does not take them."""
+        try:
+            for row in range(len(frames)):
+                self._bus.send(message_of(frames, row), timeout=SEND_TIMEOUT_S)
+        except (OSError, can.CanError) as fault:
+            raise BusError(f"cannot send on {self._name}: {fault}") from fault
+
+    def __exit__(
+        self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the channel."""
+        self._bus.shutdown()
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayProgress:
+    """How far a replay is: frames sent, and the recorded time from the first frame."""
+
+    n_sent: int
+    recorded_s: float
+
+
+OnProgress = Callable[[ReplayProgress], None]
+
+
+def replay(
+    log: Path | str,
+    interface: str,
+    channel: str,
+    *,
+    from_channel: str | None = None,
+    speed: Speed = 1.0,
+    on_progress: OnProgress | None = None,
+    stop: threading.Event | None = None,
+) -> LogReport:
+    """Send every data frame of a log (of ``from_channel``, or of all) to a bus; returns the reader's report.
+
+    ``speed`` 2.0 is twice as fast as recorded, "max" as fast as the bus takes them. ``stop`` ends it early.
+    Raises LogUnreadableError for the log, BusError for the bus.
+    """
+    chunks, report = open_whole_log(log, from_channel)
+    with BusSink(interface, channel) as sink:
+        replay_frames(chunks, sink, speed, on_progress, stop)
+    return report
+
+
+def replay_frames(
+    chunks: Iterable[Frames],
+    sink: BusSink,
+    speed: Speed = 1.0,
+    on_progress: OnProgress | None = None,
+    stop: threading.Event | None = None,
+) -> int:
+    """Send chunks of frames paced by their stamps; how many were sent. A step back in time does not wait."""
+    stop = stop or threading.Event()
+    if speed != "max" and not speed > 0.0:
+        raise BusError(f'speed {speed!r} is impossible: a number above 0, or "max"')
+    n_sent = 0
+    first_ns: int | None = None
+    begun_s = time.monotonic()
+    for piece in _pieces(chunks):
+        first_ns = int(piece.t_ns[0]) if first_ns is None else first_ns
+        recorded_s = (int(piece.t_ns[0]) - first_ns) / NS_PER_S
+        if speed != "max":
+            _wait_until(begun_s + recorded_s / speed, stop)
+        if stop.is_set():
+            break
+        sink.send(piece)
+        n_sent += len(piece)
+        if on_progress:
+            on_progress(ReplayProgress(n_sent, recorded_s))
+    return n_sent
+
+
+def _pieces(chunks: Iterable[Frames]) -> Iterator[Frames]:
+    """Cut chunks into pieces of at most one millisecond or PIECE_FRAMES frames, each sent at one time."""
+    for chunk in chunks:
+        millisecond = chunk.t_ns // 1_000_000
+        begin = 0
+        for end in range(1, len(chunk) + 1):
+            if end == len(chunk) or millisecond[end] != millisecond[begin] or end - begin == PIECE_FRAMES:
+                yield take(chunk, slice(begin, end))
+                begin = end
+
+
+def _wait_until(due_s: float, stop: threading.Event) -> None:
+    while not stop.is_set() and (left_s := due_s - time.monotonic()) > 0:
+        stop.wait(min(left_s, LONGEST_SLEEP_S))

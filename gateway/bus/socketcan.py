@@ -1,0 +1,174 @@
+"""SocketCAN, listened to in bursts: one wake-up drains the socket, one numpy view reads the frames.
+
+Nothing here can send. Whether the controller itself stays silent on the wire (not even acknowledging)
+is the interface's setting: ``ip link set can0 type can bitrate 500000 listen-only on``.
+"""
+
+import select
+import socket
+import struct
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from gateway.bus.frames import empty_frames, take
+from gateway.bus.mapping import IdFilter
+from gateway.bus.receiver import Burst, error_class_names
+from gateway.errors import BusError
+from gateway.records import I64, U32, Frames
+from gateway.units import NS_PER_S
+
+GATHER_S: Final = 0.02  # frames are left to gather this long: few wake-ups, little work
+BURST_FRAMES: Final = 4096
+RECEIVE_BUFFER_BYTES: Final = 4 << 20
+
+_REMOTE_FLAG: Final = 0x4000_0000
+_ERROR_FLAG: Final = 0x2000_0000
+_ALL_ERROR_CLASSES: Final = 0x1FFF_FFFF
+_CAN_RAW_ERR_FILTER: Final = 2  # linux/can/raw.h; the socket module names neither this nor those below
+_SO_RCVBUFFORCE: Final = 33  # linux/asm-generic/socket.h
+_SO_TIMESTAMPNS: Final = 35
+_SO_RXQ_OVFL: Final = 40
+_TIMESPEC: Final = np.dtype([("seconds", np.long), ("nanoseconds", np.long)])
+_COUNT: Final = struct.Struct("=I")
+_ANCILLARY_BYTES: Final = socket.CMSG_SPACE(_TIMESPEC.itemsize) + socket.CMSG_SPACE(_COUNT.size)
+_CLASSIC: Final = np.dtype([("id", "=u4"), ("length", "u1"), ("reserved", "u1", 3), ("payload", "u1", 8)])
+_FD: Final = np.dtype([("id", "=u4"), ("length", "u1"), ("reserved", "u1", 3), ("payload", "u1", 64)])
+
+
+class SocketCanReceiver:
+    """Frames of one bound CAN socket, with the kernel's own stamps and its count of lost frames."""
+
+    def __init__(self, sock: socket.socket, width: int) -> None:
+        """``sock`` gives one struct can_frame or canfd_frame a datagram; this object owns it now."""
+        self._socket = sock
+        self._width = width
+        self._n_dropped = 0
+        self._readable = select.poll()
+        self._readable.register(sock, select.POLLIN)
+
+    @property
+    def dropped_kernel(self) -> int:
+        """Frames that found the socket's buffer full."""
+        return self._n_dropped
+
+    def receive(self, timeout_s: float) -> Burst:
+        """One burst; empty where nothing came within ``timeout_s``. Raises OSError (ENETDOWN, ENODEV, ...)."""
+        if not self._readable.poll(timeout_s * 1000.0):
+            return Burst(empty_frames(self._width))
+        time.sleep(GATHER_S)
+        return self._burst(*self._drain())
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def _drain(self) -> tuple[list[bytes], list[bytes]]:
+        """The datagrams that wait, and the kernel's stamp of each (empty where it gave none)."""
+        receive = self._socket.recvmsg
+        datagrams: list[bytes] = []
+        stamps: list[bytes] = []
+        for _ in range(BURST_FRAMES):
+            try:
+                datagram, ancillary, _flags, _address = receive(_FD.itemsize, _ANCILLARY_BYTES, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                break
+            datagrams.append(datagram)
+            stamp = b""
+            for _level, kind, content in ancillary:
+                if kind == _SO_TIMESTAMPNS:
+                    stamp = content
+                elif kind == _SO_RXQ_OVFL:
+                    self._n_dropped = _COUNT.unpack(content)[0]
+            stamps.append(stamp)
+        return datagrams, stamps
+
+    def _burst(self, datagrams: Sequence[bytes], stamps: Sequence[bytes]) -> Burst:
+        if not datagrams:
+            return Burst(empty_frames(self._width))
+        is_classic = all(len(datagram) == _CLASSIC.itemsize for datagram in datagrams)
+        layout = _CLASSIC if is_classic else _FD
+        rows = np.frombuffer(b"".join(datagram.ljust(layout.itemsize, b"\0") for datagram in datagrams), layout)
+        t_ns, n_unstamped = _stamps_ns(stamps)
+        is_error = (rows["id"] & _ERROR_FLAG) != 0
+        is_remote = ~is_error & ((rows["id"] & _REMOTE_FLAG) != 0)
+        frames = Frames(t_ns, rows["id"], rows["length"], self._payloads(rows))
+        error_ids: U32 = rows["id"][is_error]
+        return Burst(
+            frames=take(frames, ~(is_error | is_remote)),
+            error_classes=Counter(name for error_id in error_ids for name in error_class_names(int(error_id))),
+            error_frames=len(error_ids),
+            remote_frames=int(np.count_nonzero(is_remote)),
+            stamped_at_receipt=n_unstamped,
+        )
+
+    def _payloads(self, rows: np.ndarray) -> np.ndarray:
+        """Payload bytes (n, width), zero beyond each frame's length."""
+        payload = np.zeros((len(rows), self._width), np.uint8)
+        kept = min(self._width, rows["payload"].shape[1])
+        payload[:, :kept] = rows["payload"][:, :kept]
+        payload[np.arange(self._width) >= rows["length"][:, None]] = 0
+        return payload
+
+
+def open_socketcan(channel: str, filters: Sequence[IdFilter], width: int) -> SocketCanReceiver:
+    """Listen to a SocketCAN interface through kernel filters.
+
+    Raises BusError where this system has no SocketCAN, OSError where the interface is absent or down.
+    """
+    try:
+        sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    except AttributeError:
+        raise BusError("SocketCAN exists on Linux only; choose another [bus] interface") from None
+    try:
+        sock.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, packed_filters(filters))
+        sock.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, _ALL_ERROR_CLASSES)
+        sock.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
+        ask_for_stamps(sock)
+        sock.bind((channel,))
+    except BaseException:
+        sock.close()
+        raise
+    return SocketCanReceiver(sock, width)
+
+
+def ask_for_stamps(sock: socket.socket) -> None:
+    """Kernel time stamps in ns, a count of lost datagrams, and as large a buffer as we may have."""
+    sock.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+    sock.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, RECEIVE_BUFFER_BYTES)
+    except PermissionError:  # wants CAP_NET_ADMIN; without it the system's limit holds
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+
+
+def packed_filters(filters: Sequence[IdFilter]) -> bytes:
+    """struct can_filter[]: data frames only, 11 and 29 bits kept apart."""
+    return b"".join(struct.pack("=II", f.can_id, f.mask | _REMOTE_FLAG) for f in filters)
+
+
+def interface_statistics(channel: str) -> dict[str, int]:
+    """The interface's own receive counters (rx_packets, rx_errors, rx_dropped, ...); empty where it has none."""
+    folder = Path("/sys/class/net") / channel / "statistics"
+    counters: dict[str, int] = {}
+    for name in ("rx_packets", "rx_errors", "rx_dropped", "rx_over_errors", "rx_frame_errors", "rx_missed_errors"):
+        try:
+            counters[name] = int((folder / name).read_text())
+        except (OSError, ValueError):
+            continue
+    return counters
+
+
+def _stamps_ns(stamps: Sequence[bytes]) -> tuple[I64, int]:
+    """Kernel stamps as ns (n,), and how many frames had none and got this moment instead."""
+    if all(stamps):
+        times = np.frombuffer(b"".join(stamps), _TIMESPEC)
+        return times["seconds"].astype(np.int64) * NS_PER_S + times["nanoseconds"], 0
+    now_ns = time.time_ns()
+    rows = [np.frombuffer(s, _TIMESPEC)[0] if s else None for s in stamps]
+    t_ns = [now_ns if row is None else int(row["seconds"]) * NS_PER_S + int(row["nanoseconds"]) for row in rows]
+    return np.array(t_ns, np.int64), rows.count(None)

@@ -1,0 +1,238 @@
+"""The live source: a thread that listens to a CAN channel, whatever happens to it, and fills an inbox.
+
+Time is each frame's own: the kernel's stamp on SocketCAN, the driver's elsewhere, the recorded one on an
+in-process bus. A frame without any is stamped on receipt and counted.
+"""
+
+import errno
+import logging
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Final
+
+import can
+
+from gateway.bus.inbox import Inbox
+from gateway.bus.python_can import open_python_can, require_known_interface
+from gateway.bus.receiver import BUS_OFF, Burst, Receiver
+from gateway.bus.signal_map import SignalMap
+from gateway.bus.socketcan import interface_statistics, open_socketcan
+
+log = logging.getLogger(__name__)
+
+POLL_S: Final = 0.1  # longest wait inside a receiver: how soon a stop is heeded
+FIRST_PAUSE_S: Final = 0.25
+LONGEST_PAUSE_S: Final = 5.0
+START_WAIT_S: Final = 2.0
+
+OpenReceiver = Callable[[], Receiver]
+
+_SYSTEM_REASONS: Final[Mapping[int, str]] = {
+    errno.ENODEV: "the interface does not exist (not plugged in, or removed)",
+    errno.ENXIO: "the interface does not exist (not plugged in, or removed)",
+    errno.ENETDOWN: "the interface is down: ip link set {channel} up",
+    errno.EAFNOSUPPORT: "this kernel has no CAN: modprobe can_raw",
+    errno.EPERM: "no permission to open the interface",
+    errno.EACCES: "no permission to open the interface",
+}
+
+
+class SourceState(StrEnum):
+    """How the source stands. A silent bus sleeps; a fault wants a person, or time."""
+
+    STARTING = "starting"
+    RECEIVING = "receiving"
+    BUS_SILENT = "bus_silent"
+    READER_FAULT = "reader_fault"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True, slots=True)
+class SourceCounts:
+    """What came and what was lost since the start. ``interface`` holds the system's own receive counters."""
+
+    frames: int
+    dropped_inbox: int
+    dropped_kernel: int
+    error_frames: int
+    error_classes: Mapping[str, int]
+    remote_frames: int
+    reconnects: int
+    stamped_at_receipt: int
+    interface: Mapping[str, int]
+
+
+class LiveSource:
+    """Listens to one channel in a thread of its own until stopped; never sends.
+
+    A channel that is down, removed, or not there yet is tried again and again with growing pauses; the
+    state and its reason say so meanwhile. What kills the thread all the same is kept in ``failure``.
+    """
+
+    def __init__(
+        self,
+        interface: str,
+        channel: str,
+        signal_map: SignalMap,
+        *,
+        options: Mapping[str, Any] | None = None,
+        inbox_frames: int = 65_536,
+        silence_s: float = 2.0,
+        open_receiver: OpenReceiver | None = None,
+    ) -> None:
+        """``open_receiver`` stands in for the interface (tests). Raises BusError on an unknown interface."""
+        require_known_interface(interface)
+        self._interface, self._channel = interface, channel
+        self._silence_s = silence_s
+        width = signal_map.payload_width
+        is_socketcan = interface == "socketcan"
+        self._open: OpenReceiver = open_receiver or (
+            (lambda: open_socketcan(channel, signal_map.filters, width))
+            if is_socketcan
+            else (lambda: open_python_can(interface, channel, signal_map.filters, width, options or {}))
+        )
+        self.inbox = Inbox(inbox_frames, width, waits_for_room=interface == "virtual")
+        self._statistics = interface_statistics if is_socketcan else _no_statistics
+        self._tally: Counter[str] = Counter()
+        self._error_classes: Counter[str] = Counter()
+        self._dropped_before = 0  # by receivers already closed
+        self._receiver: Receiver | None = None
+        self._state = SourceState.STOPPED
+        self._reason: str | None = None
+        self._failure: BaseException | None = None
+        self._seen_at_silence = 0
+        self._stopping = threading.Event()
+        self._has_tried = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="can-receiver", daemon=True)
+
+    @property
+    def state(self) -> SourceState:
+        """How the source stands now."""
+        return self._state
+
+    @property
+    def reason(self) -> str | None:
+        """Why the bus is silent or the reader at fault, for people."""
+        return self._reason
+
+    @property
+    def failure(self) -> BaseException | None:
+        """What killed the receive thread; None while it lives or after a proper stop."""
+        return self._failure
+
+    def start(self) -> None:
+        """Begin to listen; returns once the channel was opened, or failed to open, a first time."""
+        self._state = SourceState.STARTING
+        self._thread.start()
+        self._has_tried.wait(START_WAIT_S)
+
+    def stop(self, timeout_s: float = 2.0) -> None:
+        """End the thread and close the channel. What the inbox holds can still be drained."""
+        self._stopping.set()
+        self.inbox.close()
+        if self._thread.ident is not None:
+            self._thread.join(timeout_s)
+
+    def counts(self) -> SourceCounts:
+        """The counts so far."""
+        receiver = self._receiver
+        return SourceCounts(
+            frames=self._tally["frames"],
+            dropped_inbox=self.inbox.dropped,
+            dropped_kernel=self._dropped_before + (receiver.dropped_kernel if receiver else 0),
+            error_frames=self._tally["error_frames"],
+            error_classes=dict(self._error_classes),
+            remote_frames=self._tally["remote_frames"],
+            reconnects=self._tally["reconnects"],
+            stamped_at_receipt=self._tally["stamped_at_receipt"],
+            interface=self._statistics(self._channel),
+        )
+
+    def _run(self) -> None:
+        try:
+            self._listen_until_stopped()
+        except BaseException as failure:  # noqa: BLE001 # a dead thread must tell, whatever killed it
+            self._failure = failure
+            self._enter(SourceState.READER_FAULT, f"the receive thread died: {failure!r}")
+        else:
+            self._enter(SourceState.STOPPED, None)
+        finally:
+            self._has_tried.set()
+            self.inbox.close()
+
+    def _listen_until_stopped(self) -> None:
+        pause_s = FIRST_PAUSE_S
+        while not self._stopping.is_set():
+            n_before = self._tally["frames"]
+            try:
+                with closing(self._open()) as receiver:
+                    self._has_tried.set()
+                    self._listen(receiver)
+                return
+            except (OSError, can.CanError) as fault:
+                self._enter(SourceState.READER_FAULT, self._told(fault))
+            self._has_tried.set()
+            self._tally["reconnects"] += 1
+            pause_s = FIRST_PAUSE_S if self._tally["frames"] > n_before else min(2.0 * pause_s, LONGEST_PAUSE_S)
+            self._stopping.wait(pause_s)
+
+    def _listen(self, receiver: Receiver) -> None:
+        """Receive until stopped; OSError or can.CanError where the channel fails."""
+        self._receiver = receiver
+        heard_s = time.monotonic()
+        is_bus_off = False
+        try:
+            while not self._stopping.is_set():
+                burst = receiver.receive(POLL_S)
+                self._count(burst)
+                is_bus_off = not len(burst.frames) and (is_bus_off or bool(burst.error_classes.get(BUS_OFF)))
+                if len(burst.frames):
+                    heard_s = time.monotonic()
+                    self.inbox.put(burst.frames)
+                    self._enter(SourceState.RECEIVING, None)
+                elif is_bus_off:
+                    self._enter(
+                        SourceState.READER_FAULT, f"bus-off: ip link set {self._channel} type can restart-ms 100"
+                    )
+                elif time.monotonic() - heard_s > self._silence_s:
+                    self._enter(SourceState.BUS_SILENT, self._silence())
+                elif self._state is SourceState.READER_FAULT:
+                    self._enter(SourceState.STARTING, None)
+        finally:
+            self._dropped_before += receiver.dropped_kernel
+            self._receiver = None
+
+    def _count(self, burst: Burst) -> None:
+        self._tally["frames"] += len(burst.frames)
+        self._tally["error_frames"] += burst.error_frames
+        self._tally["remote_frames"] += burst.remote_frames
+        self._tally["stamped_at_receipt"] += burst.stamped_at_receipt
+        self._error_classes.update(burst.error_classes)
+
+    def _enter(self, state: SourceState, reason: str | None) -> None:
+        if state is not self._state:
+            log.info("%s %s: %s%s", self._interface, self._channel, state, f" ({reason})" if reason else "")
+        self._state, self._reason = state, reason
+
+    def _silence(self) -> str:
+        """Why nothing comes: the bus sleeps, or it talks of other things (frames seen since the silence began)."""
+        n_seen = self._statistics(self._channel).get("rx_packets", 0)
+        if self._state is not SourceState.BUS_SILENT:
+            self._seen_at_silence = n_seen
+        if n_seen > self._seen_at_silence:
+            return f"the bus is awake ({n_seen - self._seen_at_silence} frames), none has a mapped identifier"
+        return f"no frame for {self._silence_s:g} s"
+
+    def _told(self, fault: Exception) -> str:
+        number = fault.errno if isinstance(fault, OSError) else getattr(fault, "error_code", None)
+        reason = _SYSTEM_REASONS.get(number or 0, str(fault) or type(fault).__name__)
+        return reason.format(channel=self._channel)
+
+
+def _no_statistics(channel: str) -> dict[str, int]:
+    return {}
