@@ -67,16 +67,16 @@ class Leg:
 
 
 def drive_of(legs: Sequence[Leg], start_mps: float = 0.0) -> Drive:
-    """Ramps and holds, rounded so that the jerk stays below JERK_MPS3."""
+    """Ramps and holds (at least one), rounded so that the jerk stays below JERK_MPS3."""
     times, speeds = [0.0], [start_mps]
     for leg in legs:
         times.append(times[-1] + abs(leg.speed_mps - speeds[-1]) / leg.acceleration_mps2)
         times.append(times[-1] + leg.hold_s)
         speeds += [leg.speed_mps, leg.speed_mps]
-    n = math.ceil(times[-1] / STEP_S) + 1
-    ramped = np.interp(np.arange(n) * STEP_S, times, speeds)
-    sharpest = max((leg.acceleration_mps2 for leg in legs), default=1.0)
-    return Drive(_rounded(ramped, 2.0 * sharpest / JERK_MPS3), np.zeros(n))
+    ramped = np.interp(np.arange(math.ceil(times[-1] / STEP_S) + 1) * STEP_S, times, speeds)
+    sharpest = max(leg.acceleration_mps2 for leg in legs)
+    rounded = _rounded(ramped, 2.0 * sharpest / JERK_MPS3)
+    return Drive(rounded, np.zeros(len(rounded)))
 
 
 def constant(speed_mps: float, duration_s: float, rng: np.random.Generator, jitter_std_mps: float = 0.3) -> Drive:
@@ -145,9 +145,9 @@ def _wander(n: int, correlation_s: float, rng: np.random.Generator) -> F64:
 
 
 def _rounded(ramped: F64, window_s: float) -> F64:
-    """Centred moving mean; the ends are continued by their own speed."""
+    """Moving mean over window_s; each end holds its speed for half of it, so the result is window_s longer."""
     half = max(round(window_s / STEP_S / 2.0), 1)
-    padded = np.pad(ramped, half, mode="edge")
+    padded = np.pad(ramped, 2 * half, mode="edge")
     total = np.cumsum(np.concatenate(([0.0], padded)))
     rounded: F64 = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
     return np.where(rounded < 1e-9, 0.0, rounded)

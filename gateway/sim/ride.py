@@ -8,7 +8,7 @@ import numpy as np
 from gateway.records import F64
 from gateway.sim.chassis import Chassis, Records, chassis_of
 from gateway.sim.drive import Drive
-from gateway.sim.integrator import FIRST_LOAD, GROUND, Course, accelerations, integrate, look_up_ground
+from gateway.sim.integrator import FIRST_LOAD, GROUND, N_BODY, Course, accelerations, integrate, look_up_ground
 from gateway.sim.road import Road
 from gateway.sim.vehicle import Load, Vehicle
 from gateway.units import STANDARD_GRAVITY_MPS2
@@ -85,9 +85,11 @@ def equilibrium(chassis: Chassis, course: Course) -> tuple[F64, F64]:
     Newton's method on the equations of motion themselves, so a simulation begun there stays there.
     """
     n = FIRST_LOAD + len(chassis.elastic)
-    position = np.zeros(n)
     still, tyre_n = np.zeros(4, GROUND), np.zeros(4)
     look_up_ground(course, chassis.corners, 0.0, still)
+    position = np.full(n, np.mean(still["height_m"]))
+    position[N_BODY:FIRST_LOAD] = still["height_m"]  # every tyre on the ground, or it would give Newton no slope
+    position[1:N_BODY] = 0.0
     still["height_rate_mps"] = still["imbalance_n"] = 0.0
     for _ in range(50):
         slope = np.column_stack([_residual_change(chassis, position, still, i) for i in range(n)])

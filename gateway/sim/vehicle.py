@@ -82,7 +82,7 @@ class Vehicle:
         return 100.0 * (1.0 - self.cog_position_m / self.wheelbase_m)
 
     def linear(self) -> "Vehicle":
-        """The same without progression, friction, asymmetry, digression and tyre patch.
+        """The textbook car: no progression, friction, asymmetry, digression or tyre patch, wheels round and balanced.
 
         Stops and tyre lift-off remain; small motion does not reach them.
         """
@@ -156,4 +156,9 @@ def load_for_share(vehicle: Vehicle, mass_kg: float, share_pct: float) -> Load:
 
 def _linear(axle: Axle) -> Axle:
     mean = (axle.damper.compression_nspm + axle.damper.rebound_nspm) / 2.0
-    return replace(axle, spring=replace(axle.spring, progression_npm2=0.0), damper=Damper(mean, mean))
+    return replace(
+        axle,
+        spring=replace(axle.spring, progression_npm2=0.0),
+        damper=Damper(mean, mean),
+        wheel=replace(axle.wheel, imbalance_kgm=0.0, runout_m=0.0),
+    )

@@ -1,0 +1,64 @@
+"""Statics hold for every vehicle and load."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.sim.drive import constant
+from gateway.sim.ride import ride, static_axle_loads_kg
+from gateway.sim.road import PaperRoad
+from gateway.sim.vans import PAPER_VAN, VANS
+from gateway.sim.vehicle import Load, axle_loads_kg, front_share_pct, load_for_share, payload_kg
+
+vehicles = st.sampled_from(list(VANS.values()))
+loads = st.lists(
+    st.builds(
+        Load,
+        mass_kg=st.floats(5.0, 300.0),
+        position_m=st.floats(0.2, 3.4),
+        left_m=st.floats(-0.5, 0.5),
+        height_m=st.floats(0.4, 1.6),
+        resonance_hz=st.sampled_from([float("inf"), 11.0]),
+    ),
+    max_size=3,
+).map(tuple)
+
+
+@given(vehicle=vehicles, load=loads)
+def test_the_models_equilibrium_is_the_lever_rule(vehicle, load):
+    """Moments about the axles: independent of springs, progression, stops and tyres."""
+    assert static_axle_loads_kg(vehicle, load) == pytest.approx(axle_loads_kg(vehicle, load), rel=1e-9)
+
+
+@given(vehicle=vehicles, load=loads)
+def test_axle_loads_add_up_to_the_weight(vehicle, load):
+    unsprung = 2 * (vehicle.front.wheel.unsprung_kg + vehicle.rear.wheel.unsprung_kg)
+    assert sum(axle_loads_kg(vehicle, load)) == pytest.approx(vehicle.sprung_kg + unsprung + payload_kg(load))
+
+
+@given(mass_kg=st.floats(100.0, 450.0), share_pct=st.floats(46.0, 53.0))
+def test_a_load_can_be_placed_for_a_share(mass_kg, share_pct):
+    assert front_share_pct(PAPER_VAN, (load_for_share(PAPER_VAN, mass_kg, share_pct),)) == pytest.approx(share_pct)
+
+
+@given(mass_kg=st.floats(0.0, 450.0), position_m=st.floats(0.0, 2.8))
+def test_the_papers_van_follows_equation_3(mass_kg, position_m):
+    expected = 100.0 * (1240.0 / 2.0 + (1.0 - position_m / 2.8) * mass_kg) / (1240.0 + mass_kg)
+    assert front_share_pct(PAPER_VAN, (Load(mass_kg, position_m),)) == pytest.approx(expected)
+
+
+@given(share_pct=st.sampled_from([20.0, 40.0, 80.0]))
+def test_a_share_out_of_reach_is_refused(share_pct):
+    with pytest.raises(ValueError, match="behind the front axle"):
+        load_for_share(PAPER_VAN, 50.0, share_pct)
+
+
+@given(seed=st.integers(0, 2**31), gain=st.floats(0.2, 3.0))
+def test_the_textbook_car_is_linear(seed, gain):
+    """Twice the road, twice the motion."""
+    rng = np.random.default_rng(seed)
+    drive, road = constant(12.0, 2.0, rng, jitter_std_mps=0.0), PaperRoad(sigma_m=1e-4).lay(60.0, rng)
+    higher = type(road)(road.step_m, gain * road.left_m, gain * road.right_m)
+    one, other = (ride(PAPER_VAN.linear(), (), r, drive).acceleration for r in (road, higher))
+    assert np.allclose(other, gain * one, atol=1e-7 * np.max(np.abs(one)) + 1e-9)

@@ -1,0 +1,220 @@
+"""The full car obeys mechanics: energy, momentum, equilibrium, convergence."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gateway.records import F64
+from gateway.sim.chassis import Chassis, chassis_of
+from gateway.sim.drive import Drive, Leg, constant, drive_of
+from gateway.sim.integrator import Course, integrate
+from gateway.sim.ride import Ride, ride, static_axle_loads_kg
+from gateway.sim.road import PaperRoad, Road, iso_road
+from gateway.sim.vans import LARGE_VAN, PAPER_VAN, SMALL_VAN
+from gateway.sim.vehicle import Axle, Damper, Load, Vehicle, axle_loads_kg
+from gateway.units import STANDARD_GRAVITY_MPS2
+
+FLAT = Road(0.05, np.zeros(60_000), np.zeros(60_000))
+
+
+def flat_course(vehicle: Vehicle) -> Course:
+    level = np.zeros(2)
+    return Course(1.0, level, level, vehicle.wheelbase_m, 1.0, level, level, level, level)
+
+
+def without_losses(vehicle: Vehicle) -> Vehicle:
+    def free(axle: Axle) -> Axle:
+        return replace(axle, damper=Damper(0.0, 0.0), wheel=replace(axle.wheel, tyre_nspm=0.0, runout_m=0.0))
+
+    return replace(vehicle, front=free(vehicle.front), rear=free(vehicle.rear))
+
+
+def energy_j(vehicle: Vehicle, loads: tuple[Load, ...], chassis: Chassis, position: F64, rate: F64) -> float:
+    """Kinetic, elastic and potential energy; forces integrated by hand for every spring, stop and tyre."""
+    g = STANDARD_GRAVITY_MPS2
+    total = 0.5 * rate[:3] @ np.linalg.inv(chassis.inverse_mass) @ rate[:3] - chassis.weight @ position[:3]
+    for wheel in range(4):
+        axle = vehicle.front if wheel < 2 else vehicle.rear
+        forward = vehicle.cog_position_m - (0.0 if wheel < 2 else vehicle.wheelbase_m)
+        left = axle.track_m / 2.0 * (1 if wheel % 2 == 0 else -1)
+        share = vehicle.empty_front_share_pct / 100.0
+        preload = g * vehicle.sprung_kg / 2.0 * (share if wheel < 2 else 1.0 - share)
+        unsprung = axle.wheel.unsprung_kg
+        lift = position[3 + wheel]
+        e = lift - (position[0] - forward * position[1] + left * position[2])
+        spring = axle.spring
+        total += preload * e + spring.rate_npm * e**2 / 2 + spring.progression_npm2 * max(e, 0.0) ** 3 / 6
+        total += spring.stop_npm2 * max(e - spring.bump_clearance_m, 0.0) ** 3 / 3
+        total += spring.stop_npm2 * max(-e - spring.rebound_clearance_m, 0.0) ** 3 / 3
+        pressed = max(preload + unsprung * g - axle.wheel.tyre_npm * lift, 0.0)
+        total += pressed**2 / (2 * axle.wheel.tyre_npm)
+        total += 0.5 * unsprung * rate[3 + wheel] ** 2 + unsprung * g * lift
+    for axle, first in ((vehicle.front, 3), (vehicle.rear, 5)):
+        twist = position[first] - position[first + 1] - axle.track_m * position[2]
+        total += 0.5 * axle.anti_roll_npm * twist**2
+    for k, load in enumerate(load for load in loads if load.is_elastic):
+        forward = vehicle.cog_position_m - load.position_m
+        base = load.mass_kg * (2 * math.pi * load.resonance_hz) ** 2
+        squeeze = position[0] - forward * position[1] + load.left_m * position[2] - position[7 + k]
+        total += load.mass_kg * g * squeeze + 0.5 * base * squeeze**2
+        total += 0.5 * load.mass_kg * rate[7 + k] ** 2 + load.mass_kg * g * position[7 + k]
+    return float(total)
+
+
+@pytest.mark.parametrize(("drop_m", "drift"), [(0.003, 1e-8), (0.15, 1e-4)])  # the higher one meets stops and lifts off
+def test_without_dampers_energy_is_conserved(drop_m: float, drift: float) -> None:
+    vehicle = without_losses(SMALL_VAN)
+    loads = (Load(200.0, 2.2, 0.3), Load(100.0, 1.5, -0.2, resonance_hz=9.0, damping_ratio=0.0))
+    chassis = chassis_of(vehicle, loads)
+    position, rate = np.zeros(8), np.zeros(8)
+    position[:] = drop_m
+    position[1:3] = 0.1 * drop_m, -0.2 * drop_m
+    before = energy_j(vehicle, loads, chassis, position, rate)
+    _, tyre_n = integrate(chassis, flat_course(vehicle), position, rate, 2e-4, 5, 10_001)
+    swing = energy_j(vehicle, loads, chassis, np.zeros(8), np.zeros(8)) - before
+    after = energy_j(vehicle, loads, chassis, position, rate)
+    assert (np.min(tyre_n) == 0.0) == (drop_m > 0.1)
+    assert after == pytest.approx(before, abs=drift * abs(swing))
+
+
+def test_halving_the_step_divides_the_error_by_sixteen() -> None:
+    """A fourth-order method on a smooth system."""
+    vehicle = PAPER_VAN.linear()
+    chassis = chassis_of(vehicle, (Load(300.0, 2.0),))
+
+    def end_state(step_s: float) -> F64:
+        position, rate = np.full(7, 0.004), np.zeros(7)
+        n_records = round(1.0 / step_s)  # one row a step and the step after the last row
+        integrate(chassis, flat_course(vehicle), position, rate, step_s, 1, n_records)
+        return np.concatenate((position, rate))
+
+    exact = end_state(1.25e-4)
+    coarse, fine = (np.max(np.abs(end_state(step) - exact)) for step in (4e-3, 2e-3))
+    assert 12.0 < coarse / fine < 20.0
+
+
+def test_the_default_step_is_fine_enough_on_a_rough_road() -> None:
+    rng = np.random.default_rng(1)
+    drive = constant(20.0, 20.0, rng)
+    road = iso_road("C").lay(500.0, rng)
+    coarse = ride(LARGE_VAN, (Load(500.0, 2.5),), road, drive)
+    fine = ride(LARGE_VAN, (Load(500.0, 2.5),), road, drive, step_s=1.25e-4, record_every=16)
+    assert len(coarse) == len(fine)
+    error = np.std(coarse.acceleration - fine.acceleration, axis=0) / np.std(fine.acceleration, axis=0)
+    assert np.all(error < 0.01)
+
+
+@pytest.mark.parametrize("loads", [(), (Load(300.0, 2.6, 0.3),), (Load(250.0, 0.4, resonance_hz=12.0),)])
+def test_what_rests_stays_at_rest(loads: tuple[Load, ...]) -> None:
+    still = ride(PAPER_VAN, loads, FLAT, Drive(np.zeros(101), np.zeros(101)))
+    assert np.max(np.abs(still.acceleration)) < 1e-9
+    assert np.ptp(still.position, axis=0) == pytest.approx(np.zeros(3), abs=1e-12)
+    scales = still.tyre_n[-1].reshape(2, 2).sum(axis=1) / STANDARD_GRAVITY_MPS2
+    assert scales == pytest.approx(axle_loads_kg(PAPER_VAN, loads), rel=1e-12)
+
+
+def test_a_load_on_the_left_presses_the_left_wheels() -> None:
+    tilted = ride(PAPER_VAN, (Load(300.0, 1.4, left_m=0.4),), FLAT, Drive(np.zeros(11), np.zeros(11)))
+    front_left, front_right, rear_left, rear_right = tilted.tyre_n[0]
+    moment = (front_left - front_right + rear_left - rear_right) * 1.50 / 2.0
+    assert moment == pytest.approx(300.0 * STANDARD_GRAVITY_MPS2 * 0.4, rel=1e-9)
+    assert tilted.position[0, 2] < 0.0  # roll is positive where the left side is up
+
+
+def test_on_the_road_the_wheels_carry_the_weight_on_average() -> None:
+    """Momentum: whatever springs and dampers do, the mean wheel loads are the static axle loads."""
+    rng = np.random.default_rng(2)
+    loads = (Load(300.0, 2.2),)
+    drive = constant(15.0, 300.0, rng)
+    driven = ride(PAPER_VAN, loads, iso_road("B").lay(5000.0, rng), drive)
+    mean = driven.tyre_n.mean(axis=0).reshape(2, 2).sum(axis=1) / STANDARD_GRAVITY_MPS2
+    assert mean == pytest.approx(static_axle_loads_kg(PAPER_VAN, loads), rel=2e-3)
+
+
+def test_braking_moves_load_to_the_front() -> None:
+    """m a h / l in the steady state; a nose that goes down."""
+    loads = (Load(200.0, 2.0, height_m=1.0),)
+    braking = drive_of([Leg(30.0, 4.0, 3.0), Leg(0.0, 3.0, 3.0)])
+    driven = ride(PAPER_VAN, loads, FLAT, braking)
+    steady = (driven.longitudinal_mps2 < -2.99) & (driven.t_s > 18.0) & (driven.t_s < 22.0)
+    shifted = driven.tyre_n[steady][:, :2].sum(axis=1).mean() - driven.tyre_n[0, :2].sum()
+    height_moment = 1240.0 * 0.70 + 200.0 * 1.0
+    assert steady.sum() > 1000
+    assert shifted == pytest.approx(3.0 * height_moment / 2.8, rel=0.005)
+    assert driven.position[steady, 1].min() > driven.position[0, 1]
+
+
+def test_a_left_turn_presses_the_right_wheels() -> None:
+    n = 401
+    lateral = np.minimum(np.arange(n) * 0.05, 2.0)
+    driven = ride(PAPER_VAN, (), FLAT, Drive(np.full(n, 20.0), lateral))
+    front_left, front_right, rear_left, rear_right = driven.tyre_n[-5000:].mean(axis=0)  # wheels are not quite round
+    moment = (front_right - front_left + rear_right - rear_left) * 0.75
+    assert moment == pytest.approx(1240.0 * 0.70 * 2.0, rel=0.01)
+    assert driven.position[-1, 2] > 0.0
+
+
+def test_the_rear_axle_meets_a_hump_a_wheelbase_later_at_any_speed() -> None:
+    heights = np.zeros(40_000)
+    heights[10_000:10_020] = 0.01
+    speeding_up = drive_of([Leg(20.0, 10.0, 2.0)], start_mps=5.0)
+    driven = ride(PAPER_VAN, (), Road(0.01, heights, heights), speeding_up, start_m=3.0)
+    way_m = 3.0 + np.interp(driven.t_s, np.arange(len(speeding_up.speed_mps)) * 0.05, speeding_up.travelled_m)
+    hits = [way_m[np.argmax(driven.tyre_n[:, wheel] > 1.2 * driven.tyre_n[0, wheel])] for wheel in (0, 2)]
+    assert hits[1] - hits[0] == pytest.approx(PAPER_VAN.wheelbase_m, abs=0.04)
+
+
+def test_a_tyre_never_pulls() -> None:
+    heights = np.zeros(4000)
+    heights[1000:1040] = 0.12 * np.sin(np.linspace(0.0, math.pi, 40))
+    driven = ride(PAPER_VAN, (), Road(0.05, heights, heights), Drive(np.full(101, 18.0), np.zeros(101)))
+    assert np.min(driven.tyre_n) == 0.0
+    assert np.max(driven.tyre_n) > 3.0 * np.max(driven.tyre_n[0])
+
+
+def test_a_stiff_base_holds_a_load_as_if_it_were_welded() -> None:
+    rng = np.random.default_rng(4)
+    drive, road = constant(14.0, 20.0, rng), PaperRoad().lay(400.0, rng)
+
+    def shaken(resonance_hz: float) -> Ride:
+        return ride(PAPER_VAN.linear(), (Load(300.0, 2.4, resonance_hz=resonance_hz),), road, drive)
+
+    welded = shaken(math.inf).acceleration
+    distance = [np.std(shaken(f).acceleration - welded) / np.std(welded) for f in (12.0, 80.0)]
+    assert distance[1] < 0.02
+    assert distance[0] > 5.0 * distance[1]
+
+
+def test_friction_passes_more_of_a_smooth_road_on_to_the_body() -> None:
+    """Below its friction a suspension hardly moves, so a smooth road reaches the body by the tyres alone."""
+    rng = np.random.default_rng(5)
+    drive, road = constant(14.0, 60.0, rng, jitter_std_mps=0.0), PaperRoad().lay(1000.0, rng)
+    smooth = Road(road.step_m, 0.02 * road.left_m, 0.02 * road.right_m)
+    textbook = PAPER_VAN.linear()
+
+    def gain(friction_n: float) -> float:
+        def rubbing(axle: Axle) -> Axle:
+            return replace(axle, damper=replace(axle.damper, friction_n=friction_n))
+
+        vehicle = replace(textbook, front=rubbing(textbook.front), rear=rubbing(textbook.rear))
+        rough_std, calm_std = (np.std(ride(vehicle, (), r, drive).acceleration[:, 0]) for r in (road, smooth))
+        return float(calm_std / (0.02 * rough_std))
+
+    assert gain(0.0) == pytest.approx(1.0, rel=1e-3)
+    assert gain(40.0) > 1.2
+
+
+def test_imbalance_shakes_at_the_wheels_frequency() -> None:
+    speed_mps = 25.0
+    driven = ride(PAPER_VAN, (), FLAT, Drive(np.full(801, speed_mps), np.zeros(801)))
+    shaking = driven.acceleration[len(driven) // 2 :, 0]
+    spectrum = np.abs(np.fft.rfft(shaking * np.hanning(len(shaking))))
+    peak_hz = np.fft.rfftfreq(len(shaking), driven.step_s)[np.argmax(spectrum)]
+    assert peak_hz == pytest.approx(speed_mps / (2 * math.pi * 0.30), abs=0.1)
+
+
+def test_a_road_that_ends_too_early_is_refused() -> None:
+    with pytest.raises(ValueError, match="needs 203 m of road, this one has 100 m"):
+        ride(PAPER_VAN, (), PaperRoad().lay(100.0, np.random.default_rng(1)), Drive(np.full(401, 10.0), np.zeros(401)))
