@@ -26,6 +26,7 @@ PAPER_VAN: Final = Vehicle(
         track_m=1.50,
         anti_roll_npm=4e3,
     ),
+    rated_payload_kg=450.0,
 )
 
 SMALL_VAN: Final = Vehicle(
@@ -50,6 +51,7 @@ SMALL_VAN: Final = Vehicle(
         track_m=1.51,
         anti_roll_npm=5e3,
     ),
+    rated_payload_kg=650.0,
 )
 
 LARGE_VAN: Final = Vehicle(
@@ -74,6 +76,7 @@ LARGE_VAN: Final = Vehicle(
         track_m=1.72,
         anti_roll_npm=8e3,
     ),
+    rated_payload_kg=1300.0,
 )
 
 VANS: Final = {van.name: van for van in (PAPER_VAN, SMALL_VAN, LARGE_VAN)}

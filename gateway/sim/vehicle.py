@@ -63,7 +63,10 @@ class Axle:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """A full car. sprung_kg and the inertias (about the centre of gravity) are those of the empty body."""
+    """A full car. sprung_kg and the inertias (about the centre of gravity) are those of the empty body.
+
+    rated_payload_kg is what it is built to carry; nothing here enforces it.
+    """
 
     name: str
     sprung_kg: float
@@ -74,6 +77,7 @@ class Vehicle:
     cog_height_m: float
     front: Axle
     rear: Axle
+    rated_payload_kg: float
     contact_patch_m: float = 0.15
 
     @property

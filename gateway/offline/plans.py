@@ -1,0 +1,251 @@
+"""Campaigns that can be simulated: which vehicle drives where, how fast and with what on board.
+
+Loads and places are the paper's for its van (450 kg rated, 2.8 m wheelbase) and scaled to other vehicles.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from gateway.sim.drive import Drive, Leg, constant, drive_of, motorway, rural, standstill, urban
+from gateway.sim.obstacles import ObstacleRoad, UnevenRoad
+from gateway.sim.road import PaperRoad, RoadRecipe, iso_road
+from gateway.sim.scenario import LoadStep
+from gateway.sim.vehicle import Load, Vehicle, front_share_pct, load_for_share
+
+PAPER_PAYLOAD_KG: Final = 450.0
+PAPER_WHEELBASE_M: Final = 2.8
+PAPER_SPEED_MPS: Final = 50.0 / 3.6
+CHANGE_S: Final = 90.0  # standing still while the load changes: longer than what ends a drive
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """A stretch of one drive with one load, seconds from its start."""
+
+    loads: tuple[Load, ...]
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedDrive:
+    """One log to be: where it goes, and what is carried when. Times of ``carried`` are those worth judging."""
+
+    name: str
+    drive: Drive
+    road: RoadRecipe
+    carried: tuple[Carried, ...]
+    steps: tuple[LoadStep, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A campaign to be. split, where given, is what every run serves."""
+
+    drives: tuple[PlannedDrive, ...]
+    identification_fraction: float = 0.667
+    split: str | None = None
+
+
+def ident(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+    """The paper's identification: 0 to the rated payload and 40 to 60 % wherever both are feasible, 50 km/h, IRI 4."""
+    pairs = [(0.0, None)]
+    for mass_kg in np.linspace(0.2, 1.0, 5) * vehicle.rated_payload_kg:
+        pairs += [(float(mass_kg), share) for share in np.linspace(-10.0, 10.0, 6) + _middle_share_pct(vehicle)]
+    loads = [_placed(vehicle, mass_kg, share) for mass_kg, share in pairs]
+    drives = [_steady(vehicle, placed, 600.0, PaperRoad(), rng) for placed in loads if placed is not None]
+    return Plan(tuple(drives), identification_fraction=1.0)
+
+
+def load_sweep(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+    """The paper's Fig. 3: 0 to the rated payload at the centre of gravity."""
+    masses = np.linspace(0.0, 1.0, 10) * vehicle.rated_payload_kg
+    loads = [(Load(float(mass_kg), vehicle.cog_position_m),) if mass_kg > 0.0 else () for mass_kg in masses]
+    drives = [_steady(vehicle, carried, 600.0, PaperRoad(), rng) for carried in loads]
+    return Plan(tuple(drives), identification_fraction=1.0)
+
+
+def share_sweep(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+    """The paper's Fig. 4: eight ninths of the rated payload moved from 40 to 60 %."""
+    mass_kg = 8.0 / 9.0 * vehicle.rated_payload_kg
+    loads = [_placed(vehicle, mass_kg, share) for share in np.linspace(-10.0, 10.0, 9) + _middle_share_pct(vehicle)]
+    drives = [_steady(vehicle, placed, 600.0, PaperRoad(), rng) for placed in loads if placed is not None]
+    return Plan(tuple(drives), identification_fraction=1.0)
+
+
+def load_step(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+    """The paper's test 1: 50 % always, the payload steps from 0 to 300 kg."""
+    mass_kg = 300.0 / PAPER_PAYLOAD_KG * vehicle.rated_payload_kg
+    loads: list[tuple[Load, ...]] = [(), (Load(mass_kg, vehicle.cog_position_m),)]
+    return _with_changes("test1", loads, 1800.0, rng)
+
+
+def share_step(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+    """The paper's test 2: 400 kg, its share steps from 40 to 60 % after 30 minutes."""
+    mass_kg = 400.0 / PAPER_PAYLOAD_KG * vehicle.rated_payload_kg
+    middle = _middle_share_pct(vehicle)
+    return _with_changes(
+        "test2", [(load_for_share(vehicle, mass_kg, middle + by),) for by in (-10.0, 10.0)], 1800.0, rng
+    )
+
+
+def random_pairs(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+    """The paper's test 3: ten random feasible pairs of payload and share, ten minutes each."""
+    loads: list[tuple[Load, ...]] = []
+    while len(loads) < 10:
+        mass_kg = float(rng.uniform(0.0, vehicle.rated_payload_kg))
+        placed = _placed(vehicle, mass_kg, _middle_share_pct(vehicle) + float(rng.uniform(-10.0, 10.0)))
+        if placed is not None:
+            loads.append(placed)
+    return _with_changes("test3", loads, 600.0, rng)
+
+
+def experiment(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+    """The paper's experiment: ten loads of 0, 120, 270, 420 kg at 0.5, 1.3, 2.8 m, 15 minutes near 50 km/h each."""
+    road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
+    return Plan(
+        tuple(_steady(vehicle, carried, 900.0, road, rng, jitter_mps=0.4) for carried in _experiment_loads(vehicle))
+    )
+
+
+def speeds(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+    """30 to 110 km/h with nothing, three fifths and nearly all of the rated payload; for validation only."""
+    masses = [part / PAPER_PAYLOAD_KG * vehicle.rated_payload_kg for part in (0.0, 270.0, 420.0)]
+    middle_m = 0.55 * vehicle.wheelbase_m
+    road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
+    drives = [
+        _steady(vehicle, (Load(mass_kg, middle_m),) if mass_kg else (), 480.0, road, rng, speed_mps=kmh / 3.6)
+        for kmh in (30.0, 50.0, 70.0, 90.0, 110.0)
+        for mass_kg in masses
+    ]
+    return Plan(tuple(drives), identification_fraction=0.0, split="validation")
+
+
+def mixed(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+    """Town, country and motorway in one drive a load, on roads that change, with potholes."""
+    road = ObstacleRoad(UnevenRoad(iso_road("B"), stretch_m=400.0, spread=0.4), potholes_per_km=1.0)
+    drives = []
+    for carried in _experiment_loads(vehicle):
+        kinds: list[Callable[[float, np.random.Generator], Drive]] = [urban, rural, motorway]
+        rng.shuffle(kinds)
+        whole = kinds[0](420.0, rng).then(kinds[1](420.0, rng)).then(kinds[2](420.0, rng))
+        drives.append(_whole(_name(vehicle, carried), whole, road, carried))
+    return Plan(tuple(drives))
+
+
+PLANS: Final[Mapping[str, Callable[[Vehicle, np.random.Generator], Plan]]] = MappingProxyType(
+    {
+        "ident": ident,
+        "load-sweep": load_sweep,
+        "share-sweep": share_sweep,
+        "test1": load_step,
+        "test2": share_step,
+        "test3": random_pairs,
+        "experiment": experiment,
+        "speeds": speeds,
+        "mixed": mixed,
+    }
+)
+
+
+def plan_of(kind: str, vehicle: Vehicle, seed: int, max_drive_s: float | None = None) -> Plan:
+    """The plan of a kind; the seed decides speeds, roads and random loads. max_drive_s cuts every drive short.
+
+    Raises KeyError for a kind that is not in PLANS.
+    """
+    plan = PLANS[kind](vehicle, np.random.default_rng(seed))
+    if max_drive_s is None:
+        return plan
+    return replace(plan, drives=tuple(_cut(drive, max_drive_s) for drive in plan.drives))
+
+
+def share_range_pct(vehicle: Vehicle) -> tuple[float, float]:
+    """The range of shares that (12) normalises by: 20 points about the middle of the plans, 40 to 60 for the paper."""
+    middle = _middle_share_pct(vehicle)
+    return middle - 10.0, middle + 10.0
+
+
+def _middle_share_pct(vehicle: Vehicle) -> float:
+    """Half of the rated payload over the middle of the wheelbase brings the share here, in whole points."""
+    half = (Load(vehicle.rated_payload_kg / 2.0, vehicle.wheelbase_m / 2.0),)
+    return round(front_share_pct(vehicle, half))
+
+
+def _placed(vehicle: Vehicle, mass_kg: float, share_pct: float | None) -> tuple[Load, ...] | None:
+    """The load placed for a share; None where it would stand outside the axles (not feasible)."""
+    if mass_kg == 0.0 or share_pct is None:
+        return ()
+    try:
+        load = load_for_share(vehicle, mass_kg, share_pct)
+    except ValueError:
+        return None
+    return (load,) if 0.0 <= load.position_m <= vehicle.wheelbase_m else None
+
+
+def _experiment_loads(vehicle: Vehicle) -> list[tuple[Load, ...]]:
+    by_mass, by_length = vehicle.rated_payload_kg / PAPER_PAYLOAD_KG, vehicle.wheelbase_m / PAPER_WHEELBASE_M
+    loaded = [(Load(m * by_mass, d * by_length),) for m in (120.0, 270.0, 420.0) for d in (0.5, 1.3, 2.8)]
+    return [(), *loaded]
+
+
+def _steady(
+    vehicle: Vehicle,
+    loads: tuple[Load, ...],
+    duration_s: float,
+    road: RoadRecipe,
+    rng: np.random.Generator,
+    speed_mps: float = PAPER_SPEED_MPS,
+    jitter_mps: float = 0.3,
+) -> PlannedDrive:
+    name = f"{_name(vehicle, loads)}_{speed_mps * 3.6:.0f}kmh"
+    return _whole(name, constant(speed_mps, duration_s, rng, jitter_mps), road, loads)
+
+
+def _whole(name: str, drive: Drive, road: RoadRecipe, loads: tuple[Load, ...]) -> PlannedDrive:
+    return PlannedDrive(name, drive, road, (Carried(loads, 0.0, drive.duration_s),), (LoadStep(0.0, loads),))
+
+
+def _name(vehicle: Vehicle, loads: tuple[Load, ...]) -> str:
+    """L270_D47.5"""
+    return f"L{sum(load.mass_kg for load in loads):03.0f}_D{front_share_pct(vehicle, loads):.1f}"
+
+
+def _with_changes(name: str, loads: Sequence[tuple[Load, ...]], each_s: float, rng: np.random.Generator) -> Plan:
+    """One drive at 50 km/h on IRI 4; for each change of load it stops for a while."""
+    whole: Drive | None = None
+    carried, steps = [], []
+    for on_board in loads:
+        ride, starts_s, ends_s = _from_rest_to_rest(each_s, rng)
+        begin_s = 0.0 if whole is None else whole.duration_s
+        carried.append(Carried(on_board, begin_s + starts_s, begin_s + ends_s))
+        steps.append(LoadStep(begin_s, on_board))
+        whole = ride if whole is None else whole.then(ride)
+    if whole is None:
+        raise ValueError("a plan needs at least one load")
+    drive = PlannedDrive(name, whole, PaperRoad(), tuple(carried), tuple(steps))
+    return Plan((drive,), identification_fraction=0.0, split="validation")
+
+
+def _from_rest_to_rest(duration_s: float, rng: np.random.Generator) -> tuple[Drive, float, float]:
+    """Standing for the change, 50 km/h for a little over duration_s, a stop; and when that speed begins and ends."""
+    ramp = drive_of([Leg(PAPER_SPEED_MPS, duration_s + 5.0), Leg(0.0, 1.0)])
+    at_speed_s = CHANGE_S + np.flatnonzero(ramp.speed_mps > 0.999 * PAPER_SPEED_MPS) * ramp.step_s
+    wandering = constant(PAPER_SPEED_MPS, ramp.duration_s + 1.0, rng).speed_mps[: len(ramp.speed_mps)]
+    scaled = ramp.speed_mps * wandering / PAPER_SPEED_MPS
+    whole = standstill(CHANGE_S).then(Drive(scaled, ramp.lateral_mps2, ramp.step_s))
+    return whole, float(at_speed_s[0]), float(at_speed_s[-1])
+
+
+def _cut(planned: PlannedDrive, duration_s: float) -> PlannedDrive:
+    """The first duration_s of a drive and what is carried in it."""
+    if duration_s >= planned.drive.duration_s:
+        return planned
+    carried = tuple(
+        replace(part, end_s=min(part.end_s, duration_s)) for part in planned.carried if part.start_s < duration_s
+    )
+    steps = tuple(step for step in planned.steps if step.t_s < duration_s)
+    return replace(planned, drive=planned.drive.part(0.0, duration_s), carried=carried, steps=steps)

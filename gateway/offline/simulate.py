@@ -1,0 +1,215 @@
+"""Simulated drives as campaigns on disk, or as frames for a bus."""
+
+import csv
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from shutil import copyfile
+from typing import Final
+
+import numpy as np
+
+from gateway.bus.candump_write import write_candump
+from gateway.bus.frames import merge_frames
+from gateway.bus.signal_map import SignalMapFile, shipped_map
+from gateway.bus.sink import BusSink, OnProgress, Speed, replay_frames
+from gateway.errors import ConfigurationError, SignalMapError
+from gateway.offline.plans import PLANS, Carried, Plan, PlannedDrive, plan_of, share_range_pct
+from gateway.offline.wiring import Wiring, unrelated_traffic
+from gateway.records import Frames
+from gateway.sim.scenario import START_NS, SimulatedDrive, simulate_drive
+from gateway.sim.sensors import CANMOD, REFERENCE, Sensors
+from gateway.sim.vans import VANS
+from gateway.sim.vehicle import Vehicle, front_share_pct, payload_kg
+from gateway.toml_file import load_toml
+from gateway.units import NS_PER_S
+
+OnDrive = Callable[[int, int], None]  # (drives done, drives in all)
+
+CHANNEL: Final = "can0"
+BETWEEN_DRIVES_S: Final = 120.0  # the bus sleeps while the vehicle is parked
+SENSORS_OF_MAP: Final = {"reference": REFERENCE, "canmod_gps": CANMOD, "j1939": REFERENCE}
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What is simulated: a plan of this kind with this vehicle, its sensors sending as a shipped signal map tells.
+
+    n_unrelated other identifiers share the bus. max_drive_s cuts every drive short.
+    """
+
+    kind: str
+    vehicle: Vehicle
+    map_name: str = "reference"
+    seed: int = 1
+    n_unrelated: int = 0
+    max_drive_s: float | None = None
+
+    @property
+    def sensors(self) -> Sensors:
+        return SENSORS_OF_MAP[self.map_name]
+
+    def plan(self) -> Plan:
+        return plan_of(self.kind, self.vehicle, self.seed, self.max_drive_s)
+
+    def simulate(self, planned: PlannedDrive, number: int, start_ns: int) -> SimulatedDrive:
+        """Drive ``number`` of the plan, begun at start_ns."""
+        seed = int(np.random.SeedSequence([self.seed, number]).generate_state(1)[0])
+        return simulate_drive(self.vehicle, planned.steps, planned.road, planned.drive, self.sensors, seed, start_ns)
+
+    def frames_of(self, planned: PlannedDrive, number: int, driven: SimulatedDrive) -> Frames:
+        """Its frames in order of time, with what else is on the bus."""
+        frames = Wiring(self.map_name).frames_of(driven.recording)
+        if self.n_unrelated == 0:
+            return frames
+        rng = np.random.default_rng([self.seed, number])
+        start_ns = int(driven.truth.t_ns[0])
+        return merge_frames([frames, unrelated_traffic(start_ns, planned.drive.duration_s, self.n_unrelated, rng)])
+
+
+def bench_of(
+    kind: str,
+    vehicle: str = "paper_van",
+    map_name: str = "reference",
+    seed: int = 1,
+    n_unrelated: int = 0,
+    max_drive_s: float | None = None,
+) -> Bench:
+    """A bench from names. Raises ConfigurationError for a name that is not there, naming those that are."""
+    for what, name, known in (
+        ("campaign", kind, PLANS),
+        ("vehicle", vehicle, VANS),
+        ("signal map to send by", map_name, SENSORS_OF_MAP),
+    ):
+        if name not in known:
+            raise ConfigurationError(f"there is no {what} {name!r}: choose {', '.join(known)}")
+    if max_drive_s is not None and not max_drive_s > 0.0:
+        raise ConfigurationError(f"a drive needs a positive duration, not {max_drive_s:g} s")
+    return Bench(kind, VANS[vehicle], map_name, seed, n_unrelated, max_drive_s)
+
+
+def write_campaign(
+    bench: Bench, directory: Path, *, workers: int = 1, on_drive: OnDrive = lambda done, of: None
+) -> Path:
+    """Write campaign.toml, signals.toml with its DBC, the logs and truth.csv; the path of campaign.toml.
+
+    The same bench writes the same bytes, however many processes work. Raises ConfigurationError where
+    the directory holds a campaign already.
+    """
+    campaign = directory / "campaign.toml"
+    if campaign.exists():
+        raise ConfigurationError(f"{campaign}: there is a campaign already; name another directory or remove it")
+    directory.mkdir(parents=True, exist_ok=True)
+    _copy_signal_map(bench.map_name, directory)
+    plan = bench.plan()
+    logs = [f"{number:02d}_{planned.name}/can.log.gz" for number, planned in enumerate(plan.drives, 1)]
+    write = partial(_write_drive, bench, plan, directory, logs)
+    truths = []
+    on_drive(0, len(logs))
+    for truth in _mapped(write, range(len(logs)), workers):
+        truths.append(truth)
+        on_drive(len(truths), len(logs))
+    _write_truth(directory / "truth.csv", truths)
+    campaign.write_text(_campaign_text(bench, plan, logs), encoding="utf-8")
+    return campaign
+
+
+def simulated_frames(bench: Bench, start_ns: int = START_NS) -> Iterator[Frames]:
+    """The plan's drives one after the other, the vehicle parked in between; a chunk of frames a drive."""
+    for number, planned in enumerate(bench.plan().drives):
+        driven = bench.simulate(planned, number, start_ns)
+        yield bench.frames_of(planned, number, driven)
+        start_ns += round((planned.drive.duration_s + BETWEEN_DRIVES_S) * NS_PER_S)
+
+
+def stream(
+    bench: Bench,
+    interface: str,
+    channel: str,
+    *,
+    speed: Speed = 1.0,
+    on_progress: OnProgress | None = None,
+    stop: threading.Event | None = None,
+) -> int:
+    """Send the plan's drives to a bus, paced by their time; how many frames. Raises BusError."""
+    with BusSink(interface, channel) as sink:
+        return replay_frames(simulated_frames(bench), sink, speed, on_progress, stop)
+
+
+def _mapped(write: Callable[[int], list[list[str]]], numbers: Sequence[int], workers: int) -> Iterator[list[list[str]]]:
+    if workers <= 1:
+        yield from map(write, numbers)
+        return
+    with ProcessPoolExecutor(workers) as pool:
+        yield from pool.map(write, numbers)
+
+
+def _write_drive(bench: Bench, plan: Plan, directory: Path, logs: Sequence[str], number: int) -> list[list[str]]:
+    """Simulate one drive and write its log; its rows of truth.csv."""
+    planned = plan.drives[number]
+    driven = bench.simulate(planned, number, START_NS + number * 86_400 * NS_PER_S)
+    log = directory / logs[number]
+    log.parent.mkdir(exist_ok=True)
+    write_candump(bench.frames_of(planned, number, driven), CHANNEL, log)
+    truth = driven.truth
+    columns = zip(truth.t_ns, truth.payload_kg, truth.front_share_pct, truth.axle_loads_kg, strict=True)
+    return [[logs[number], str(t), f"{kg:.3f}", f"{d:.4f}", f"{f:.3f}", f"{r:.3f}"] for t, kg, d, (f, r) in columns]
+
+
+def _write_truth(path: Path, drives: Sequence[Sequence[Sequence[str]]]) -> None:
+    """One row a load: it was on board from t_ns on."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(("log", "t_ns", "payload_kg", "front_share_pct", "front_axle_kg", "rear_axle_kg"))
+        table.writerows(row for drive in drives for row in drive)
+
+
+def _copy_signal_map(map_name: str, directory: Path) -> None:
+    shipped = shipped_map(map_name)
+    copyfile(shipped, directory / "signals.toml")
+    for database in load_toml(shipped, SignalMapFile, SignalMapError).dbc:
+        copyfile(shipped.parent / database, directory / database)
+
+
+def _campaign_text(bench: Bench, plan: Plan, logs: Sequence[str]) -> str:
+    vehicle, mount = bench.vehicle, bench.sensors.mount
+    low, high = share_range_pct(vehicle)
+    lines = [
+        f"# Simulated: {bench.kind}, seed {bench.seed}, sensors of the map {bench.map_name}. Truth is in truth.csv.",
+        'signals = "signals.toml"',
+        f"identification_fraction = {plan.identification_fraction}",
+        "",
+        "[vehicle]",
+        f'name = "{vehicle.name}"',
+        f"empty_mass_kg = {vehicle.sprung_kg}",
+        f"wheelbase_m = {vehicle.wheelbase_m}",
+        f"empty_front_share_pct = {vehicle.empty_front_share_pct:.6g}",
+        f"sensor_position_m = {mount.position_m}",
+        f"sensor_offset_left_m = {mount.left_m}",
+        f"payload_range_kg = [0.0, {vehicle.rated_payload_kg}]",
+        f"front_share_range_pct = [{low}, {high}]",
+        f"unsprung_front_kg = {2.0 * vehicle.front.wheel.unsprung_kg}",
+        f"unsprung_rear_kg = {2.0 * vehicle.rear.wheel.unsprung_kg}",
+        f"wheel_radius_m = {vehicle.front.wheel.radius_m}",
+    ]
+    for planned, log in zip(plan.drives, logs, strict=True):
+        for carried in planned.carried:
+            lines += ["", "[[runs]]", f'log = "{log}"', *_run_lines(vehicle, planned, carried)]
+            lines += [f'split = "{plan.split}"'] if plan.split else []
+    return "\n".join(lines) + "\n"
+
+
+def _run_lines(vehicle: Vehicle, planned: PlannedDrive, carried: Carried) -> list[str]:
+    lines = [f"payload_kg = {payload_kg(carried.loads):.6g}"]
+    if len(carried.loads) == 1:
+        lines.append(f"payload_position_m = {carried.loads[0].position_m:.6g}")
+    elif carried.loads:
+        lines.append(f"front_share_pct = {front_share_pct(vehicle, carried.loads):.6g}")
+    if carried.start_s > 0.0:
+        lines.append(f"start_s = {carried.start_s:.3f}")
+    if carried.end_s < planned.drive.duration_s:
+        lines.append(f"end_s = {carried.end_s:.3f}")
+    return lines
