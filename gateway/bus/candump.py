@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gateway.bus.candump_line import LineFrame, NotData, read_line
 from gateway.bus.candump_shape import LineShape, learn_shape
 from gateway.bus.frames import in_order, take
-from gateway.bus.line_blocks import LineBlock, line_blocks
+from gateway.bus.line_blocks import BLOCK_BYTES, LineBlock, line_blocks
 from gateway.bus.log_report import LogReject, LogReport
 from gateway.bus.mapping import CLASSIC_BYTES, IdFilter
 from gateway.records import EXTENDED_ID, I64, Bool, Frames
@@ -33,6 +33,7 @@ def read_candump(
     *,
     width: int = CLASSIC_BYTES,
     report: LogReport | None = None,
+    block_bytes: int = BLOCK_BYTES,
 ) -> Iterator[Frames]:
     """Frames that pass one of ``filters``, of ``channel`` or of all, in order of arrival, in chunks.
 
@@ -41,7 +42,7 @@ def read_candump(
     """
     report = LogReport(Path(path)) if report is None else report
     reader = _Reader(filters, channel, width, report)
-    for block in line_blocks(Path(path), report):
+    for block in line_blocks(Path(path), report, block_bytes):
         frames = reader.read(block)
         if len(frames):
             yield frames
@@ -65,7 +66,7 @@ class IdPattern:
         text = "" if is_extended else " "
         for shift in range(4 * n_digits - 4, -1, -4):
             is_fixed = (id_filter.mask ^ all_bits) >> shift & 0xF & (all_bits >> shift) == 0
-            text += f"{id_filter.can_id >> shift & 0xF:x}" if is_fixed else "?"
+            text += f"{(id_filter.can_id & all_bits) >> shift & 0xF:x}" if is_fixed else "?"
         return cls(text)
 
     def matches(self, words: NDArray[np.uint64]) -> Bool:

@@ -12,7 +12,7 @@ from gateway.units import NS_PER_S
 LAST_SECOND: Final = 9_223_372_035  # int64 nanoseconds reach no further
 _TIME = re.compile(rb"\((\d{1,15})\.(\d{1,9})\)\s")
 _LINE = re.compile(
-    rb"\((?P<seconds>\d{1,15})\.(?P<fraction>\d{1,9})\)\s+(?P<channel>\S+)\s+(?P<id>[0-9A-Fa-f]+)"
+    rb"\((?P<seconds>\d{1,15})\.(?P<fraction>\d{1,9})\)\s+(?P<channel>[!-~]+)\s+(?P<id>[0-9A-Fa-f]+)"
     rb"#(?P<fd>#[0-9A-Fa-f])?(?P<payload>[^\s_]*)(?:_[0-9A-Fa-f])?(?:\s+[RT])?"
 )
 _REMOTE = re.compile(rb"[Rr][0-9A-Fa-f]?")

@@ -13,7 +13,7 @@ from gateway.records import EXTENDED_ID, F64, I64, U8, U32, Bool, Frames
 from gateway.units import NS_PER_S
 
 _SHAPE = re.compile(
-    rb"\((\d{1,15})\.(\d{1,9})\) (\S{1,32}) ([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})(#|##[0-9A-Fa-f])"
+    rb"\((\d{1,15})\.(\d{1,9})\) ([!-~]{1,32}) ([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})(#|##[0-9A-Fa-f])"
     rb"((?:[0-9A-Fa-f]{2})*)((?: [RT])?\r?\n)"
 )
 _NOT_HEX: Final = 0xFF

@@ -1,23 +1,28 @@
 """A text file, gzip or not, as blocks of whole lines in one buffer that is used again and again."""
 
-import zlib
+import io
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Final, cast
+from typing import TYPE_CHECKING, BinaryIO, Final, cast
 
 import numpy as np
-from isal import igzip, isal_zlib
+from isal import igzip_lib
 
 from gateway.bus.log_report import LogReject, LogReport
 from gateway.errors import LogUnreadableError
 from gateway.records import U8
 
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
 BLOCK_BYTES: Final = 1 << 20  # stays in the cache; reading a file whole costs three times the decode in page faults
 MARGIN: Final = 512  # lets a reader look this far around any byte of a block
+PACKED_BYTES: Final = 1 << 18
+INFLATED_BYTES: Final = 1 << 17  # at most this much before a damage is lost
 _GZIP_MAGIC: Final = b"\x1f\x8b"
-_IsalError = cast(type[Exception], isal_zlib.error)
+_IsalError = cast(type[Exception], igzip_lib.error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +37,67 @@ class LineBlock:
     end: int
 
 
+class GzipStream(io.RawIOBase):
+    """A gzip file inflated by isal. Unlike a GzipFile it gives all there is before a damage, then raises.
+
+    Raises EOFError where the stream is cut, ValueError where it is damaged.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._inflater = _new_inflater()
+        self._packed = b""
+
+    def readable(self) -> bool:
+        """A stream to read from."""
+        return True
+
+    def readinto(self, buffer: "WriteableBuffer") -> int:
+        """Inflate into ``buffer``; bytes written, 0 at the end."""
+        room = memoryview(buffer).cast("B")
+        while True:
+            if self._inflater.eof and not self._next_member():
+                return 0
+            if self._inflater.needs_input and not self._packed:
+                self._packed = self._file.read(PACKED_BYTES)
+                if not self._packed:
+                    raise EOFError("the gzip stream is cut off")
+            try:
+                text = self._inflater.decompress(self._packed, min(len(room), INFLATED_BYTES))
+            except _IsalError as fault:
+                raise ValueError(f"the gzip stream is damaged: {fault}") from None
+            self._packed = b""
+            if text:
+                room[: len(text)] = text
+                return len(text)
+
+    def close(self) -> None:
+        """Close the file below as well."""
+        self._file.close()
+        super().close()
+
+    def _next_member(self) -> bool:
+        """Whether another gzip member follows; zeros and what is no gzip after the last one are padding."""
+        self._packed = self._inflater.unused_data or self._file.read(PACKED_BYTES)
+        if not self._packed.startswith(_GZIP_MAGIC):
+            return False
+        self._inflater = _new_inflater()
+        return True
+
+
+def _new_inflater() -> igzip_lib.IgzipDecompressor:
+    return igzip_lib.IgzipDecompressor(flag=igzip_lib.DECOMP_GZIP)
+
+
 def open_maybe_gzip(path: Path) -> AbstractContextManager[BinaryIO]:
     """Open for reading, inflating where the content is gzip whatever the file is called."""
     try:
-        with path.open("rb") as file:
-            is_gzip = file.read(2) == _GZIP_MAGIC
-        return cast(BinaryIO, igzip.IGzipFile(path)) if is_gzip else path.open("rb")  # type: ignore[no-untyped-call] # isal has no types
+        file = path.open("rb")
     except OSError as fault:
         raise LogUnreadableError(f"{path}: cannot be read: {fault.strerror or fault}") from None
+    if not file.peek(2).startswith(_GZIP_MAGIC):
+        return file
+    return io.BufferedReader(GzipStream(file), BLOCK_BYTES)
 
 
 def line_blocks(path: Path, report: LogReport, block_bytes: int = BLOCK_BYTES) -> Iterator[LineBlock]:
@@ -83,6 +141,6 @@ def _fill(stream: BinaryIO, free: memoryview, report: LogReport) -> int:
     try:
         while n_read < len(free) and (n := stream.readinto1(free[n_read:])):  # type: ignore[attr-defined] # BufferedIOBase has it
             n_read += n
-    except (EOFError, OSError, zlib.error, _IsalError) as fault:
-        report.ended_early = f"the file is damaged: {fault}"
+    except (EOFError, OSError, ValueError) as fault:
+        report.ended_early = str(fault)
     return n_read

@@ -1,0 +1,269 @@
+"""The bulk reader on logs as they are found: what is read, what is counted, and that nothing ends a run."""
+
+import gzip
+
+import numpy as np
+import pytest
+
+from gateway.bus.candump import read_candump
+from gateway.bus.frames import join
+from gateway.bus.log_report import LogReject, LogReport
+from gateway.bus.mapping import IdFilter, exact_filter, j1939_filter
+from gateway.errors import LogUnreadableError
+from gateway.records import EXTENDED_ID, Frames
+
+WANTED = (exact_filter(0x120), exact_filter(0x18FEF100 | EXTENDED_ID))
+GOOD = b"(1627274455.012500) can1 120#0011223344556677\n"
+GOOD_NS = 1627274455_012500_000
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(text, filters=WANTED, channel="can1", width=8, name="a.log", **options):
+        path = tmp_path / name
+        path.write_bytes(text)
+        report = LogReport(path)
+        chunks = list(read_candump(path, filters, channel, width=width, report=report, **options))
+        return join(chunks, width), report
+
+    return read
+
+
+def rows(frames: Frames):
+    return [
+        (int(t), int(i), p[:n].tobytes())
+        for t, i, n, p in zip(frames.t_ns, frames.can_id, frames.length, frames.payload, strict=True)
+    ]
+
+
+def test_a_plain_log(read):
+    frames, report = read(
+        b"(1627274455.012500) can1 120#0011223344556677\n"
+        b"(1627274455.023950) can1 7E8#03412F8C00000000\n"
+        b"(1627274455.044400) can1 18FEF100#FFFF\n"
+        b"(1627274455.044400) can1 120#\n"
+    )
+    assert rows(frames) == [
+        (GOOD_NS, 0x120, bytes.fromhex("0011223344556677")),
+        (1627274455_044400_000, 0x18FEF100 | EXTENDED_ID, b"\xff\xff"),
+        (1627274455_044400_000, 0x120, b""),
+    ]
+    assert (report.lines, report.frames, report.wanted, report.n_rejected) == (4, 4, 3, 0)
+
+
+SOUND_LINES = {
+    "nanoseconds": (b"(1627274455.012500001) can1 120#0011223344556677\n", GOOD_NS + 1),
+    "few decimals": (b"(1627274455.0125) can1 120#0011223344556677\n", GOOD_NS),
+    "relative stamps": (b"(3.000001) can1 120#0011223344556677\n", 3_000_001_000),
+    "padded relative stamps": (b"(0000000003.000001) can1 120#0011223344556677\n", 3_000_001_000),
+    "lower case": (b"(1627274455.012500) can1 120#0011223344556677\n".lower(), GOOD_NS),
+    "CRLF": (GOOD.replace(b"\n", b"\r\n"), GOOD_NS),
+    "direction suffix": (GOOD.replace(b"\n", b" R\n"), GOOD_NS),
+    "direction suffix and CRLF": (GOOD.replace(b"\n", b" T\r\n"), GOOD_NS),
+    "no final newline": (GOOD.rstrip(b"\n"), GOOD_NS),
+    "trailing blanks": (GOOD.replace(b"\n", b" \t \n"), GOOD_NS),
+    "two blanks": (GOOD.replace(b") can1 ", b")  can1  "), GOOD_NS),
+    "NULs before the line": (b"\0" * 100 + GOOD, GOOD_NS),
+    "length code": (GOOD.replace(b"\n", b"_9\n"), GOOD_NS),
+    "last stamp of all": (b"(9223372035.999999999) can1 120#0011223344556677\n", 9223372035_999999999),
+}
+
+
+@pytest.mark.parametrize("kind", SOUND_LINES)
+def test_a_sound_line_of_any_kind_is_read(kind, read):
+    line, t_ns = SOUND_LINES[kind]
+    frames, report = read(GOOD + line)
+    assert rows(frames) == [(t, 0x120, bytes.fromhex("0011223344556677")) for t in (GOOD_NS, t_ns)]
+    assert report.n_rejected == 0
+
+
+DIRTY_LINES = {
+    "half a byte": (b"(1627274455.012500) can1 120#010\n", LogReject.HALF_BYTE),
+    "no hexadecimal": (b"(1627274455.012500) can1 120#00112233445566zz\n", LogReject.BAD_PAYLOAD),
+    "no ASCII": (b"(1627274455.012500) can1 120#00\xff1\n", LogReject.BAD_PAYLOAD),
+    "nine bytes": (b"(1627274455.012500) can1 120#001122334455667788\n", LogReject.TOO_LONG),
+    "cut at the front": (b"4455.012500) can1 120#0011223344556677\n", LogReject.BAD_TIME),
+    "cut in the stamp": (b"(162727\n", LogReject.NO_FRAME),
+    "cut before the mark": (b"(1627274455.012500) can1 12\n", LogReject.NO_FRAME),
+    "joined to the next": (b"(1627274455.012500) can1 120#0011(1627274455.0\n", LogReject.BAD_PAYLOAD),
+    "NULs inside": (b"(1627274455.012500) can1\0\0\0 120#0011223344556677\n", LogReject.NUL_BYTES),
+    "stamp without a point": (b"(1627274455) can1 120#0011223344556677\n", LogReject.BAD_TIME),
+    "stamp beyond 2262": (b"(9999999999.000000) can1 120#0011223344556677\n", LogReject.BAD_TIME),
+    "negative stamp": (b"(-1.000000) can1 120#0011223344556677\n", LogReject.BAD_TIME),
+    "no channel": (b"(1627274455.012500) 120#0011223344556677\n", LogReject.GARBLED),
+    "words": (b"candump: write error: no space left on device\n", LogReject.NO_FRAME),
+    "another tool's format": (b"  can1  120   [8]  00 11 22 33 44 55 66 77\n", LogReject.NO_FRAME),
+    "identifier of 30 bits": (b"(1627274455.012500) can1 58FEF100#00\n", LogReject.BAD_ID),
+}
+
+
+@pytest.mark.parametrize("kind", DIRTY_LINES)
+def test_a_dirty_line_is_rejected_by_reason_and_number_and_the_rest_is_read(kind, read):
+    line, reason = DIRTY_LINES[kind]
+    filters = (*WANTED, j1939_filter(0x18FEF100))
+    frames, report = read(GOOD + line + GOOD + line + GOOD, filters)
+    assert rows(frames) == [(GOOD_NS, 0x120, bytes.fromhex("0011223344556677"))] * 3
+    assert {r: (n.count, n.first_lines) for r, n in report.rejects.items()} == {reason: (2, [2, 4])}
+
+
+def test_only_the_first_line_numbers_are_kept_but_all_are_counted(read):
+    _, report = read(b"(1627274455.012500) can1 120#010\n" * 1000)
+    rejected = report.rejects[LogReject.HALF_BYTE]
+    assert (rejected.count, rejected.first_lines) == (1000, [1, 2, 3, 4, 5])
+
+
+def test_line_numbers_count_on_over_blocks(read):
+    _, report = read((GOOD * 500 + b"garbage\n" + GOOD * 10 + GOOD.replace(b"77\n", b"7\n")), block_bytes=4096)
+    assert report.rejects[LogReject.NO_FRAME].first_lines == [501]
+    assert report.rejects[LogReject.HALF_BYTE].first_lines == [512]
+    assert report.lines == 512
+
+
+def test_error_frames_are_counted_not_read(read):
+    line = b"(1627274455.012500) can1 20000004#0008000000000000\n"
+    frames, report = read(GOOD + line, (*WANTED, j1939_filter(0x00000000)))
+    assert (len(frames), report.error_frames, report.frames, report.n_rejected) == (1, 1, 1, 0)
+
+
+def test_remote_frames_are_counted_not_read(read):
+    frames, report = read(GOOD + b"(1.0) can1 120#R\n(2.0) can1 120#R8\n")
+    assert (len(frames), report.remote_frames, report.n_rejected) == (1, 2, 0)
+
+
+def test_other_channels_are_counted_not_read(read):
+    frames, report = read(GOOD + GOOD.replace(b"can1", b"can0") * 2 + GOOD.replace(b"can1", b"vcan11"))
+    assert (len(frames), report.other_channel, report.channels) == (1, 3, {"can0", "can1", "vcan11"})
+
+
+def test_without_a_channel_all_are_read_in_order(read):
+    frames, report = read(GOOD + b"(1627274455.012501) can0 120#01\n" + GOOD, channel=None)
+    assert frames.length.tolist() == [8, 1, 8]
+    assert report.out_of_order == 1
+
+
+def test_the_order_is_that_of_the_lines_whatever_their_shape(read):
+    lines = [b"(%d.5) can1 120#%02X%s\n" % (s, s, b"00" * (s % 7)) for s in range(1, 60)]
+    lines[30] = lines[30].replace(b"\n", b"  \n")
+    frames, _ = read(b"".join(lines), block_bytes=256)
+    assert frames.payload[:, 0].tolist() == list(range(1, 60))
+    assert frames.length.tolist() == [1 + s % 7 for s in range(1, 60)]
+
+
+def test_can_fd_lines(read):
+    frames, report = read(
+        b"(1.000001) can1 120##1" + b"AB" * 64 + b"\n(1.000002) can1 120##0\n(1.000003) can1 120##101\n" + GOOD,
+        width=64,
+    )
+    assert [len(p) for _, _, p in rows(frames)] == [64, 0, 1, 8]
+    assert frames.payload[0].tolist() == [0xAB] * 64
+    assert (report.frames, report.n_rejected) == (4, 0)
+
+
+def test_a_can_fd_frame_in_a_classic_table_keeps_its_true_length(read):
+    frames, _ = read(b"(1.000001) can1 120##1" + b"AB" * 12 + b"\n")
+    assert (frames.length.tolist(), frames.payload.tolist()) == ([12], [[0xAB] * 8])
+
+
+def test_a_29_bit_identifier_is_one_of_eight_digits(read):
+    frames, _ = read(b"(1.0) can1 00000120#01\n(1.0) can1 120#02\n", (exact_filter(0x120 | EXTENDED_ID),))
+    assert rows(frames) == [(10**9, 0x120 | EXTENDED_ID, b"\1")]
+
+
+def test_j1939_frames_are_found_by_group(read):
+    ids = [b"18FEF100", b"0CFEF1AB", b"18FEF200", b"1CEE2103", b"18EEFFAB", b"19FEF100"]
+    text = b"".join(b"(1.0) can1 %s#00\n" % i for i in ids)
+    frames, _ = read(text, (j1939_filter(0x18FEF1FE), j1939_filter(0x18EEFF00)))
+    assert [f"{i & 0x1FFFFFFF:08X}".encode() for _, i, _ in rows(frames)] == [ids[0], ids[1], ids[3], ids[4]]
+
+
+def test_a_mask_finer_than_a_digit_is_honoured(read):
+    text = b"".join(b"(1.0) can1 %03X#00\n" % i for i in range(0x120, 0x130))
+    frames, _ = read(text, (IdFilter(0x120, 0x7FC | EXTENDED_ID),))
+    assert frames.can_id.tolist() == [0x120, 0x121, 0x122, 0x123]
+
+
+def test_a_hole_of_nuls_longer_than_a_block_is_passed_over(read):
+    frames, report = read(GOOD + b"\0" * 20_000 + GOOD + GOOD, block_bytes=4096)
+    assert len(frames) == 2
+    assert report.rejects[LogReject.OVERLONG_LINE].first_lines == [2]
+    assert report.lines == 3
+
+
+def test_a_hole_of_nuls_to_the_end(read):
+    frames, report = read(GOOD + b"\0" * 20_000, block_bytes=4096)
+    assert (len(frames), report.rejects[LogReject.OVERLONG_LINE].count) == (1, 1)
+
+
+def test_an_empty_log_and_blank_lines(read):
+    assert read(b"")[1].lines == 0
+    frames, report = read(b"\n\n" + GOOD + b"\r\n \n")
+    assert (len(frames), report.lines, report.n_rejected) == (1, 5, 0)
+
+
+@pytest.mark.parametrize("n", range(60, 200, 7))
+def test_blocks_cut_no_line(n, read):
+    text = b"".join(b"(%d.000000) can1 120#%02X\n" % (1000 + i, i) for i in range(100))
+    frames, report = read(text, block_bytes=n)
+    assert frames.payload[:, 0].tolist() == list(range(100))
+    assert (report.lines, report.n_rejected) == (100, 0)
+
+
+def test_gzip_is_known_by_its_content_not_its_name(read):
+    assert len(read(gzip.compress(GOOD * 10), name="a.log")[0]) == 10
+    assert len(read(gzip.compress(GOOD) + gzip.compress(GOOD), name="a.log.gz")[0]) == 2
+
+
+def test_a_cut_gzip_gives_what_was_readable_and_says_so(read):
+    rng = np.random.default_rng(3)
+    text = b"".join(b"(1.0) can1 120#%s\n" % rng.bytes(8).hex().encode() for _ in range(20_000))
+    packed = gzip.compress(text)
+    frames, report = read(packed[: len(packed) // 2], name="a.log.gz")
+    assert 5_000 < len(frames) < 20_000
+    assert report.ended_early == "the gzip stream is cut off"
+
+
+def test_a_gzip_damaged_inside_ends_there(read):
+    rng = np.random.default_rng(4)
+    text = b"".join(b"(1.0) can1 120#%s\n" % rng.bytes(8).hex().encode() for _ in range(20_000))
+    packed = bytearray(gzip.compress(text))
+    packed[len(packed) // 2 : len(packed) // 2 + 400] = bytes(400)
+    frames, report = read(bytes(packed), name="a.log.gz")
+    assert len(frames) < 20_000
+    assert report.ended_early is not None
+    assert "damaged" in report.ended_early
+
+
+def test_random_bytes_end_no_run(read):
+    rng = np.random.default_rng(5)
+    frames, report = read(rng.bytes(100_000) + b"\n" + GOOD, block_bytes=4096)
+    assert rows(frames)[-1] == (GOOD_NS, 0x120, bytes.fromhex("0011223344556677"))
+    assert report.n_rejected > 0
+
+
+def test_a_folder_or_a_missing_file_is_said_so(tmp_path):
+    with pytest.raises(LogUnreadableError, match="Is a directory"):
+        list(read_candump(tmp_path, WANTED))
+    with pytest.raises(LogUnreadableError, match="No such file"):
+        list(read_candump(tmp_path / "b.log", WANTED))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (b"", "holds no CAN frame"),
+        (b"hello\n", "candump -L"),
+        (b"(1.0) can1 7E8#00\n", "none of its 1 frames has an identifier"),
+        (b"(1.0) can0 120#00\n", "the mapped frames are on can0 only; correct channel"),
+    ],
+)
+def test_a_log_without_a_wanted_frame_says_why(text, message, read):
+    _, report = read(text)
+    with pytest.raises(LogUnreadableError, match=message):
+        report.require_frames()
+
+
+def test_the_report_tells_all_to_machines(read):
+    _, report = read(GOOD + b"(1.0) can1 120#0\n")
+    told = report.to_json()
+    assert told["rejects"] == {"half_byte": {"count": 1, "first_lines": [2]}}
+    assert (told["lines"], told["frames"], told["wanted"]) == (2, 2, 1)

@@ -1,0 +1,194 @@
+"""Signal maps: what they resolve to, and that every fault names the file, the key and the way out."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gateway.bus.signal_map import load_signal_map, shipped_map, shipped_maps
+from gateway.errors import SignalMapError
+from gateway.records import EXTENDED_ID, Signal
+
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: A
+BO_ 256 IMU: 8 A
+ SG_ AccelZ : 0|16@1- (0.01,0) [-20|30] "m/s^2" A
+ SG_ Rate : 16|16@1- (0.5,0) [0|0] "deg/s" A
+ SG_ Odd : 32|16@1- (1,0) [0|0] "furlong" A
+ SG_ Status : 48|2@1+ (1,0) [0|3] "" A
+BO_ 2566844926 GROUP: 8 A
+ SG_ Speed : 8|16@1+ (0.00390625,0) [0|250.99609375] "km/h" A
+BO_ 2565799679 ADDRESSED: 8 A
+ SG_ Speed : 8|16@1+ (0.00390625,0) [0|250.99609375] "km/h" A
+BO_ 2566844672 GROUP_AGAIN: 8 A
+ SG_ Speed : 24|16@1+ (0.00390625,0) [0|250.99609375] "km/h" A
+BO_ 257 SHORT: 2 A
+ SG_ TooFar : 8|16@1- (1,0) [0|0] "g" A
+ SG_ Flat : 0|8@1- (0,0) [0|0] "g" A
+BO_ 258 WIDE: 8 A
+ SG_ Huge : 0|64@1+ (1,0) [0|0] "" A
+VAL_ 256 Status 0 "off" 1 "starting" 2 "ready" ;
+"""
+ACCEL = '[signals.vertical_acceleration]\nmessage = "IMU"\nsignal = "AccelZ"\n'
+SPEED = '[signals.speed]\nmessage = "GROUP"\nsignal = "Speed"\n'
+
+
+@pytest.fixture
+def write_map(tmp_path):
+    (tmp_path / "car.dbc").write_text(DBC)
+
+    def write(text, head='dbc = ["car.dbc"]\n'):
+        path = tmp_path / "signals.toml"
+        path.write_text(head + text)
+        return path
+
+    return write
+
+
+def only_signal(signal_map):
+    (message,) = signal_map.messages
+    (mapped,) = message.signals
+    return mapped
+
+
+def test_units_and_sign_are_one_factor(write_map):
+    text = '[signals.pitch_rate]\nmessage = "IMU"\nsignal = "Rate"\nsign = -1\n'
+    assert only_signal(load_signal_map(write_map(text))).to_si == pytest.approx(-math.pi / 180)
+
+
+def test_a_unit_in_the_map_overrides_the_databases(write_map):
+    assert only_signal(load_signal_map(write_map(ACCEL + 'unit = "g"\n'))).to_si == 9.80665
+
+
+def test_range_is_the_databases_in_si_and_turns_with_the_sign(write_map):
+    traits = load_signal_map(write_map(ACCEL + "sign = -1\n")).traits[Signal.VERTICAL_ACCELERATION]
+    assert (traits.minimum, traits.maximum, traits.resolution) == (-30.0, 20.0, 0.01)
+
+
+def test_range_of_a_database_that_says_none_is_what_the_bits_can_carry(write_map):
+    text = '[signals.pitch_rate]\nmessage = "IMU"\nsignal = "Rate"\nunit = "rad/s"\n'
+    traits = load_signal_map(write_map(text)).traits[Signal.PITCH_RATE]
+    assert (traits.minimum, traits.maximum) == (-16384.0, 16383.5)
+
+
+def test_range_in_the_map_overrides_the_databases(write_map):
+    traits = load_signal_map(write_map(ACCEL + "minimum = 5.0\n")).traits[Signal.VERTICAL_ACCELERATION]
+    assert (traits.minimum, traits.maximum) == (5.0, 30.0)
+
+
+def test_conditions_are_given_by_number_name_or_list(write_map):
+    conditions = [
+        only_signal(load_signal_map(write_map(ACCEL + f"valid_when = {{ Status = {allowed} }}\n"))).valid_when
+        for allowed in ("2", '"ready"', "[1, 2]")
+    ]
+    assert [condition.allowed_bits for (condition,) in conditions] == [(2,), (2,), (1, 2)]
+
+
+def test_signals_come_in_the_order_of_the_records(write_map):
+    assert load_signal_map(write_map(SPEED + ACCEL)).signals == (Signal.VERTICAL_ACCELERATION, Signal.SPEED)
+
+
+def test_without_j1939_an_identifier_is_matched_whole(write_map):
+    (id_filter,) = load_signal_map(write_map(SPEED)).filters
+    ids = np.array([0x18FEF1FE, 0x18FEF100, 0x0CFEF1FE], np.uint32) | np.uint32(EXTENDED_ID)
+    assert id_filter.matches(ids).tolist() == [True, False, False]
+
+
+def test_with_j1939_the_group_is_matched_whatever_priority_and_source(write_map):
+    (id_filter,) = load_signal_map(write_map("j1939 = true\n" + SPEED)).filters
+    ids = np.array([0x18FEF1FE, 0x0CFEF100, 0x18FEF2FE, 0x19FEF1FE], np.uint32) | np.uint32(EXTENDED_ID)
+    assert id_filter.matches(ids).tolist() == [True, True, False, False]
+    assert not id_filter.matches(np.array([0x7F1], np.uint32)).any()
+
+
+def test_with_j1939_an_addressed_group_is_matched_whatever_destination(write_map):
+    text = 'j1939 = true\n[signals.speed]\nmessage = "ADDRESSED"\nsignal = "Speed"\n'
+    (id_filter,) = load_signal_map(write_map(text)).filters
+    ids = np.array([0x18EEFFFF, 0x1CEE2103, 0x18EFFFFF], np.uint32) | np.uint32(EXTENDED_ID)
+    assert id_filter.matches(ids).tolist() == [True, True, False]
+
+
+def test_with_j1939_an_11_bit_message_is_still_matched_whole(write_map):
+    (id_filter,) = load_signal_map(write_map("j1939 = true\n" + ACCEL)).filters
+    assert id_filter.matches(np.array([256, 257], np.uint32)).tolist() == [True, False]
+
+
+FAULTS = {
+    "no such key": (ACCEL + "typo = 1\n", ["signals.vertical_acceleration.typo", "unknown key"]),
+    "no such signal of ours": (ACCEL.replace("vertical_", "sideways_"), ["sideways_acceleration"]),
+    "no message": (ACCEL.replace("IMU", "IMV"), ["vertical_acceleration.message", "'IMV'", "did you mean 'IMU'"]),
+    "no signal": (ACCEL.replace("AccelZ", "AccelY"), ["'AccelY'", "did you mean 'AccelZ'"]),
+    "unit unknown": (ACCEL.replace("AccelZ", "Odd"), ["vertical_acceleration.unit", "'furlong'", "m/s^2"]),
+    "unit missing": (ACCEL.replace("AccelZ", "Status"), ["vertical_acceleration.unit", "no unit", "m/s^2"]),
+    "sign not one": (ACCEL + "sign = 2\n", ["vertical_acceleration.sign", "it says 2"]),
+    "latency negative": (ACCEL + "latency_s = -1.0\n", ["latency_s"]),
+    "condition of no signal": (ACCEL + "valid_when = { Statu = 1 }\n", ["valid_when", "did you mean 'Status'"]),
+    "condition never true": (ACCEL + "valid_when = { Status = 7 }\n", ["valid_when.Status", "never be 7"]),
+    "condition of no name": (ACCEL + 'valid_when = { Status = "redy" }\n', ["'redy'", "did you mean 'ready'"]),
+    "range turned round": (ACCEL + "minimum = 99.0\n", ["minimum 99", "maximum 30"]),
+    "beyond the message": ('[signals.speed]\nmessage = "SHORT"\nsignal = "TooFar"\n', ["byte 3", "has 2", "car.dbc"]),
+    "scale zero": ('[signals.speed]\nmessage = "SHORT"\nsignal = "Flat"\n', ["scale 0", "car.dbc"]),
+    "too wide": ('[signals.ignition]\nmessage = "WIDE"\nsignal = "Huge"\n', ["2^53"]),
+    "no signals": ("signals = {}\n", ["signals"]),
+    "broken TOML": ("[signals\n", ["not valid TOML", "line"]),
+    "same frames twice": (
+        "j1939 = true\n" + SPEED + '[signals.wheel_speed]\nmessage = "GROUP_AGAIN"\nsignal = "Speed"\n',
+        ["'GROUP'", "'GROUP_AGAIN'", "same frames"],
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_fault_names_its_place_and_the_way_out(fault, write_map):
+    text, expected = FAULTS[fault]
+    path = write_map(text)
+    with pytest.raises(SignalMapError) as raised:
+        load_signal_map(path)
+    assert str(path) in str(raised.value)
+    for piece in expected:
+        assert piece in str(raised.value)
+
+
+def test_a_missing_map_is_named(tmp_path):
+    with pytest.raises(SignalMapError, match=r"nowhere\.toml: no such file"):
+        load_signal_map(tmp_path / "nowhere.toml")
+
+
+def test_a_missing_database_is_named(write_map):
+    with pytest.raises(SignalMapError, match=r"signals\.toml: dbc: no such file: .*lorry\.dbc; paths are relative"):
+        load_signal_map(write_map(ACCEL, head='dbc = ["lorry.dbc"]\n'))
+
+
+def test_a_database_that_is_none_is_named(write_map, tmp_path):
+    (tmp_path / "photo.dbc").write_bytes(b"\xff\xd8\xff\xe0 no database")
+    with pytest.raises(SignalMapError, match=r"photo\.dbc cannot be read as a CAN database"):
+        load_signal_map(write_map(ACCEL, head='dbc = ["photo.dbc"]\n'))
+
+
+def test_a_message_in_two_databases_is_refused(write_map, tmp_path):
+    (tmp_path / "copy.dbc").write_text(DBC)
+    with pytest.raises(SignalMapError, match=r"'IMU' is in car\.dbc and in copy\.dbc"):
+        load_signal_map(write_map(ACCEL, head='dbc = ["car.dbc", "copy.dbc"]\n'))
+
+
+def test_a_kcd_database_serves_as_well(write_map, tmp_path):
+    (tmp_path / "car.kcd").write_text(
+        '<?xml version="1.0"?><NetworkDefinition xmlns="http://kayak.2codeornot2code.org/1.0">'
+        '<Document name="d"/><Bus name="b"><Message id="0x100" name="IMU" length="8">'
+        '<Signal name="AccelZ" offset="0" length="16"><Value type="signed" slope="0.01" unit="m/s^2"/></Signal>'
+        "</Message></Bus></NetworkDefinition>"
+    )
+    from_kcd = only_signal(load_signal_map(write_map(ACCEL, head='dbc = ["car.kcd"]\n')))
+    assert from_kcd.field == only_signal(load_signal_map(write_map(ACCEL))).field
+
+
+def test_shipped_maps_are_found_by_name():
+    assert "reference" in shipped_maps()
+    assert load_signal_map("springscale:reference").messages == load_signal_map(shipped_map("reference")).messages
+
+
+def test_an_unknown_shipped_map_names_those_there_are():
+    with pytest.raises(SignalMapError, match=r"springscale:referenz: no such map; there are .*reference"):
+        load_signal_map("springscale:referenz")
