@@ -149,6 +149,8 @@ def _messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.Messag
     try:
         with open_maybe_gzip(path) as stream, _binary_reader(path, suffix, stream) as reader:
             yield from reader
+            if _is_cut(path, reader):
+                report.ended_early = "the file is cut off: shorter than its header says"
     except NotImplementedError:
         raise LogUnreadableError(f'{path}: reading {suffix} needs asammdf: pip install "python-can[mf4]"') from None
     except LogUnreadableError:
@@ -161,6 +163,12 @@ def _messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.Messag
 
 def _binary_reader(path: Path, suffix: str, stream: BinaryIO) -> MessageReader:
     return can.SqliteReader(path) if suffix == ".db" else _BINARY_READERS[suffix](stream)
+
+
+def _is_cut(path: Path, reader: MessageReader) -> bool:
+    """Whether an (uncompressed) .blf is shorter than it says; python-can ends such a file without a word."""
+    is_plain = path.suffix.lower() == ".blf"
+    return is_plain and isinstance(reader, can.BLFReader) and path.stat().st_size < reader.file_size
 
 
 def _told(fault: Exception) -> str:

@@ -1,0 +1,247 @@
+"""One suite over every way in: the same frames as .log, .log.gz, .asc, .blf, .trc, .csv, .db or on a bus."""
+
+import gzip
+import importlib.util
+import itertools
+import os
+import sqlite3
+import time
+from contextlib import closing
+
+import can
+import numpy as np
+import pytest
+
+from gateway.bus.candump_write import write_candump
+from gateway.bus.decode import Decoder
+from gateway.bus.encode import Encoder
+from gateway.bus.frames import join, merge_frames
+from gateway.bus.logs import open_log
+from gateway.bus.messages import message_of
+from gateway.bus.signal_map import load_signal_map, shipped_map
+from gateway.bus.sink import BusSink, replay
+from gateway.bus.source import LiveSource
+from gateway.errors import LogUnreadableError
+from gateway.records import EXTENDED_ID, Frames, Motion, Signal
+
+START_NS = 1_760_146_908_000_000_000
+CHANNELS = itertools.count()
+TEXT_FORMATS = (".asc", ".csv", ".trc")
+WRITERS = {".asc": can.ASCWriter, ".blf": can.BLFWriter, ".trc": can.TRCWriter, ".csv": can.CSVWriter}
+
+
+@pytest.fixture(autouse=True)
+def utc(monkeypatch):
+    """.asc files tell local time: let it be UTC here."""
+    monkeypatch.setenv("TZ", "UTC")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()
+
+
+@pytest.fixture(scope="module")
+def signal_map():
+    return load_signal_map("springscale:reference")
+
+
+@pytest.fixture(scope="module")
+def drive(signal_map) -> Frames:
+    """Two seconds of our sensors with jitter to the millisecond, between frames of others."""
+    rng = np.random.default_rng(11)
+    imu_ns = START_NS + np.arange(200) * 10_000_000 + rng.integers(0, 3, 200) * 1_000_000
+    gps_ns = START_NS + 1_000_000 + np.arange(10) * 200_000_000
+    t_ns = {
+        Signal.VERTICAL_ACCELERATION: imu_ns,
+        Signal.LONGITUDINAL_ACCELERATION: imu_ns,
+        Signal.PITCH_RATE: imu_ns + 1_000_000,
+        Signal.SPEED: gps_ns,
+    }
+    samples = {
+        Signal.VERTICAL_ACCELERATION: 9.81 + rng.normal(0, 1, 200),
+        Signal.LONGITUDINAL_ACCELERATION: rng.normal(0, 1, 200),
+        Signal.PITCH_RATE: rng.normal(0, 0.05, 200),
+        Signal.SPEED: 14 + rng.normal(0, 0.1, 10),
+    }
+    ours = Encoder(signal_map).encode_signals(t_ns, samples)
+    n = 300
+    ids = rng.choice(np.array([0x7E8, 0x200, 0x18FEF100 | EXTENDED_ID], np.uint32), n)
+    others = Frames(
+        START_NS + np.sort(rng.integers(0, 2000, n)) * 1_000_000,
+        ids,
+        np.full(n, 8, np.uint8),
+        rng.integers(0, 256, (n, 8), np.uint8),
+    )
+    return merge_frames([ours, others])
+
+
+@pytest.fixture(scope="module")
+def truth(signal_map, drive) -> Motion:
+    return Decoder(signal_map).decode(drive)
+
+
+def write_log(frames, path):
+    suffix = "".join(path.suffixes)
+    if suffix in (".log", ".log.gz"):
+        write_candump(frames, "can0", path)
+        return
+    if suffix == ".db":
+        write_database(frames, path)
+        return
+    plain = path.with_suffix("") if path.suffix == ".gz" else path
+    with WRITERS[plain.suffix](plain) as writer:
+        for row in range(len(frames)):
+            message = message_of(frames, row)
+            message.channel = 0
+            message.timestamp = float(message.timestamp)
+            writer.on_message_received(message)
+    if plain != path:
+        path.write_bytes(gzip.compress(plain.read_bytes()))
+
+
+def write_database(frames, path):
+    """python-can's own layout; its writer loses what it holds beyond 500 messages when it is stopped."""
+    columns = "ts REAL, arbitration_id INTEGER, extended INTEGER, remote INTEGER, error INTEGER, dlc INTEGER, data BLOB"
+    messages = [message_of(frames, row) for row in range(len(frames))]
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute(f"CREATE TABLE messages ({columns})")
+        database.executemany(
+            "INSERT INTO messages VALUES (?, ?, ?, 0, 0, ?, ?)",
+            [(float(m.timestamp), m.arbitration_id, m.is_extended_id, m.dlc, bytes(m.data)) for m in messages],
+        )
+
+
+def read(path, signal_map):
+    chunks, report = open_log(path, signal_map)
+    return Decoder(signal_map).decode(join(list(chunks), 8)), report
+
+
+def assert_same(motion: Motion, truth: Motion, *, stamp_tolerance_ns: int = 0) -> None:
+    assert motion.signals == truth.signals
+    np.testing.assert_array_equal(motion.columns, truth.columns)
+    assert np.abs(motion.t_ns - truth.t_ns).max() <= stamp_tolerance_ns
+
+
+@pytest.mark.parametrize("suffix", [".log", ".log.gz", ".asc", ".asc.gz", ".blf", ".blf.gz", ".csv", ".csv.gz", ".db"])
+def test_every_log_format_gives_the_same_motion(suffix, tmp_path, drive, truth, signal_map):
+    path = tmp_path / f"drive{suffix}"
+    write_log(drive, path)
+    motion, report = read(path, signal_map)
+    assert_same(motion, truth)
+    assert (report.frames, report.wanted, report.n_rejected, report.ended_early) == (len(drive), len(truth), 0, None)
+
+
+def test_a_trc_log_gives_the_same_motion_up_to_its_start_time(tmp_path, drive, truth, signal_map):
+    path = tmp_path / "drive.trc"
+    write_log(drive, path)
+    motion, report = read(path, signal_map)
+    np.testing.assert_array_equal(np.diff(motion.t_ns), np.diff(truth.t_ns))
+    assert (report.frames, report.n_rejected) == (len(drive), 0)
+
+
+def test_an_in_process_bus_gives_the_same_motion_and_stamps(drive, truth, signal_map):
+    exact = Frames(drive.t_ns + 1, drive.can_id, drive.length, drive.payload)  # not even a nanosecond is lost
+    channel = f"contract-{next(CHANNELS)}"
+    source = LiveSource("virtual", channel, signal_map)
+    source.start()
+    with BusSink("virtual", channel) as sink:
+        sink.send(exact)
+    motion = collect(source, len(truth), signal_map)
+    assert_same(motion, Motion(truth.signals, truth.t_ns + 1, truth.columns))
+    assert source.counts().dropped_inbox == 0
+
+
+@pytest.mark.parametrize("suffix", [".log.gz", ".blf"])
+def test_a_replayed_log_gives_the_same_motion(suffix, tmp_path, drive, truth, signal_map):
+    path = tmp_path / f"drive{suffix}"
+    write_log(drive, path)
+    channel = f"contract-{next(CHANNELS)}"
+    source = LiveSource("virtual", channel, signal_map, inbox_frames=64)  # the sender waits: nothing is dropped
+    source.start()
+    report = replay(path, "virtual", channel, from_channel="can0", speed="max")
+    assert_same(collect(source, len(truth), signal_map), truth)
+    assert report.wanted == len(drive)
+
+
+def collect(source, n_rows, signal_map) -> Motion:
+    """Drain until the expected rows are there (or a generous time is up), then stop."""
+    decoder, parts, n = Decoder(signal_map), [], 0
+    deadline = time.monotonic() + 20.0
+    while n < n_rows and time.monotonic() < deadline:
+        frames = source.inbox.drain(0.2)
+        if frames is not None:
+            parts.append(decoder.decode(frames))
+            n += len(parts[-1])
+    source.stop()
+    return Motion(decoder.signals, np.concatenate([p.t_ns for p in parts]), np.concatenate([p.columns for p in parts]))
+
+
+@pytest.mark.parametrize("suffix", TEXT_FORMATS)
+def test_a_garbled_line_ends_no_text_log(suffix, tmp_path, drive, truth, signal_map):
+    path = tmp_path / f"drive{suffix}"
+    write_log(drive, path)
+    lines = path.read_bytes().splitlines(keepends=True)
+    middle = len(lines) // 2
+    garbled = lines[middle].replace(b"0", b"?").replace(b"1", b"\0")
+    path.write_bytes(b"".join([*lines[:middle], garbled, *lines[middle:]]))
+    motion, report = read(path, signal_map)
+    np.testing.assert_array_equal(motion.columns, truth.columns)
+    assert report.ended_early is None
+
+
+@pytest.mark.parametrize("suffix", TEXT_FORMATS)
+def test_a_text_log_cut_anywhere_still_reads(suffix, tmp_path, drive, signal_map):
+    path = tmp_path / f"drive{suffix}"
+    write_log(drive, path)
+    whole = path.read_bytes()
+    for share in (0.5, 0.77, 0.99):
+        path.write_bytes(whole[: int(share * len(whole))])
+        motion, _ = read(path, signal_map)
+        assert len(motion) > share * 380
+
+
+def test_a_cut_blf_gives_what_was_readable_and_says_so(tmp_path, drive, signal_map, monkeypatch):
+    monkeypatch.setattr(can.BLFWriter, "max_container_size", 4096)
+    path = tmp_path / "drive.blf"
+    write_log(drive, path)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    motion, report = read(path, signal_map)
+    assert 50 < len(motion) < 400
+    assert report.ended_early == "the file is cut off: shorter than its header says"
+
+
+def test_a_blf_that_is_none_is_refused(tmp_path, signal_map):
+    (tmp_path / "a.blf").write_bytes(b"no such thing" * 100)
+    with pytest.raises(LogUnreadableError, match=r"a\.blf: cannot be read as \.blf"):
+        read(tmp_path / "a.blf", signal_map)
+
+
+def test_an_unknown_kind_of_log_names_the_known(tmp_path, signal_map):
+    (tmp_path / "a.pcap").write_bytes(b"")
+    with pytest.raises(LogUnreadableError, match=r"'\.pcap'; known are \.log .*\.asc .*\.blf"):
+        open_log(tmp_path / "a.pcap", signal_map)
+
+
+def test_the_maps_channel_filters_numbered_channels_too(tmp_path, drive, truth):
+    (tmp_path / "s.toml").write_text(reference_with_channel("can1"))
+    path = tmp_path / "drive.blf"
+    write_log(drive, path)
+    _, report = read(path, load_signal_map(tmp_path / "s.toml"))
+    assert (report.wanted, report.other_channel) == (0, len(truth))
+    (tmp_path / "s.toml").write_text(reference_with_channel("can0"))
+    _, report = read(path, load_signal_map(tmp_path / "s.toml"))
+    assert (report.wanted, report.other_channel) == (len(truth), 0)
+
+
+def reference_with_channel(channel):
+    path = shipped_map("reference")
+    shown = os.fspath(path.with_name("springscale_reference.dbc"))
+    return f'channel = "{channel}"\n' + path.read_text().replace("springscale_reference.dbc", shown)
+
+
+def test_mf4_without_its_library_says_what_to_install(tmp_path, signal_map):
+    if importlib.util.find_spec("asammdf"):
+        pytest.skip("asammdf is installed here: .mf4 can be read")
+    (tmp_path / "a.mf4").write_bytes(b"MDF     4.10    ")
+    with pytest.raises(LogUnreadableError, match=r'pip install "python-can\[mf4\]"'):
+        read(tmp_path / "a.mf4", signal_map)

@@ -1,0 +1,95 @@
+"""Every shipped map loads and decodes a frame worked out by hand from the device's facts."""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from gateway.bus.decode import Decoder
+from gateway.bus.mapping import CLASSIC_BYTES
+from gateway.bus.signal_map import load_signal_map, shipped_map, shipped_maps
+from gateway.records import EXTENDED_ID, Frames, Signal
+
+RAD = math.pi / 180
+A, P, V, W, X = (
+    Signal.VERTICAL_ACCELERATION,
+    Signal.PITCH_RATE,
+    Signal.SPEED,
+    Signal.WHEEL_SPEED,
+    Signal.LONGITUDINAL_ACCELERATION,
+)
+
+
+def bits(*fields, length=8):
+    """Little-endian payload from (start bit, raw number)."""
+    return sum(raw << start for start, raw in fields).to_bytes(length, "little")
+
+
+J1939_FRAMES = [
+    # vertical raw 32981: 329.81 - 320 = 9.81; longitudinal raw 31950: -0.5; lateral not available
+    (0x0CF02D80 | EXTENDED_ID, struct.pack("<HHHH", 0xFFFF, 31950, 32981, 0xFFFF), {A: 9.81, X: -0.5}),
+    # bytes 3-4: 72 km/h x 256
+    (0x18FEE81C | EXTENDED_ID, bits((0, 0xFFFF), (16, 72 * 256), (32, 0xFFFFFFFF)), {V: 20.0}),
+    # bytes 2-3: 90 km/h x 256
+    (0x0CFEF100 | EXTENDED_ID, bits((0, 0xF3), (8, 90 * 256), (24, 0xFFFFFFFFFF)), {W: 25.0}),
+]
+# -250 deg/s + raw / 128: raw 32256 is 2 deg/s, raw 31360 is -5 deg/s
+J1939_RATES = (0x18F02A45 | EXTENDED_ID, struct.pack("<HHHH", 32256, 31360, 0xFFFF, 0xFFFF))
+
+FRAMES = {
+    "reference": [
+        (0x120, struct.pack("<hhhBB", -1500, 20, 9810, 7, 1), {A: 9.81, X: -1.5}),
+        (0x121, struct.pack("<hhhBB", 10, -400, 30, 7, 1), {P: -2.0 * RAD}),
+        (0x130, struct.pack("<HBB", 10_000, 12, 3), {V: 20.0}),
+    ],
+    "canmod_gps": [
+        # z: (9.75 + 64) / 0.125 = 590; y rate: (3.5 + 256) / 0.25 = 1038
+        (0x009, bits((0, 1), (1, 512), (11, 512), (21, 590), (31, 1024), (42, 1038)), {A: 9.75, P: 3.5 * RAD}),
+        (0x007, bits((0, 1), (1, 12_345), (21, 99), length=5), {V: 12.345}),
+    ],
+    "j1939": [*(f for f in J1939_FRAMES), (*J1939_RATES, {P: 2.0 * RAD})],
+    "j1939_aceinna": [(*J1939_RATES, {P: 5.0 * RAD})],
+    "pcan_gps": [
+        (0x600, struct.pack("<hhhh", 0, 0, 256, 0), {A: 256 * 3.91e-3 * 9.80665}),
+        (0x610, struct.pack("<ff", 1.0, -2.5), {P: -2.5 * RAD}),
+        (0x621, struct.pack("<ff", 123.0, 36.0), {V: 10.0}),
+    ],
+    "race_technology": [
+        (0x094A6C21 | EXTENDED_ID, struct.pack("<hhhh", 0, 0, 0, 1000), {A: 9.80665}),
+        (0x094A6D21 | EXTENDED_ID, struct.pack("<hhhh", 0, 0, -150, 0), {P: -1.5 * RAD}),
+        (0x09567C22 | EXTENDED_ID, bits((16, 250_000)), {V: 25.0}),
+    ],
+    "xsens_mti": [
+        (0x34, struct.pack(">hhh", 0, 0, 2511), {A: 2511 / 256}),
+        (0x32, struct.pack(">hhh", 0, -64, 0), {P: -0.125}),
+    ],
+}  # fmt: skip
+
+
+def test_every_shipped_map_has_a_frame_worked_out():
+    assert set(FRAMES) == set(shipped_maps())
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_hand_computed_frames(name):
+    signal_map = load_signal_map(f"springscale:{name}")
+    assert signal_map.payload_width == CLASSIC_BYTES
+    for can_id, payload, expected in FRAMES[name]:
+        frame = Frames(
+            np.zeros(1, np.int64),
+            np.array([can_id], np.uint32),
+            np.array([len(payload)], np.uint8),
+            np.frombuffer(payload.ljust(8, b"\0"), np.uint8).reshape(1, 8),
+        )
+        motion = Decoder(signal_map).decode(frame)
+        found = {s: x for s, x in zip(motion.signals, motion.columns[0], strict=True) if math.isfinite(x)}
+        wanted = {s: x for s, x in expected.items() if s in signal_map.signals}
+        assert found == pytest.approx(wanted), f"{name} {can_id:X}"
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_every_shipped_map_says_which_axes_and_whence_the_pitch_sign(name):
+    text = shipped_map(name).read_text()
+    assert "Axes of the device" in text or "# Axes" in text
+    assert "Pitch sign" in text
