@@ -96,7 +96,7 @@ def write_campaign(
 ) -> Path:
     """Write campaign.toml, signals.toml with its DBC, the logs and truth.csv; the path of campaign.toml.
 
-    The same bench writes the same bytes, however many processes work. Raises ConfigurationError where
+    The same bench writes the same frames, however many processes work. Raises ConfigurationError where
     the directory holds a campaign already.
     """
     campaign = directory / "campaign.toml"

@@ -1,0 +1,148 @@
+"""Simulated campaigns: complete, repeatable, and readable by the tools that read recorded ones."""
+
+import csv
+import filecmp
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.bus.source import LiveSource
+from gateway.calibration.campaign import load_campaign
+from gateway.core.settings import BatchSettings
+from gateway.errors import ConfigurationError
+from gateway.offline.known_runs import split_runs
+from gateway.offline.plans import PLANS, plan_of
+from gateway.offline.simulate import BETWEEN_DRIVES_S, bench_of, simulated_frames, stream, write_campaign
+from gateway.records import Why
+from gateway.sim.vans import PAPER_VAN, VANS
+from gateway.sim.vehicle import front_share_pct, payload_kg
+
+
+@pytest.mark.parametrize("vehicle", list(VANS))
+@pytest.mark.parametrize("kind", list(PLANS))
+def test_every_plan_suits_every_vehicle(kind: str, vehicle: str) -> None:
+    van = VANS[vehicle]
+    plan = plan_of(kind, van, seed=1)
+    for planned in plan.drives:
+        assert planned.carried[0].loads == planned.steps[0].loads
+        for carried in planned.carried:
+            assert 0.0 <= payload_kg(carried.loads) <= van.rated_payload_kg * 1.0001
+            assert all(-1e-9 <= load.position_m <= van.wheelbase_m + 1e-9 for load in carried.loads)
+            assert 0.0 <= carried.start_s < carried.end_s <= planned.drive.duration_s
+    assert len({planned.name for planned in plan.drives}) == len(plan.drives)
+
+
+@pytest.mark.parametrize("kind", ["test1", "test2", "test3"])
+def test_the_papers_tests_change_load_at_rest_and_run_at_50_kmh(kind: str) -> None:
+    (planned,) = plan_of(kind, PAPER_VAN, seed=2).drives
+    drive = planned.drive
+    for step in planned.steps[1:]:
+        assert drive.speed_mps[round(step.t_s / drive.step_s)] == 0.0
+    for carried in planned.carried:
+        moving = drive.part(carried.start_s, carried.end_s).speed_mps
+        assert np.mean(moving) == pytest.approx(50.0 / 3.6, rel=0.01)
+        assert np.min(moving) > 45.0 / 3.6
+        assert (carried.end_s - carried.start_s) % 300.0 < 15.0  # whole batches of five minutes
+
+
+def test_the_papers_loads_are_the_papers() -> None:
+    of_kind = {kind: plan_of(kind, PAPER_VAN, 1).drives for kind in ("test1", "test2", "experiment")}
+    masses = [payload_kg(c.loads) for c in of_kind["test1"][0].carried]
+    shares = [front_share_pct(PAPER_VAN, c.loads) for c in of_kind["test2"][0].carried]
+    placed = [[(load.mass_kg, load.position_m) for load in d.carried[0].loads] for d in of_kind["experiment"]]
+    assert masses == pytest.approx([0.0, 300.0])
+    assert shares == pytest.approx([40.0, 60.0])
+    assert placed[0] == []
+    assert [pair for (pair,) in placed[1:]] == [
+        (pytest.approx(mass_kg), pytest.approx(d)) for mass_kg in (120.0, 270.0, 420.0) for d in (0.5, 1.3, 2.8)
+    ]
+
+
+def test_the_seed_and_nothing_else_decides_the_frames(tmp_path: Path) -> None:
+    bench = bench_of("load-sweep", max_drive_s=4.0, n_unrelated=3)
+    one = write_campaign(bench, tmp_path / "one")
+    other = write_campaign(bench, tmp_path / "other", workers=2)
+    reseeded = write_campaign(bench_of("load-sweep", max_drive_s=4.0, n_unrelated=3, seed=2), tmp_path / "reseeded")
+    logs = sorted(path.relative_to(one.parent) for path in one.parent.rglob("can.log.gz"))
+    assert len(logs) == 10
+    for name in ("campaign.toml", "truth.csv", "signals.toml"):
+        assert filecmp.cmp(one.parent / name, other.parent / name, shallow=False)
+    for log in logs:
+        first, same, different = (gzip.decompress((path.parent / log).read_bytes()) for path in (one, other, reseeded))
+        assert first == same
+        assert first != different
+
+
+def test_a_simulated_campaign_reads_like_a_recorded_one(tmp_path: Path) -> None:
+    path = write_campaign(bench_of("test1", max_drive_s=150.0), tmp_path)
+    campaign = load_campaign(path)
+    settings = BatchSettings(window_s=20.0)
+    (run,) = split_runs(campaign, settings)
+    batches = run.validation.batches
+    assert campaign.vehicle.empty_mass_kg == 1240.0
+    assert run.identification.batches == ()
+    assert [batch.rejected for batch in batches] == [(), (), (Why.TOO_SHORT,)]
+    assert [batch.mean_speed_mps for batch in batches] == pytest.approx([50.0 / 3.6] * len(batches), abs=1.0)
+    assert [batch.gravity_mps2 for batch in batches] == pytest.approx([9.8] * len(batches), abs=0.5)
+
+
+def test_the_truth_lies_beside_the_logs(tmp_path: Path) -> None:
+    path = write_campaign(bench_of("share-sweep", max_drive_s=2.0), tmp_path)
+    with (tmp_path / "truth.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    campaign = load_campaign(path)
+    for row, run in zip(rows, campaign.runs, strict=True):
+        assert row["log"] == str(run.log)
+        assert float(row["payload_kg"]) == pytest.approx(run.payload_kg, abs=1e-3)
+        assert float(row["front_share_pct"]) == pytest.approx(campaign.front_share_pct(run), abs=1e-3)
+        unsprung = campaign.vehicle.unsprung_front_kg
+        sprung = campaign.vehicle.empty_mass_kg + run.payload_kg
+        assert float(row["front_axle_kg"]) == pytest.approx(
+            sprung * float(row["front_share_pct"]) / 100.0 + unsprung, abs=0.1
+        )
+
+
+def test_a_campaign_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "campaign.toml").write_text("mine")
+    with pytest.raises(ConfigurationError, match="there is a campaign already"):
+        write_campaign(bench_of("ident"), tmp_path)
+    assert (tmp_path / "campaign.toml").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("names", "complaint"),
+    [
+        ({"kind": "tset1"}, "no campaign 'tset1': choose ident, "),
+        ({"kind": "ident", "vehicle": "lorry"}, "no vehicle 'lorry': choose paper_van, small_van, large_van"),
+        ({"kind": "ident", "map_name": "pcan_gps"}, "no signal map to send by 'pcan_gps': choose reference, "),
+        ({"kind": "ident", "max_drive_s": 0.0}, "positive duration"),
+    ],
+)
+def test_a_name_that_is_not_there_is_refused_with_those_that_are(names: dict[str, str], complaint: str) -> None:
+    with pytest.raises(ConfigurationError, match=complaint):
+        bench_of(**names)
+
+
+def test_drives_follow_one_another_with_the_vehicle_parked_between() -> None:
+    first, second, *_ = simulated_frames(bench_of("speeds", max_drive_s=3.0))
+    parked_s = (second.t_ns[0] - first.t_ns[-1]) / 1e9
+    assert parked_s == pytest.approx(BETWEEN_DRIVES_S, abs=0.2)
+
+
+def test_a_stream_reaches_a_listener_frame_by_frame() -> None:
+    from gateway.bus.signal_map import load_signal_map
+
+    bench = bench_of("test1", max_drive_s=3.0)
+    source = LiveSource("virtual", "simulate-stream", load_signal_map("springscale:reference"))
+    source.start()
+    n_sent = stream(bench, "virtual", "simulate-stream", speed="max")
+    received = []
+    while (frames := source.inbox.drain(0.5)) is not None:
+        received.append(frames)
+    source.stop()
+    sent = next(simulated_frames(bench))
+    assert n_sent == len(sent)
+    assert np.array_equal(np.concatenate([frames.t_ns for frames in received]), sent.t_ns)
+    assert np.array_equal(np.concatenate([frames.payload for frames in received]), sent.payload)

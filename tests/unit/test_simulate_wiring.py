@@ -1,0 +1,96 @@
+"""A recording goes onto the bus and comes back as it was, to half a step of the DBC."""
+
+import cantools.database
+import numpy as np
+import pytest
+
+from gateway.bus.candump_write import write_candump
+from gateway.bus.decode import Decoder
+from gateway.bus.logs import motion_of_log
+from gateway.bus.signal_map import load_signal_map, shipped_map
+from gateway.errors import ConfigurationError
+from gateway.offline.wiring import WIRED_MAPS, Wiring, unrelated_traffic
+from gateway.records import EXTENDED_ID, Motion, Signal
+from gateway.sim.drive import constant
+from gateway.sim.road import PaperRoad
+from gateway.sim.scenario import simulate_drive
+from gateway.sim.sensors import Clock, Gps, Imu, Recording, Sensors
+from gateway.sim.vans import PAPER_VAN
+from gateway.sim.vehicle import Load
+
+SENSORS = Sensors(
+    imu=Imu(corner_hz=40.0),
+    gps=Gps(5.0, latency_s=0.2, noise_std_mps=0.05, dropouts_per_hour=200.0),
+    clock=Clock(jitter_mean_s=1e-4, lost_share=0.01),
+)
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    drive = constant(14.0, 60.0, np.random.default_rng(1))
+    return simulate_drive(PAPER_VAN, (Load(200.0, 2.0),), PaperRoad(), drive, SENSORS, 3).recording
+
+
+@pytest.mark.parametrize("name", WIRED_MAPS)
+def test_what_goes_onto_the_bus_comes_back(name: str, recording: Recording) -> None:
+    signal_map = load_signal_map(f"springscale:{name}")
+    motion = Decoder(signal_map).decode(Wiring(name).frames_of(recording))
+    wanted = {
+        Signal.VERTICAL_ACCELERATION: (recording.imu_t_ns, recording.accel_mps2[:, 2]),
+        Signal.PITCH_RATE: (recording.imu_t_ns, recording.gyro_radps[:, 1]),
+        Signal.SPEED: (recording.gps_t_ns[recording.gps_fix], recording.gps_speed_mps[recording.gps_fix]),
+    }
+    assert 0.5 < np.mean(recording.gps_fix) < 1.0
+    for signal, (t_ns, samples) in wanted.items():
+        decoded_t_ns, decoded = motion.of(signal)
+        assert len(decoded) == len(samples)
+        assert np.max(np.abs(decoded - samples)) <= 0.5001 * signal_map.traits[signal].resolution
+        assert np.all((decoded_t_ns - t_ns >= -1000) & (decoded_t_ns - t_ns < 1_000_000))
+
+
+@pytest.mark.parametrize("name", WIRED_MAPS)
+def test_a_candump_log_loses_nothing_on_the_way(name: str, recording: Recording, tmp_path) -> None:
+    signal_map = load_signal_map(f"springscale:{name}")
+    frames = Wiring(name).frames_of(recording)
+    write_candump(frames, "can0", tmp_path / "can.log.gz")
+    chunks, report, _ = motion_of_log(tmp_path / "can.log.gz", signal_map)
+    parts = list(chunks)
+    read = Motion(
+        parts[0].signals, *(np.concatenate(c) for c in zip(*((p.t_ns, p.columns) for p in parts), strict=True))
+    )
+    direct = Decoder(signal_map).decode(frames)
+    assert report.wanted == len(frames)
+    assert np.array_equal(read.t_ns, direct.t_ns)
+    assert np.array_equal(read.columns, direct.columns, equal_nan=True)
+
+
+def test_cantools_reads_every_axis_as_it_was_recorded(recording: Recording) -> None:
+    frames = Wiring("reference").frames_of(recording)
+    database = cantools.database.load_file(shipped_map("reference").parent / "springscale_reference.dbc")
+    gyro = [row for row in range(len(frames)) if frames.can_id[row] == 289][:50]
+    decoded = [database.decode_message(289, frames.payload[row].tobytes()) for row in gyro]
+    names = ("RollRate", "PitchRate", "YawRate")
+    read = np.array([[message[name] for name in names] for message in decoded])
+    assert read == pytest.approx(np.rad2deg(recording.gyro_radps[:50]), abs=0.00251)
+    assert [message["GyroCounter"] for message in decoded] == list(range(50))
+
+
+def test_frames_leave_in_order_of_time(recording: Recording) -> None:
+    frames = Wiring("reference").frames_of(recording)
+    assert np.all(np.diff(frames.t_ns) >= 0)
+    assert not np.any(frames.t_ns % 1000)
+
+
+def test_unrelated_traffic_shares_no_identifier_with_the_sensors() -> None:
+    frames = unrelated_traffic(0, 10.0, 60, np.random.default_rng(1))
+    assert len(np.unique(frames.can_id)) == 60
+    assert np.count_nonzero(np.unique(frames.can_id) & EXTENDED_ID) == 12
+    assert np.all(np.diff(frames.t_ns) >= 0)
+    for name in WIRED_MAPS:
+        for id_filter in load_signal_map(f"springscale:{name}").filters:
+            assert not id_filter.matches(frames.can_id).any()
+
+
+def test_a_map_without_simulated_sensors_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match="choose reference, canmod_gps, j1939"):
+        Wiring("xsens_mti")
