@@ -26,13 +26,14 @@ HeldEstimates = Callable[[], tuple[str, tuple[EstimateRow, ...]]]
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A piece of the history: JSON texts in order.
+    """A piece of the history: JSON texts in order, the cursor of each beside it.
 
     ``next_cursor`` asks for more, None where there is no more now; ``last_cursor`` is the newest row
     of this page: the place to go on from when more arrives (None while there is nothing at all).
     """
 
     items: tuple[str, ...]
+    cursors: tuple[str, ...]
     next_cursor: str | None
     last_cursor: str | None
 
@@ -124,10 +125,13 @@ class StoreReader:
         rows |= {row.seq: row.text if with_spectra else _without_spectra(row.text) for row in fresh}
         seqs = sorted(rows, reverse=newest_first)
         shown = seqs[:limit]
+        cursors = tuple(f"{epoch}-{seq}" for seq in shown)
+        newest = 0 if newest_first else -1
         return Page(
             items=tuple(rows[seq] for seq in shown),
-            next_cursor=f"{epoch}-{shown[-1]}" if len(seqs) > limit else None,
-            last_cursor=f"{epoch}-{max(shown)}" if shown else cursor,
+            cursors=cursors,
+            next_cursor=cursors[-1] if len(seqs) > limit else None,
+            last_cursor=cursors[newest] if shown else cursor,
         )
 
     def latest(self) -> Latest:

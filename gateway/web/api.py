@@ -1,0 +1,104 @@
+"""/api/v1: the latest estimate, the history, the stream, the status."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Annotated, Final, Literal
+
+from fastapi import APIRouter, Header, Query, Request
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+
+from gateway.records import json_line
+from gateway.web.board import Board
+from gateway.web.instant import Instant
+from gateway.web.latest import LatestResponse
+from gateway.web.reader import Page, Reader
+from gateway.web.schemas import EstimatesPage, Latest, problem_responses
+from gateway.web.settings import PAGE_LIMIT, WebSettings
+from gateway.web.status import Status
+from gateway.web.stream import EventStream
+
+PREFIX: Final = "/api/v1"
+JSON: Final = "application/json"
+Cursor = Annotated[str, Field(max_length=64, examples=["3f2a9c1e-1048577"])]
+
+
+class EstimatesQuery(BaseModel):
+    """Which part of the history."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    since: Instant | None = Field(None, description="batches that end at or after this")
+    until: Instant | None = Field(None, description="batches that end before this")
+    limit: int = Field(100, ge=1, le=PAGE_LIMIT)
+    cursor: Cursor | None = Field(None, description="next_cursor or last_cursor of an earlier answer")
+    order: Literal["oldest_first", "newest_first"] = "oldest_first"
+    spectra: bool = Field(True, description="false leaves the spectra out")
+
+
+def api_router(board: Board, reader: Reader, status: Callable[[], Status], settings: WebSettings) -> APIRouter:
+    """The routes under /api/v1."""
+    router = APIRouter(prefix=PREFIX, tags=["api"])
+
+    @router.get(
+        "/estimates/latest", response_model=Latest, responses={304: {"description": "nothing but the age is new"}}
+    )
+    async def latest(request: Request) -> Response:
+        """The last good estimate and how old it is. Its ETag changes with all but the age."""
+        return LatestResponse(board, request.scope)
+
+    @router.get("/estimates", response_model=EstimatesPage, responses=problem_responses(422, 503))
+    async def estimates(query: Annotated[EstimatesQuery, Query()]) -> Response:
+        """Estimates and rejections in the order they were made. Follow next_cursor: nothing is missed or repeated."""
+        page = await _asked(
+            "query.cursor",
+            reader,
+            since_ns=query.since,
+            until_ns=query.until,
+            limit=query.limit,
+            cursor=query.cursor,
+            newest_first=query.order == "newest_first",
+            with_spectra=query.spectra,
+        )
+        return Response(_page_json(page), media_type=JSON)
+
+    @router.get("/status", response_model=Status)
+    async def status_now() -> Status:
+        """What the service is doing, in words and in numbers."""
+        return status()
+
+    @router.get(
+        "/stream",
+        response_class=Response,
+        responses={
+            200: {"content": {EventStream.media_type: {"schema": {"type": "string"}}}},
+            **problem_responses(422, 503),
+        },
+    )
+    async def stream(last_event_id: Annotated[Cursor | None, Header()] = None) -> Response:
+        """Server-sent events: estimate, rejection, provisional; data is the estimate object.
+
+        With Last-Event-ID, what was missed comes first.
+        """
+        if board.fanout.n_subscribers >= settings.n_streams_max:
+            raise HTTPException(503, f"{settings.n_streams_max} streams are open already: close one")
+        if last_event_id is not None:
+            await _asked("header.last-event-id", reader, cursor=last_event_id, limit=1)
+        return EventStream(board.fanout, reader, last_event_id, settings.keep_alive_s)
+
+    return router
+
+
+async def _asked(where: str, reader: Reader, **question: object) -> Page:
+    """An answer from the store; a cursor that is none is the client's fault, and ``where`` says which."""
+    try:
+        return await asyncio.to_thread(reader.estimates, **question)  # type: ignore[arg-type]  # checked by its callers
+    except ValueError as error:
+        raise RequestValidationError([{"loc": tuple(where.split(".")), "msg": str(error)}]) from None
+
+
+def _page_json(page: Page) -> bytes:
+    tail = json_line({"next_cursor": page.next_cursor, "last_cursor": page.last_cursor})[1:]
+    return f'{{"items":[{",".join(page.items)}],{tail}'.encode()

@@ -1,0 +1,87 @@
+"""The web application: one function that puts the parts together."""
+
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any, Final
+
+from fastapi import FastAPI
+from starlette.types import ASGIApp
+
+from gateway.web import pages, problems
+from gateway.web.api import api_router
+from gateway.web.board import Board
+from gateway.web.headers import SecurityHeaders
+from gateway.web.health import health_router
+from gateway.web.latest import LatestFirst
+from gateway.web.metrics import metrics_registry
+from gateway.web.reader import Reader
+from gateway.web.settings import WebSettings
+from gateway.web.status import Status
+
+API_VERSION: Final = "1.0.0"
+_DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
+
+Units stand at the end of each name. Unknown is null. Errors are problem details (RFC 9457)."""
+
+
+def create_app(
+    board: Board, reader: Reader, status: Callable[[], Status], settings: WebSettings | None = None
+) -> FastAPI:
+    """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
+    service is (``status``, called in the event loop: quick and thread-safe).
+
+    Call ``board.close()`` before the server stops: it ends the streams.
+    """
+    chosen = settings or WebSettings()
+    responses: Counter[int] = Counter()
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        yield
+        board.close()
+
+    app = _Application(
+        wrap=lambda inner: SecurityHeaders(LatestFirst(inner, board), responses),
+        title="Springscale",
+        version=API_VERSION,
+        description=_DESCRIPTION,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+    )
+    problems.install(app)
+    app.include_router(api_router(board, reader, status, chosen))
+    app.include_router(health_router(status, metrics_registry(board, status, responses)))
+    pages.install(app)
+    _describe_problems(app)
+    return app
+
+
+class _Application(FastAPI):
+    """FastAPI with layers around all of its own, so that they see every answer, an unforeseen error's too."""
+
+    def __init__(self, *, wrap: Callable[[ASGIApp], ASGIApp], **settings: Any) -> None:
+        self._wrap = wrap
+        super().__init__(**settings)
+
+    def build_middleware_stack(self) -> ASGIApp:
+        return self._wrap(super().build_middleware_stack())
+
+
+def _describe_problems(app: FastAPI) -> None:
+    """Let the description say that problems come as application/problem+json."""
+    describe = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        schema = describe()
+        for operations in schema["paths"].values():
+            for operation in operations.values():
+                for code, response in operation["responses"].items():
+                    content = response.get("content", {})
+                    if int(code) >= 400 and "application/json" in content:
+                        content[problems.MEDIA_TYPE] = content.pop("application/json")
+        return schema
+
+    app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's documented way to extend the description

@@ -1,0 +1,70 @@
+"""Every error leaves as problem details (RFC 9457): what is wrong, where, and how to mend it."""
+
+import http
+from collections.abc import Mapping, Sequence
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, Response
+
+from gateway.errors import StoreError
+from gateway.web.schemas import Fault, Problem
+
+MEDIA_TYPE = "application/problem+json"
+
+
+def problem_response(
+    status: int,
+    detail: str,
+    instance: str,
+    errors: Sequence[Fault] | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    """A problem as it goes over the wire."""
+    problem = Problem(
+        title=http.HTTPStatus(status).phrase,
+        status=status,
+        detail=detail,
+        instance=instance,
+        errors=None if errors is None else list(errors),
+    )
+    return JSONResponse(problem.model_dump(exclude_none=True), status, headers=headers, media_type=MEDIA_TYPE)
+
+
+def install(app: FastAPI) -> None:
+    """Answer all that goes wrong in ``app`` with problem details."""
+    app.add_exception_handler(HTTPException, _http)
+    app.add_exception_handler(RequestValidationError, _invalid)
+    app.add_exception_handler(StoreError, _unavailable)
+    app.add_exception_handler(TimeoutError, _unavailable)
+    app.add_exception_handler(Exception, _unforeseen)
+
+
+async def _http(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    detail = error.detail
+    if error.status_code == 404 and detail == http.HTTPStatus.NOT_FOUND.phrase:
+        detail = "there is nothing at this address: /openapi.json lists what there is"
+    elif error.status_code == 405:
+        detail = f"{request.method} is not possible here"
+    return problem_response(error.status_code, detail, request.url.path, headers=error.headers)
+
+
+async def _invalid(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    faults = [Fault(where=".".join(map(str, e["loc"])), what=_said(e["msg"])) for e in error.errors()]
+    detail = "; ".join(f"{fault.where}: {fault.what}" for fault in faults)
+    return problem_response(422, detail, request.url.path, faults)
+
+
+async def _unavailable(request: Request, error: Exception) -> Response:
+    return problem_response(503, str(error), request.url.path)
+
+
+async def _unforeseen(request: Request, _error: Exception) -> Response:
+    return problem_response(500, "the service met an error it did not expect; its log has it", request.url.path)
+
+
+def _said(message: str) -> str:
+    return message.removeprefix("Value error, ")

@@ -1,0 +1,35 @@
+"""What the web needs of a store, whatever keeps it."""
+
+from typing import Protocol
+
+
+class Page(Protocol):
+    """A piece of the history; items are JSON texts, ``cursors`` stand beside them."""
+
+    @property
+    def items(self) -> tuple[str, ...]: ...
+    @property
+    def cursors(self) -> tuple[str, ...]: ...
+    @property
+    def next_cursor(self) -> str | None: ...
+    @property
+    def last_cursor(self) -> str | None: ...
+
+
+class Reader(Protocol):
+    """Blocking questions, each from a thread of its own.
+
+    Raises ValueError for a cursor that is none, TimeoutError for a question that takes too long,
+    StoreError for a store that cannot be read.
+    """
+
+    def estimates(
+        self,
+        *,
+        since_ns: int | None = None,
+        until_ns: int | None = None,
+        limit: int = 100,
+        cursor: str | None = None,
+        newest_first: bool = False,
+        with_spectra: bool = True,
+    ) -> Page: ...

@@ -1,0 +1,14 @@
+"""What can be set about the web, apart from the address it listens on."""
+
+from dataclasses import dataclass
+from typing import Final
+
+PAGE_LIMIT: Final = 1000  # records in one answer; part of the described API, therefore no setting
+
+
+@dataclass(frozen=True, slots=True)
+class WebSettings:
+    """keep_alive_s between comments on a quiet stream; n_streams_max streams at a time, then 503."""
+
+    keep_alive_s: float = 15.0
+    n_streams_max: int = 100

@@ -1,0 +1,123 @@
+"""What the service tells of itself, in types and in words."""
+
+from enum import StrEnum
+from typing import Final
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class State(StrEnum):
+    """What the service is doing."""
+
+    STARTING = "starting"
+    WAITING_FOR_BUS = "waiting_for_bus"
+    WAITING_FOR_SPEED = "waiting_for_speed"
+    COLLECTING = "collecting"
+    ESTIMATING = "estimating"
+    STALE = "stale"
+    READER_FAULT = "reader_fault"
+
+
+SENTENCES: Final[dict[State, str]] = {
+    State.STARTING: "Starting.",
+    State.WAITING_FOR_BUS: "The bus is silent: the vehicle is asleep or the channel is not connected.",
+    State.WAITING_FOR_SPEED: "Sensors are heard; waiting for the vehicle to drive fast enough.",
+    State.COLLECTING: "Driving; collecting the first batch.",
+    State.ESTIMATING: "Driving; the estimate is kept up to date.",
+    State.STALE: "No new estimate for a while: the shown one is old.",
+    State.READER_FAULT: "The bus cannot be read: see the last fault.",
+}
+
+
+class _Told(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", from_attributes=True)
+
+
+class BusStatus(_Told):
+    """The CAN interface and what came through it since the start."""
+
+    interface: str = ""
+    channel: str = ""
+    state: str = Field("unknown", examples=["connected", "bus_silent", "reader_fault"])
+    n_frames: int = Field(0, description="data frames received")
+    n_error_frames: int = 0
+    n_reconnects: int = 0
+    n_inbox_dropped: int = Field(0, description="frames the pipeline did not take in time")
+    n_kernel_dropped: int | None = Field(None, description="frames the kernel dropped; null where it does not tell")
+    last_frame_age_s: float | None = None
+    last_fault: str | None = None
+
+
+class DecodeCount(_Told):
+    """How often frames of one signal ended one way; reason ``ok`` counts the samples."""
+
+    signal: str
+    reason: str
+    n: int
+
+
+class SignalHealth(_Told):
+    """How one mapped signal has been doing lately; null is unknown."""
+
+    signal: str = Field(examples=["vertical_acceleration"])
+    rate_hz: float | None = None
+    last_age_s: float | None = None
+    rejected_share: float | None = Field(None, description="share of its frames that gave no sample")
+
+
+class BatchCounts(_Told):
+    """What became of the batches since the start."""
+
+    n_estimates: int = 0
+    n_rejected: int = 0
+    n_provisional: int = 0
+    rejected_by_reason: dict[str, int] = Field(default_factory=dict)
+
+
+class StoreStatus(_Told):
+    """Whether estimates reach the disk. Degraded: they are kept in memory, and ``reason`` says why."""
+
+    state: str = Field("ok", examples=["ok", "degraded"])
+    reason: str | None = None
+    n_written: int = 0
+    n_held: int = Field(0, description="rows that wait in memory")
+    n_dropped: int = Field(0, description="rows that had to give way in memory")
+    n_duplicates: int = 0
+    n_pruned: int = Field(0, description="rows removed by age or size")
+    size_bytes: int = 0
+    set_aside: str | None = Field(None, description="damaged database that was renamed out of the way")
+
+
+class Status(_Told):
+    """The service as it is now; counts begin at its start."""
+
+    version: str
+    state: State
+    uptime_s: float
+    state_in_words: str = Field("", description="the state as a sentence; filled in where left empty")
+    vehicle_id: str | None = None
+    vin: str | None = None
+    calibration_id: str | None = None
+    estimator: str | None = None
+    bus: BusStatus = BusStatus()
+    decode: tuple[DecodeCount, ...] = ()
+    signals: tuple[SignalHealth, ...] = ()
+    batches: BatchCounts = BatchCounts()
+    store: StoreStatus = StoreStatus()
+    is_ready: bool = Field(True, description="whether estimates can come: what /health/ready tells")
+    not_ready_reason: str | None = None
+
+    def model_post_init(self, _context: object) -> None:
+        if not self.state_in_words:
+            object.__setattr__(self, "state_in_words", self.sentence())
+
+    def sentence(self) -> str:
+        """The state in words, with what is wrong beside it."""
+        said = [SENTENCES[self.state]]
+        if self.state is State.READER_FAULT and self.bus.last_fault:
+            said.append(f"Last fault: {self.bus.last_fault}.")
+        if self.calibration_id is None:
+            said.append("No calibration: spectra only, no payload.")
+        if self.store.state != "ok":
+            said.append(f"Estimates are kept in memory only ({self.store.reason}).")
+        return " ".join(said)

@@ -1,0 +1,241 @@
+"""The routes as the contract has them, asked through the real application over a real store."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+from support.estimates import make_record, texts
+from support.web import Client, Gateway
+
+from gateway.records import Why
+from gateway.web import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
+
+
+@pytest.fixture
+def gateway(tmp_path: Path) -> Iterator[Gateway]:
+    with Gateway(tmp_path) as opened:
+        yield opened
+
+
+@pytest.fixture
+def client(gateway: Gateway) -> Client:
+    return Client(gateway.app)
+
+
+def test_latest_before_any_estimate(client: Client) -> None:
+    answer = client.get("/api/v1/estimates/latest")
+    assert answer.status_code == 200
+    assert answer.headers["content-type"] == "application/json"
+    assert answer.json()["rejected"] == ["no_estimate_yet"]
+    assert answer.json()["payload_kg"] is None
+
+
+def test_latest_is_the_estimate_with_its_age(gateway: Gateway, client: Client) -> None:
+    gateway.publish(make_record(5, with_spectra=True))
+    gateway.clock_s += 7.0
+    expected = make_record(5, with_spectra=True) | {"age_s": 7.0, "is_stale": False, "last_rejection": None}
+    assert client.get("/api/v1/estimates/latest").json() == expected
+
+
+def test_latest_is_not_sent_twice_to_who_has_it(gateway: Gateway, client: Client) -> None:
+    gateway.publish(make_record(5))
+    etag = client.get("/api/v1/estimates/latest").headers["etag"]
+    for named in (etag, f'"other", {etag}', etag.removeprefix("W/"), "*"):
+        again = client.get("/api/v1/estimates/latest", headers={"if-none-match": named})
+        assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", etag)
+    gateway.publish(make_record(6))
+    assert client.get("/api/v1/estimates/latest", headers={"if-none-match": etag}).status_code == 200
+
+
+def test_the_history_is_the_stored_text_page_by_page(gateway: Gateway, client: Client) -> None:
+    records = [make_record(n, *([Why.GAP] if n % 2 else [])) for n in range(5)]
+    gateway.publish(*records)
+    first = client.get("/api/v1/estimates", params={"limit": 3})
+    assert first.text.startswith('{"items":[' + ",".join(texts(*records[:3])) + '],"next_cursor":"')
+    second = client.get("/api/v1/estimates", params={"limit": 3, "cursor": first.json()["next_cursor"]}).json()
+    assert second["items"] == records[3:]
+    assert second["next_cursor"] is None
+    gateway.publish(make_record(9))
+    tail = client.get("/api/v1/estimates", params={"cursor": second["last_cursor"]}).json()
+    assert tail["items"] == [make_record(9)]
+
+
+def test_the_history_can_be_asked_newest_first_and_without_spectra(gateway: Gateway, client: Client) -> None:
+    gateway.publish(make_record(0, with_spectra=True), make_record(1, with_spectra=True))
+    answer = client.get("/api/v1/estimates", params={"order": "newest_first", "spectra": "false"}).json()
+    assert answer["items"] == [make_record(1), make_record(0)]
+
+
+def test_the_history_can_be_cut_by_time(gateway: Gateway, client: Client) -> None:
+    gateway.publish(*(make_record(n) for n in range(4)))  # they end at 00:05, 00:10, 00:15, 00:20
+    span = {"since": "1970-01-01T01:10:00+01:00", "until": "1970-01-01T00:20:00Z"}
+    assert client.get("/api/v1/estimates", params=span).json()["items"] == [make_record(1), make_record(2)]
+    ages = {"since": "0001-01-01T00:00:00Z", "until": "9999-12-31T23:59:59Z"}
+    assert len(client.get("/api/v1/estimates", params=ages).json()["items"]) == 4
+
+
+@pytest.mark.parametrize(
+    ("query", "where"),
+    [
+        ("limit=0", "query.limit"),
+        ("limit=1001", "query.limit"),
+        ("limit=many", "query.limit"),
+        ("since=yesterday", "query.since"),
+        ("until=2026-11-21", "query.until"),
+        ("cursor=nonsense", "query.cursor"),
+        ("cursor=" + "a" * 65, "query.cursor"),
+        ("order=sideways", "query.order"),
+        ("sinc=2026-11-21T00:00:00Z", "query.sinc"),
+    ],
+)
+def test_a_question_that_cannot_be_answered_is_a_problem_that_says_where(
+    client: Client, query: str, where: str
+) -> None:
+    answer = client.get(f"/api/v1/estimates?{query}")
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert [fault["where"] for fault in answer.json()["errors"]] == [where]
+    assert where in answer.json()["detail"]
+
+
+def test_what_is_not_there_is_a_problem(client: Client) -> None:
+    for path in ("/api/v1/nothing", "/pages/nothing.js", "/pages/../app.py", "/swagger/%2e%2e/core.py", "/health"):
+        answer = client.get(path)
+        assert answer.status_code == 404, path
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert answer.json()["status"] == 404
+    answer = client.request("DELETE", "/api/v1/status")
+    assert (answer.status_code, answer.headers["allow"]) == (405, "GET")
+    assert answer.json()["title"] == "Method Not Allowed"
+
+
+def test_an_unforeseen_error_is_a_problem_without_its_inside(gateway: Gateway, client: Client) -> None:
+    del gateway.status
+    answer = client.get("/api/v1/status")
+    assert answer.status_code == 500
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert "AttributeError" not in answer.text
+    assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_a_store_that_cannot_be_read_is_503(gateway: Gateway, client: Client, tmp_path: Path) -> None:
+    gateway.publish(make_record(0))
+    assert gateway.store.flush(10.0)
+    gateway.store.close()
+    (tmp_path / "springscale.db").write_bytes(b"no database at all" * 1000)
+    answer = client.get("/api/v1/estimates")
+    assert answer.status_code == 503
+    assert "cannot be read" in answer.json()["detail"]
+
+
+def test_status_is_told_in_words_and_numbers(gateway: Gateway, client: Client) -> None:
+    gateway.status = Status(
+        version="1.2.3",
+        state=State.READER_FAULT,
+        uptime_s=1.0,
+        calibration_id="sha256:ab",
+        bus=BusStatus(interface="socketcan", channel="can0", state="reader_fault", last_fault="can0: no such device"),
+        store=StoreStatus(state="degraded", reason="disk full", n_held=3),
+    )
+    told = client.get("/api/v1/status").json()
+    assert told["state"] == "reader_fault"
+    assert "can0: no such device" in told["state_in_words"]
+    assert "disk full" in told["state_in_words"]
+    assert told["store"]["n_held"] == 3
+
+
+@pytest.mark.parametrize("state", State)
+def test_every_state_has_its_words(state: State) -> None:
+    assert Status(version="1", state=state, uptime_s=0.0).sentence().endswith(".")
+
+
+def test_ready_follows_the_service(gateway: Gateway, client: Client) -> None:
+    assert client.get("/health/ready").json() == {"is_ready": True, "state": "collecting"}
+    gateway.status = gateway.status.model_copy(update={"is_ready": False, "not_ready_reason": "the bus is silent"})
+    answer = client.get("/health/ready")
+    assert (answer.status_code, answer.json()["detail"]) == (503, "the bus is silent")
+    assert client.get("/health/live").json() == {"is_alive": True}
+
+
+def test_metrics_can_be_parsed_and_follow_the_status(gateway: Gateway, client: Client) -> None:
+    gateway.publish(make_record(20))
+    gateway.status = Status(
+        version="1.2.3",
+        state=State.ESTIMATING,
+        uptime_s=60.0,
+        bus=BusStatus(n_frames=1234, n_inbox_dropped=5, n_kernel_dropped=6),
+        decode=(DecodeCount(signal="speed", reason="not_valid", n=7),),
+        signals=(SignalHealth(signal="speed", rate_hz=5.0),),
+        batches=BatchCounts(n_estimates=1, n_rejected=2, rejected_by_reason={"gap": 2}),
+    )
+    answer = client.get("/metrics")
+    assert answer.headers["content-type"].startswith("text/plain")
+    families = list(text_string_to_metric_families(answer.text))
+    samples = {(s.name, *sorted(s.labels.values())): s.value for family in families for s in family.samples}
+    assert all(family.name.startswith("springscale_") and family.documentation for family in families)
+    assert samples["springscale_payload_kilograms",] == 120.0
+    assert samples["springscale_front_share_ratio",] == pytest.approx(0.505)
+    assert samples["springscale_bus_frames_total",] == 1234
+    assert samples["springscale_bus_dropped_frames_total", "kernel"] == 6
+    assert samples["springscale_decoded_frames_total", "not_valid", "speed"] == 7
+    assert samples["springscale_rejections_total", "gap"] == 2
+    assert samples["springscale_state", "estimating"] == 1
+    assert samples["springscale_state", "stale"] == 0
+
+
+def test_no_metric_is_invented_for_what_is_unknown(client: Client) -> None:
+    text = client.get("/metrics").text
+    for name in ("payload_kilograms", "estimate_age_seconds", "bus_last_frame_age_seconds"):
+        assert f"springscale_{name}" not in text
+
+
+def test_the_pages_load_nothing_from_elsewhere(client: Client) -> None:
+    for page in ("/", "/docs"):
+        answer = client.get(page)
+        assert answer.headers["content-type"].startswith("text/html")
+        loaded = re.findall(r'(?:src|href)="([^"]+)"', answer.text)
+        assert loaded
+        for address in loaded:
+            assert address.startswith("/")
+            assert client.get(address).status_code == 200, address
+        assert "<script>" not in answer.text  # the content security policy forbids inline scripts
+        assert "script-src 'self';" in answer.headers["content-security-policy"]
+
+
+@pytest.mark.parametrize("path", ["/", "/api/v1/estimates/latest", "/api/v1/status", "/nothing", "/openapi.json"])
+def test_every_answer_carries_the_security_headers(client: Client, path: str) -> None:
+    headers = client.get(path).headers
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["x-frame-options"] == "DENY"
+    assert headers["cache-control"] in ("no-store", "no-cache")
+
+
+def test_the_description_covers_the_contract_with_units_and_examples(client: Client) -> None:
+    described = client.get("/openapi.json").json()
+    assert described["openapi"].startswith("3.1")
+    assert set(described["paths"]) >= {
+        "/api/v1/estimates/latest",
+        "/api/v1/estimates",
+        "/api/v1/status",
+        "/api/v1/stream",
+        "/health/live",
+        "/health/ready",
+        "/metrics",
+    }
+    problem = described["paths"]["/api/v1/estimates"]["get"]["responses"]["422"]["content"]
+    assert list(problem) == ["application/problem+json"]
+    estimate = described["components"]["schemas"]["Estimate"]["properties"]
+    assert set(make_record(0, with_spectra=True)) <= set(estimate)
+    assert all(estimate[name].get("examples") for name in make_record(0))
+
+
+def test_the_described_latest_fits_what_is_sent(gateway: Gateway, client: Client) -> None:
+    gateway.publish(make_record(1, with_spectra=True), make_record(2, Why.GAP))
+    from gateway.web.schemas import EstimatesPage, Latest
+
+    Latest.model_validate_json(client.get("/api/v1/estimates/latest").content, strict=True)
+    EstimatesPage.model_validate_json(client.get("/api/v1/estimates").content, strict=True)
+    assert json.loads(client.get("/api/v1/estimates").content)["items"][0]["spectra"]["freq_hz"]

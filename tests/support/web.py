@@ -1,0 +1,97 @@
+"""A store, a board and the application over them, without a server or with one on a free port."""
+
+import asyncio
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import httpx
+import uvicorn
+from fastapi import FastAPI
+
+from gateway.store import Store
+from gateway.web import Board, State, Status, WebSettings, create_app
+
+
+class Gateway:
+    """The web room with a real store behind it; ``clock_s`` and ``status`` are the test's to set."""
+
+    def __init__(self, directory: Path, settings: WebSettings | None = None) -> None:
+        self.clock_s = 1000.0
+        self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
+        self.store = Store.open(directory)
+        self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
+        self.app: FastAPI = create_app(self.board, self.store.reader(), lambda: self.status, settings)
+
+    def publish(self, *records: dict[str, Any]) -> list[str]:
+        """As the pipeline does: into the store, then onto the board."""
+        cursors = []
+        for record in records:
+            cursors.append(self.store.write_estimate(record))
+            self.board.publish(record, cursors[-1])
+        return cursors
+
+    def __enter__(self) -> "Gateway":
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.board.close()
+        self.store.close()
+
+
+class Client:
+    """Asks the application itself, without a server in between; an error in it is an answer, not an exception."""
+
+    def __init__(self, app: FastAPI) -> None:
+        self._app = app
+
+    def get(self, url: str, **options: Any) -> httpx.Response:
+        return self.request("GET", url, **options)
+
+    def request(self, method: str, url: str, **options: Any) -> httpx.Response:
+        return asyncio.run(self._ask(method, url, **options))
+
+    async def _ask(self, method: str, url: str, **options: Any) -> httpx.Response:
+        transport = httpx.ASGITransport(self._app, raise_app_exceptions=False)
+        async with httpx.AsyncClient(transport=transport, base_url="http://gateway") as client:
+            return await client.request(method, url, **options)
+
+
+class Server:
+    """The application under uvicorn, on a loopback port of its own."""
+
+    def __init__(self, app: FastAPI) -> None:
+        self.socket = socket.create_server(("127.0.0.1", 0))
+        self.url = f"http://127.0.0.1:{self.socket.getsockname()[1]}"
+        config = uvicorn.Config(app, loop="uvloop", http="httptools", access_log=False, log_config=None)
+        self.uvicorn = uvicorn.Server(config)
+        self.is_up = threading.Event()
+        self.thread = threading.Thread(target=self._run)
+
+    def _run(self) -> None:
+        asyncio.run(self._serve())
+
+    async def _serve(self) -> None:
+        serving = asyncio.create_task(self.uvicorn.serve(sockets=[self.socket]))
+        while not self.uvicorn.started and not serving.done():
+            await asyncio.sleep(0.005)
+        self.is_up.set()
+        await serving
+
+
+@contextmanager
+def serving(app: FastAPI) -> Iterator[Server]:
+    """A running server; stopped at the end if the test has not done so."""
+    server = Server(app)
+    server.thread.start()
+    assert server.is_up.wait(20.0)
+    try:
+        yield server
+    finally:
+        server.uvicorn.should_exit = True
+        server.thread.join(20.0)
+        assert not server.thread.is_alive()

@@ -1,0 +1,134 @@
+"""What latest says: the last good estimate, its age, and what came after it."""
+
+import json
+
+import pytest
+from support.estimates import make_record
+
+from gateway.records import Why
+from gateway.web import Board
+
+
+class Clock:
+    now_s = 50.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def board(clock: Clock) -> Board:
+    return Board(stale_after_s=900.0, clock=clock)
+
+
+def latest(board: Board) -> dict[str, object]:
+    told = json.loads(board.latest()[1])
+    assert isinstance(told, dict)
+    return told
+
+
+def test_before_any_estimate_all_is_null_and_says_why(board: Board) -> None:
+    told = latest(board)
+    assert told["rejected"] == ["no_estimate_yet"]
+    assert told["age_s"] is None
+    assert told["is_stale"] is False
+    assert told["last_rejection"] is None
+    assert {told[name] for name in ("id", "payload_kg", "front_share_pct", "t_end", "payload_interval95_kg")} == {None}
+    assert set(make_record(0)) <= set(told)
+
+
+def test_the_estimate_is_shown_as_it_is_with_its_age(board: Board, clock: Clock) -> None:
+    board.publish(make_record(3))
+    clock.now_s += 12.34
+    told = latest(board)
+    assert told == make_record(3) | {"age_s": 12.3, "is_stale": False, "last_rejection": None}
+
+
+def test_it_becomes_stale_after_the_time_set(board: Board, clock: Clock) -> None:
+    board.publish(make_record(3))
+    clock.now_s += 900.0
+    assert not board.is_stale()
+    clock.now_s += 0.1
+    assert board.is_stale()
+    assert latest(board)["is_stale"] is True
+
+
+def test_a_rejection_stands_beside_the_estimate_and_does_not_renew_it(board: Board, clock: Clock) -> None:
+    board.publish(make_record(3))
+    clock.now_s += 300.0
+    board.publish(make_record(4, Why.TOO_SLOW, with_spectra=True))
+    told = latest(board)
+    assert told["payload_kg"] == 103.0
+    assert told["age_s"] == 300.0
+    expected = make_record(4, Why.TOO_SLOW)
+    assert told["last_rejection"] == expected
+
+
+def test_a_rejection_before_any_estimate_leaves_the_nulls(board: Board) -> None:
+    board.publish(make_record(0, Why.NO_CALIBRATION))
+    told = latest(board)
+    assert told["rejected"] == ["no_estimate_yet"]
+    rejection = told["last_rejection"]
+    assert isinstance(rejection, dict)
+    assert rejection["rejected"] == ["no_calibration"]
+
+
+def test_a_provisional_estimate_stands_in_until_the_drive_has_a_good_one(board: Board) -> None:
+    board.publish(make_record(0, is_provisional=True))
+    assert latest(board)["provisional"] is True
+    board.publish(make_record(0))
+    assert "provisional" not in latest(board)
+    board.publish(make_record(1, is_provisional=True))
+    assert latest(board)["payload_kg"] == 100.0
+    assert "provisional" not in latest(board)
+
+
+def test_a_new_drive_shows_its_early_value_at_once(board: Board) -> None:
+    board.publish(make_record(0))
+    board.publish(make_record(7, is_provisional=True))
+    told = latest(board)
+    assert (told["payload_kg"], told.get("provisional")) == (107.0, True)
+
+
+def test_an_early_look_without_an_answer_is_not_shown(board: Board) -> None:
+    board.publish(make_record(0))
+    board.publish(make_record(7, Why.NOT_ENOUGH_EXCITATION, is_provisional=True))
+    told = latest(board)
+    assert told["payload_kg"] == 100.0
+    assert told["last_rejection"] is None
+
+
+def test_what_an_earlier_run_stored_is_shown_as_old_as_it_is(board: Board) -> None:
+    board.restore(json.dumps(make_record(2)), json.dumps(make_record(3, Why.GAP)), age_s=3600.0)
+    told = latest(board)
+    assert (told["payload_kg"], told["age_s"], told["is_stale"]) == (102.0, 3600.0, True)
+    assert told["last_rejection"] is not None
+
+
+def test_nothing_restored_is_nothing_yet(board: Board) -> None:
+    board.restore(None, None, None)
+    assert latest(board)["rejected"] == ["no_estimate_yet"]
+
+
+def test_the_tag_changes_with_all_but_the_age(board: Board, clock: Clock) -> None:
+    tags = [board.latest()[0]]
+
+    def is_new() -> bool:
+        tags.append(board.latest()[0])
+        return tags[-1] not in tags[:-1]
+
+    board.publish(make_record(0, is_provisional=True))
+    assert is_new()
+    board.publish(make_record(0))
+    assert is_new()
+    clock.now_s += 10.0
+    assert not is_new()
+    board.publish(make_record(1, Why.GAP))
+    assert is_new()
+    clock.now_s += 1000.0
+    assert is_new()
