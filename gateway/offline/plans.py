@@ -3,8 +3,9 @@
 Loads and places are the paper's for its van (450 kg rated, 2.8 m wheelbase) and scaled to other vehicles.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
@@ -12,13 +13,23 @@ import numpy as np
 
 from gateway.sim.drive import Drive, Leg, constant, drive_of, motorway, rural, standstill, urban
 from gateway.sim.obstacles import ObstacleRoad, UnevenRoad
-from gateway.sim.road import PaperRoad, RoadRecipe, iso_road
+from gateway.sim.road import (
+    PAPER_CORNER_RADPM,
+    PAPER_SIGMA_M,
+    PaperRoad,
+    RoadRecipe,
+    SpectralRoad,
+    iso_road,
+)
 from gateway.sim.scenario import LoadStep
 from gateway.sim.vehicle import Load, Vehicle, front_share_pct, load_for_share
 
 PAPER_PAYLOAD_KG: Final = 450.0
 PAPER_WHEELBASE_M: Final = 2.8
 PAPER_SPEED_MPS: Final = 50.0 / 3.6
+PAPER_ROUGHNESS_M3: Final = (
+    2.0 * PAPER_CORNER_RADPM * PAPER_SIGMA_M**2 / math.pi
+)  # (1) at short waves, as C of ISO 8608
 CHANGE_S: Final = 90.0  # standing still while the load changes: longer than what ends a drive
 
 
@@ -51,49 +62,52 @@ class Plan:
     split: str | None = None
 
 
-def ident(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+def ident(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's identification: 0 to the rated payload and 40 to 60 % wherever both are feasible, 50 km/h, IRI 4."""
     pairs = [(0.0, None)]
     for mass_kg in np.linspace(0.2, 1.0, 5) * vehicle.rated_payload_kg:
         pairs += [(float(mass_kg), share) for share in np.linspace(-10.0, 10.0, 6) + _middle_share_pct(vehicle)]
     loads = [_placed(vehicle, mass_kg, share) for mass_kg, share in pairs]
-    drives = [_steady(vehicle, placed, 600.0, PaperRoad(), rng) for placed in loads if placed is not None]
+    drives = [
+        _steady(vehicle, placed, min(600.0, longest_s), PaperRoad(), rng) for placed in loads if placed is not None
+    ]
     return Plan(tuple(drives), identification_fraction=1.0)
 
 
-def load_sweep(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+def load_sweep(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's Fig. 3: 0 to the rated payload at the centre of gravity."""
     masses = np.linspace(0.0, 1.0, 10) * vehicle.rated_payload_kg
     loads = [(Load(float(mass_kg), vehicle.cog_position_m),) if mass_kg > 0.0 else () for mass_kg in masses]
-    drives = [_steady(vehicle, carried, 600.0, PaperRoad(), rng) for carried in loads]
+    drives = [_steady(vehicle, carried, min(600.0, longest_s), PaperRoad(), rng) for carried in loads]
     return Plan(tuple(drives), identification_fraction=1.0)
 
 
-def share_sweep(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+def share_sweep(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's Fig. 4: eight ninths of the rated payload moved from 40 to 60 %."""
     mass_kg = 8.0 / 9.0 * vehicle.rated_payload_kg
     loads = [_placed(vehicle, mass_kg, share) for share in np.linspace(-10.0, 10.0, 9) + _middle_share_pct(vehicle)]
-    drives = [_steady(vehicle, placed, 600.0, PaperRoad(), rng) for placed in loads if placed is not None]
+    drives = [
+        _steady(vehicle, placed, min(600.0, longest_s), PaperRoad(), rng) for placed in loads if placed is not None
+    ]
     return Plan(tuple(drives), identification_fraction=1.0)
 
 
-def load_step(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+def load_step(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's test 1: 50 % always, the payload steps from 0 to 300 kg."""
     mass_kg = 300.0 / PAPER_PAYLOAD_KG * vehicle.rated_payload_kg
     loads: list[tuple[Load, ...]] = [(), (Load(mass_kg, vehicle.cog_position_m),)]
-    return _with_changes("test1", loads, 1800.0, rng)
+    return _with_changes("test1", loads, min(1800.0, longest_s), rng)
 
 
-def share_step(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+def share_step(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's test 2: 400 kg, its share steps from 40 to 60 % after 30 minutes."""
     mass_kg = 400.0 / PAPER_PAYLOAD_KG * vehicle.rated_payload_kg
     middle = _middle_share_pct(vehicle)
-    return _with_changes(
-        "test2", [(load_for_share(vehicle, mass_kg, middle + by),) for by in (-10.0, 10.0)], 1800.0, rng
-    )
+    loads = [(load_for_share(vehicle, mass_kg, middle + by),) for by in (-10.0, 10.0)]
+    return _with_changes("test2", loads, min(1800.0, longest_s), rng)
 
 
-def random_pairs(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+def random_pairs(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's test 3: ten random feasible pairs of payload and share, ten minutes each."""
     loads: list[tuple[Load, ...]] = []
     while len(loads) < 10:
@@ -101,43 +115,71 @@ def random_pairs(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
         placed = _placed(vehicle, mass_kg, _middle_share_pct(vehicle) + float(rng.uniform(-10.0, 10.0)))
         if placed is not None:
             loads.append(placed)
-    return _with_changes("test3", loads, 600.0, rng)
+    return _with_changes("test3", loads, min(600.0, longest_s), rng)
 
 
-def experiment(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+def experiment(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's experiment: ten loads of 0, 120, 270, 420 kg at 0.5, 1.3, 2.8 m, 15 minutes near 50 km/h each."""
     road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
     return Plan(
-        tuple(_steady(vehicle, carried, 900.0, road, rng, jitter_mps=0.4) for carried in _experiment_loads(vehicle))
+        tuple(
+            _steady(vehicle, carried, min(900.0, longest_s), road, rng, jitter_mps=0.4)
+            for carried in _experiment_loads(vehicle)
+        )
     )
 
 
-def speeds(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+def speeds(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """30 to 110 km/h with nothing, three fifths and nearly all of the rated payload; for validation only."""
     masses = [part / PAPER_PAYLOAD_KG * vehicle.rated_payload_kg for part in (0.0, 270.0, 420.0)]
     middle_m = 0.55 * vehicle.wheelbase_m
     road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
     drives = [
-        _steady(vehicle, (Load(mass_kg, middle_m),) if mass_kg else (), 480.0, road, rng, speed_mps=kmh / 3.6)
+        _steady(
+            vehicle,
+            (Load(mass_kg, middle_m),) if mass_kg else (),
+            min(480.0, longest_s),
+            road,
+            rng,
+            speed_mps=kmh / 3.6,
+        )
         for kmh in (30.0, 50.0, 70.0, 90.0, 110.0)
         for mass_kg in masses
     ]
     return Plan(tuple(drives), identification_fraction=0.0, split="validation")
 
 
-def mixed(vehicle: Vehicle, rng: np.random.Generator) -> Plan:
+def sensitivity(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
+    """Half the rated payload at the centre of gravity, at other speeds and on other roads than the paper's."""
+    loads = (Load(vehicle.rated_payload_kg / 2.0, vehicle.cog_position_m),)
+    each_s = min(600.0, longest_s)
+    by_speed = [
+        _steady(vehicle, loads, each_s, PaperRoad(), rng, speed_mps=kmh / 3.6) for kmh in (30, 40, 50, 60, 70, 90, 130)
+    ]
+    roads: dict[str, RoadRecipe] = {
+        "iri2": PaperRoad(sigma_m=0.5 * PAPER_SIGMA_M),
+        "iri8": PaperRoad(sigma_m=2.0 * PAPER_SIGMA_M),
+        "waviness1.8": SpectralRoad(PAPER_ROUGHNESS_M3, 1.8),
+        "waviness2.2": SpectralRoad(PAPER_ROUGHNESS_M3, 2.2),
+    }
+    by_road = [_steady(vehicle, loads, each_s, road, rng, label=f"_{name}") for name, road in roads.items()]
+    return Plan((*by_speed, *by_road), identification_fraction=0.0, split="validation")
+
+
+def mixed(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """Town, country and motorway in one drive a load, on roads that change, with potholes."""
     road = ObstacleRoad(UnevenRoad(iso_road("B"), stretch_m=400.0, spread=0.4), potholes_per_km=1.0)
     drives = []
     for carried in _experiment_loads(vehicle):
         kinds: list[Callable[[float, np.random.Generator], Drive]] = [urban, rural, motorway]
         rng.shuffle(kinds)
-        whole = kinds[0](420.0, rng).then(kinds[1](420.0, rng)).then(kinds[2](420.0, rng))
+        third_s = min(1260.0, longest_s) / 3.0
+        whole = kinds[0](third_s, rng).then(kinds[1](third_s, rng)).then(kinds[2](third_s, rng))
         drives.append(_whole(_name(vehicle, carried), whole, road, carried))
     return Plan(tuple(drives))
 
 
-PLANS: Final[Mapping[str, Callable[[Vehicle, np.random.Generator], Plan]]] = MappingProxyType(
+PLANS: Final[Mapping[str, Callable[[Vehicle, np.random.Generator, float], Plan]]] = MappingProxyType(
     {
         "ident": ident,
         "load-sweep": load_sweep,
@@ -147,20 +189,18 @@ PLANS: Final[Mapping[str, Callable[[Vehicle, np.random.Generator], Plan]]] = Map
         "test3": random_pairs,
         "experiment": experiment,
         "speeds": speeds,
+        "sensitivity": sensitivity,
         "mixed": mixed,
     }
 )
 
 
-def plan_of(kind: str, vehicle: Vehicle, seed: int, max_drive_s: float | None = None) -> Plan:
-    """The plan of a kind; the seed decides speeds, roads and random loads. max_drive_s cuts every drive short.
+def plan_of(kind: str, vehicle: Vehicle, seed: int, longest_s: float = math.inf) -> Plan:
+    """The plan of a kind; the seed decides speeds, roads and random loads. No load is driven longer than longest_s.
 
     Raises KeyError for a kind that is not in PLANS.
     """
-    plan = PLANS[kind](vehicle, np.random.default_rng(seed))
-    if max_drive_s is None:
-        return plan
-    return replace(plan, drives=tuple(_cut(drive, max_drive_s) for drive in plan.drives))
+    return PLANS[kind](vehicle, np.random.default_rng(seed), longest_s)
 
 
 def share_range_pct(vehicle: Vehicle) -> tuple[float, float]:
@@ -200,8 +240,9 @@ def _steady(
     rng: np.random.Generator,
     speed_mps: float = PAPER_SPEED_MPS,
     jitter_mps: float = 0.3,
+    label: str = "",
 ) -> PlannedDrive:
-    name = f"{_name(vehicle, loads)}_{speed_mps * 3.6:.0f}kmh"
+    name = f"{_name(vehicle, loads)}_{speed_mps * 3.6:.0f}kmh{label}"
     return _whole(name, constant(speed_mps, duration_s, rng, jitter_mps), road, loads)
 
 
@@ -238,14 +279,3 @@ def _from_rest_to_rest(duration_s: float, rng: np.random.Generator) -> tuple[Dri
     scaled = ramp.speed_mps * wandering / PAPER_SPEED_MPS
     whole = standstill(CHANGE_S).then(Drive(scaled, ramp.lateral_mps2, ramp.step_s))
     return whole, float(at_speed_s[0]), float(at_speed_s[-1])
-
-
-def _cut(planned: PlannedDrive, duration_s: float) -> PlannedDrive:
-    """The first duration_s of a drive and what is carried in it."""
-    if duration_s >= planned.drive.duration_s:
-        return planned
-    carried = tuple(
-        replace(part, end_s=min(part.end_s, duration_s)) for part in planned.carried if part.start_s < duration_s
-    )
-    steps = tuple(step for step in planned.steps if step.t_s < duration_s)
-    return replace(planned, drive=planned.drive.part(0.0, duration_s), carried=carried, steps=steps)

@@ -1,6 +1,7 @@
 """Simulated drives as campaigns on disk, or as frames for a bus."""
 
 import csv
+import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -38,7 +39,7 @@ SENSORS_OF_MAP: Final = {"reference": REFERENCE, "canmod_gps": CANMOD, "j1939": 
 class Bench:
     """What is simulated: a plan of this kind with this vehicle, its sensors sending as a shipped signal map tells.
 
-    n_unrelated other identifiers share the bus. max_drive_s cuts every drive short.
+    n_unrelated other identifiers share the bus. No load is driven longer than longest_s.
     """
 
     kind: str
@@ -46,14 +47,14 @@ class Bench:
     map_name: str = "reference"
     seed: int = 1
     n_unrelated: int = 0
-    max_drive_s: float | None = None
+    longest_s: float = math.inf
 
     @property
     def sensors(self) -> Sensors:
         return SENSORS_OF_MAP[self.map_name]
 
     def plan(self) -> Plan:
-        return plan_of(self.kind, self.vehicle, self.seed, self.max_drive_s)
+        return plan_of(self.kind, self.vehicle, self.seed, self.longest_s)
 
     def simulate(self, planned: PlannedDrive, number: int, start_ns: int) -> SimulatedDrive:
         """Drive ``number`` of the plan, begun at start_ns."""
@@ -76,7 +77,7 @@ def bench_of(
     map_name: str = "reference",
     seed: int = 1,
     n_unrelated: int = 0,
-    max_drive_s: float | None = None,
+    longest_s: float = math.inf,
 ) -> Bench:
     """A bench from names. Raises ConfigurationError for a name that is not there, naming those that are."""
     for what, name, known in (
@@ -86,9 +87,9 @@ def bench_of(
     ):
         if name not in known:
             raise ConfigurationError(f"there is no {what} {name!r}: choose {', '.join(known)}")
-    if max_drive_s is not None and not max_drive_s > 0.0:
-        raise ConfigurationError(f"a drive needs a positive duration, not {max_drive_s:g} s")
-    return Bench(kind, VANS[vehicle], map_name, seed, n_unrelated, max_drive_s)
+    if not longest_s > 0.0:
+        raise ConfigurationError(f"a drive needs a positive duration, not {longest_s:g} s")
+    return Bench(kind, VANS[vehicle], map_name, seed, n_unrelated, longest_s)
 
 
 def write_campaign(

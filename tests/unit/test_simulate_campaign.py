@@ -61,10 +61,10 @@ def test_the_papers_loads_are_the_papers() -> None:
 
 
 def test_the_seed_and_nothing_else_decides_the_frames(tmp_path: Path) -> None:
-    bench = bench_of("load-sweep", max_drive_s=4.0, n_unrelated=3)
+    bench = bench_of("load-sweep", longest_s=4.0, n_unrelated=3)
     one = write_campaign(bench, tmp_path / "one")
     other = write_campaign(bench, tmp_path / "other", workers=2)
-    reseeded = write_campaign(bench_of("load-sweep", max_drive_s=4.0, n_unrelated=3, seed=2), tmp_path / "reseeded")
+    reseeded = write_campaign(bench_of("load-sweep", longest_s=4.0, n_unrelated=3, seed=2), tmp_path / "reseeded")
     logs = sorted(path.relative_to(one.parent) for path in one.parent.rglob("can.log.gz"))
     assert len(logs) == 10
     for name in ("campaign.toml", "truth.csv", "signals.toml"):
@@ -76,20 +76,22 @@ def test_the_seed_and_nothing_else_decides_the_frames(tmp_path: Path) -> None:
 
 
 def test_a_simulated_campaign_reads_like_a_recorded_one(tmp_path: Path) -> None:
-    path = write_campaign(bench_of("test1", max_drive_s=150.0), tmp_path)
+    path = write_campaign(bench_of("test1", longest_s=45.0), tmp_path)
     campaign = load_campaign(path)
     settings = BatchSettings(window_s=20.0)
-    (run,) = split_runs(campaign, settings)
-    batches = run.validation.batches
+    runs = split_runs(campaign, settings)
     assert campaign.vehicle.empty_mass_kg == 1240.0
-    assert run.identification.batches == ()
-    assert [batch.rejected for batch in batches] == [(), (), (Why.TOO_SHORT,)]
-    assert [batch.mean_speed_mps for batch in batches] == pytest.approx([50.0 / 3.6] * len(batches), abs=1.0)
-    assert [batch.gravity_mps2 for batch in batches] == pytest.approx([9.8] * len(batches), abs=0.5)
+    assert [run.validation.payload_kg for run in runs] == [0.0, 300.0]
+    for run in runs:
+        batches = run.validation.batches
+        assert run.identification.batches == ()
+        assert [batch.rejected for batch in batches] == [(), (), (Why.TOO_SHORT,)]
+        assert [batch.mean_speed_mps for batch in batches] == pytest.approx([50.0 / 3.6] * 3, abs=1.0)
+        assert [batch.gravity_mps2 for batch in batches] == pytest.approx([9.8] * 3, abs=0.5)
 
 
 def test_the_truth_lies_beside_the_logs(tmp_path: Path) -> None:
-    path = write_campaign(bench_of("share-sweep", max_drive_s=2.0), tmp_path)
+    path = write_campaign(bench_of("share-sweep", longest_s=2.0), tmp_path)
     with (tmp_path / "truth.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     campaign = load_campaign(path)
@@ -117,7 +119,7 @@ def test_a_campaign_is_not_written_over(tmp_path: Path) -> None:
         ({"kind": "tset1"}, "no campaign 'tset1': choose ident, "),
         ({"kind": "ident", "vehicle": "lorry"}, "no vehicle 'lorry': choose paper_van, small_van, large_van"),
         ({"kind": "ident", "map_name": "pcan_gps"}, "no signal map to send by 'pcan_gps': choose reference, "),
-        ({"kind": "ident", "max_drive_s": 0.0}, "positive duration"),
+        ({"kind": "ident", "longest_s": 0.0}, "positive duration"),
     ],
 )
 def test_a_name_that_is_not_there_is_refused_with_those_that_are(names: dict[str, str], complaint: str) -> None:
@@ -126,7 +128,7 @@ def test_a_name_that_is_not_there_is_refused_with_those_that_are(names: dict[str
 
 
 def test_drives_follow_one_another_with_the_vehicle_parked_between() -> None:
-    first, second, *_ = simulated_frames(bench_of("speeds", max_drive_s=3.0))
+    first, second, *_ = simulated_frames(bench_of("speeds", longest_s=3.0))
     parked_s = (second.t_ns[0] - first.t_ns[-1]) / 1e9
     assert parked_s == pytest.approx(BETWEEN_DRIVES_S, abs=0.2)
 
@@ -134,7 +136,7 @@ def test_drives_follow_one_another_with_the_vehicle_parked_between() -> None:
 def test_a_stream_reaches_a_listener_frame_by_frame() -> None:
     from gateway.bus.signal_map import load_signal_map
 
-    bench = bench_of("test1", max_drive_s=3.0)
+    bench = bench_of("test1", longest_s=3.0)
     source = LiveSource("virtual", "simulate-stream", load_signal_map("springscale:reference"))
     source.start()
     n_sent = stream(bench, "virtual", "simulate-stream", speed="max")
