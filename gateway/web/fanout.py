@@ -46,7 +46,7 @@ class Subscription:
         self._in_loop(self._news.set)
 
     async def next(self, timeout_s: float) -> StreamEvent | None:
-        """The next event; None where there was none in time or the stream has ended."""
+        """The next event; None where there was none in time, or the stream has ended and all was taken."""
         if not self._queue and not self.ended.is_set():
             self._news.clear()
             try:

@@ -70,9 +70,11 @@ class EventStream(Response):
             async for event in self._missed(self._behind):
                 replayed.append(event.cursor)
                 yield event.wire
-        while not subscription.ended.is_set():
+        while True:
             live = await subscription.next(self._keep_alive_s)
             if live is None:
+                if subscription.ended.is_set():
+                    return
                 yield b": keep-alive\n\n"
             elif live.cursor is None or live.cursor not in replayed:
                 yield live.wire

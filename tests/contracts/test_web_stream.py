@@ -1,0 +1,182 @@
+"""Server-sent events over a real server: what is sent, what is resumed, how it ends."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from support.estimates import make_record
+from support.web import Client, Gateway, Server, serving
+
+from gateway.records import Why
+from gateway.web import WebSettings
+from gateway.web.fanout import QUEUE, Fanout, StreamEvent
+
+LIMIT_S = 20.0
+
+
+class Listener:
+    """A client of the stream: events as (id, kind, record)."""
+
+    def __init__(self, response: httpx.Response) -> None:
+        self.response = response
+        self._lines = response.aiter_lines()
+
+    async def event(self) -> tuple[str | None, str, Any]:
+        """The next event; StopAsyncIteration where the stream has ended. Comments and retry are skipped."""
+        fields: dict[str, str] = {}
+        while True:
+            line = await asyncio.wait_for(anext(self._lines), LIMIT_S)
+            if not line and "data" in fields:
+                return fields.get("id"), fields["event"], json.loads(fields["data"])
+            if line and not line.startswith(":"):
+                name, _, text = line.partition(": ")
+                fields[name] = text
+
+    async def numbers(self, n: int) -> list[int]:
+        """Which batches the next n events are about."""
+        return [(await self.event())[2]["t_end_ns"] // (300 * 10**9) - 1 for _ in range(n)]
+
+
+@asynccontextmanager
+async def listening(server: Server, last_event_id: str | None = None) -> AsyncIterator[Listener]:
+    headers = {} if last_event_id is None else {"Last-Event-ID": last_event_id}
+    async with (
+        httpx.AsyncClient(timeout=LIMIT_S) as client,
+        client.stream("GET", f"{server.url}/api/v1/stream", headers=headers) as response,
+    ):
+        yield Listener(response)
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    async with asyncio.timeout(LIMIT_S):
+        while not condition():
+            await asyncio.sleep(0.005)
+
+
+def run(gateway: Gateway, scenario: Callable[[Server], Coroutine[Any, Any, None]]) -> None:
+    with serving(gateway.app) as server:
+        asyncio.run(scenario(server))
+
+
+def test_each_record_is_sent_with_its_kind_and_cursor(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+
+        async def scenario(server: Server) -> None:
+            async with listening(server) as listener:
+                assert listener.response.headers["content-type"].startswith("text/event-stream")
+                await until(lambda: gateway.board.fanout.n_subscribers == 1)
+                cursors = gateway.publish(make_record(0), make_record(1, Why.GAP))
+                gateway.board.publish(make_record(2, is_provisional=True))
+                assert await listener.event() == (cursors[0], "estimate", make_record(0))
+                assert await listener.event() == (cursors[1], "rejection", make_record(1, Why.GAP))
+                assert await listener.event() == (None, "provisional", make_record(2, is_provisional=True))
+            await until(lambda: gateway.board.fanout.n_subscribers == 0)
+
+        run(gateway, scenario)
+
+
+def test_a_stream_is_resumed_behind_the_last_event_without_loss_or_repetition(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        cursors = gateway.publish(*(make_record(n) for n in range(250)))
+
+        async def scenario(server: Server) -> None:
+            async with listening(server, last_event_id=cursors[19]) as listener:
+                await until(lambda: gateway.board.fanout.n_subscribers == 1)
+                for n in range(250, 260):  # while the missed ones are on their way
+                    gateway.publish(make_record(n))
+                assert await listener.numbers(240) == list(range(20, 260))
+
+        run(gateway, scenario)
+
+
+def test_a_quiet_stream_is_kept_alive_by_comments(tmp_path: Path) -> None:
+    with Gateway(tmp_path, WebSettings(keep_alive_s=0.01)) as gateway:
+
+        async def scenario(server: Server) -> None:
+            async with listening(server) as listener:
+                lines = listener.response.aiter_lines()
+                seen = [await asyncio.wait_for(anext(lines), LIMIT_S) for _ in range(6)]
+                assert seen == ["retry: 3000", "", ": keep-alive", "", ": keep-alive", ""]
+
+        run(gateway, scenario)
+
+
+def test_a_cursor_that_is_none_is_a_problem_before_the_stream_begins(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        answer = Client(gateway.app).get("/api/v1/stream", headers={"Last-Event-ID": "nonsense"})
+        assert answer.status_code == 422
+        assert answer.json()["errors"][0]["where"] == "header.last-event-id"
+
+
+def test_more_streams_than_allowed_are_refused(tmp_path: Path) -> None:
+    with Gateway(tmp_path, WebSettings(n_streams_max=1)) as gateway:
+
+        async def scenario(server: Server) -> None:
+            async with listening(server) as first, listening(server) as second:
+                await until(lambda: gateway.board.fanout.n_subscribers == 1)
+                assert {first.response.status_code, second.response.status_code} == {200, 503}
+
+        run(gateway, scenario)
+
+
+def test_closing_the_board_ends_the_streams_and_lets_the_server_stop(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+
+        async def scenario(server: Server) -> None:
+            async with listening(server) as listener, listening(server) as other:
+                await until(lambda: gateway.board.fanout.n_subscribers == 2)
+                gateway.publish(make_record(0), make_record(1))
+                gateway.board.close()
+                server.uvicorn.should_exit = True
+                for each in (listener, other):
+                    assert await each.numbers(2) == [0, 1]  # what was queued still goes out
+                    assert (await each.event())[1] == "closing"
+                    with pytest.raises(StopAsyncIteration):
+                        await each.event()
+                await asyncio.to_thread(server.thread.join, LIMIT_S)
+                assert not server.thread.is_alive()
+                assert (
+                    time.monotonic() - begun_s < LIMIT_S / 2
+                )  # not left to the limit: the streams let go by themselves
+
+        run(gateway, scenario)
+
+
+def test_a_client_that_does_not_read_is_left_behind_alone(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        fanout = gateway.board.fanout
+        bulky = {**make_record(0), "ballast": "x" * 1_000_000}  # more than the sockets hold
+
+        async def scenario(server: Server) -> None:
+            host, port = server.socket.getsockname()
+            _, deaf = await asyncio.open_connection(host, port, limit=1024)
+            deaf.write(b"GET /api/v1/stream HTTP/1.1\r\nhost: gateway\r\n\r\n")
+            async with listening(server) as listener:
+                await until(lambda: fanout.n_subscribers == 2)
+                n_sent = 0
+                while fanout.n_slow_clients == 0:
+                    gateway.board.publish({**bulky, "n": n_sent})
+                    assert (await listener.event())[2]["n"] == n_sent
+                    n_sent += 1
+                    assert n_sent < 5 * QUEUE
+                assert fanout.n_subscribers == 1
+                assert fanout.n_events_dropped > QUEUE
+            deaf.transport.abort()
+
+        run(gateway, scenario)
+
+
+def test_publishing_after_the_loop_is_gone_harms_nobody() -> None:
+    fanout = Fanout()
+
+    async def join_and_leave_the_loop() -> None:
+        fanout.join()
+
+    asyncio.run(join_and_leave_the_loop())
+    fanout.publish(StreamEvent.of("estimate", "{}", None))
+    fanout.close()
