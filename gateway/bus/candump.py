@@ -18,7 +18,7 @@ from gateway.bus.frames import in_order, take
 from gateway.bus.line_blocks import BLOCK_BYTES, LineBlock, line_blocks
 from gateway.bus.log_report import LogReject, LogReport
 from gateway.bus.mapping import CLASSIC_BYTES, IdFilter
-from gateway.records import EXTENDED_ID, I64, Bool, Frames
+from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
 KEPT_SHAPES: Final = 32
 LONGEST_LINE: Final = 4096  # what an exact read looks at
@@ -92,12 +92,11 @@ class _Reader:
         report = self._report
         lines = block.text[block.start : block.end]
         n_lines = int(np.count_nonzero(lines == ord("\n")))
-        hashes = np.flatnonzero(lines == ord("#")) + block.start
-        n_frames = len(hashes) - int(np.count_nonzero(np.diff(hashes) == 1))  # ## is one mark
-        if n_frames != n_lines:
+        hashes = _marks(lines) + block.start
+        if len(hashes) != n_lines:
             self._report_frameless(block, hashes)
         frames = self._wanted(block, self._hits(block, hashes))
-        report.frames += n_frames
+        report.frames += len(hashes)
         report.lines += n_lines
         report.hand_on(frames.t_ns)
         return frames
@@ -183,6 +182,13 @@ class _Reader:
                 found = read_line(line)
                 reason = found if isinstance(found, LogReject) else LogReject.GARBLED
                 self._report.reject(reason, self._report.lines + int(i) + 1)
+
+
+def _marks(lines: U8) -> I64:
+    """Where the marks between identifier and payload stand; the two characters of a CAN FD ## are one."""
+    hashes = np.flatnonzero(lines == ord("#"))
+    is_second = np.diff(hashes, prepend=-2) == 1
+    return hashes[~is_second] if is_second.any() else hashes
 
 
 def _line_around(block: LineBlock, at: int) -> bytes:

@@ -1,0 +1,147 @@
+"""Replay: every frame once, in order, paced by the stamps, with progress, and stopped when told."""
+
+import threading
+import time
+
+import can
+import numpy as np
+import pytest
+
+from gateway.bus import sink as sink_module
+from gateway.bus.candump_write import write_candump
+from gateway.bus.sink import BusSink, replay, replay_frames
+from gateway.errors import BusError, LogUnreadableError
+from gateway.records import Frames
+
+
+class RecordingSink:
+    """Keeps what was sent and when, by a clock the test owns."""
+
+    def __init__(self, clock):
+        self.clock = clock
+        self.sent = []
+
+    def send(self, frames):
+        self.sent += [(self.clock.now_s, int(t)) for t in frames.t_ns]
+
+
+class Clock:
+    """Virtual time: sleeping moves it on."""
+
+    now_s = 100.0
+
+    def monotonic(self):
+        return self.now_s
+
+    def wait(self, seconds):
+        self.now_s += seconds
+
+
+class ClockedEvent(threading.Event):
+    def __init__(self, clock):
+        super().__init__()
+        self.clock = clock
+
+    def wait(self, timeout=None):
+        self.clock.wait(timeout)
+        return self.is_set()
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(sink_module, "time", clock)
+    return clock
+
+
+def frames(*t_s):
+    n = len(t_s)
+    return Frames(
+        np.array([round(t * 1e9) for t in t_s], np.int64),
+        np.arange(n, dtype=np.uint32),
+        np.zeros(n, np.uint8),
+        np.zeros((n, 8), np.uint8),
+    )
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 4.0])
+def test_frames_are_sent_when_their_stamps_say(speed, clock):
+    sink = RecordingSink(clock)
+    replay_frames([frames(5.0, 5.25), frames(7.0)], sink, speed, stop=ClockedEvent(clock))
+    due_s = [100.0 + (t - 5.0) / speed for t in (5.0, 5.25, 7.0)]
+    assert [sent_s for sent_s, _ in sink.sent] == pytest.approx(due_s)
+
+
+def test_at_full_speed_nothing_waits(clock):
+    sink = RecordingSink(clock)
+    assert replay_frames([frames(5.0, 9000.0), frames(1e6)], sink, "max", stop=ClockedEvent(clock)) == 3
+    assert {sent_s for sent_s, _ in sink.sent} == {100.0}
+
+
+def test_a_step_back_in_time_does_not_wait_and_keeps_the_order(clock):
+    sink = RecordingSink(clock)
+    replay_frames([frames(5.0, 6.0, 3.0, 7.0)], sink, 1.0, stop=ClockedEvent(clock))
+    assert [t for _, t in sink.sent] == [5_000_000_000, 6_000_000_000, 3_000_000_000, 7_000_000_000]
+    assert [sent_s for sent_s, _ in sink.sent] == pytest.approx([100.0, 101.0, 101.0, 102.0])
+
+
+def test_progress_tells_frames_and_recorded_time(clock):
+    told = []
+    replay_frames([frames(5.0, 6.0)], RecordingSink(clock), "max", told.append)
+    assert [(p.n_sent, p.recorded_s) for p in told] == [(1, 0.0), (2, 1.0)]
+
+
+def test_a_stop_ends_the_replay(clock):
+    stop = ClockedEvent(clock)
+    sink = RecordingSink(clock)
+    n_sent = replay_frames([frames(*range(100))], sink, 1.0, lambda p: p.n_sent == 3 and stop.set(), stop)
+    assert n_sent == 3
+    assert len(sink.sent) == 3
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, float("nan")])
+def test_an_impossible_speed_is_refused(speed, clock):
+    with pytest.raises(BusError, match="speed"):
+        replay_frames([frames(1.0)], RecordingSink(clock), speed)
+
+
+def test_a_log_is_replayed_whole_with_its_stamps(tmp_path):
+    log = frames(1.0, 1.000000001, 2.5)
+    write_candump(log, "can3", tmp_path / "a.log")
+    with can.Bus(interface="virtual", channel="sink-1", ignore_config=True) as bus:
+        report = replay(tmp_path / "a.log", "virtual", "sink-1", from_channel="can3", speed="max")
+        received = [bus.recv(1.0) for _ in range(3)]
+        assert bus.recv(0.0) is None
+    assert [message.arbitration_id for message in received] == [0, 1, 2]
+    assert [message.timestamp.t_ns for message in received] == log.t_ns.tolist()
+    assert report.wanted == 3
+
+
+def test_only_the_channel_asked_for_is_replayed(tmp_path):
+    write_candump(frames(1.0), "can3", tmp_path / "a.log")
+    report = replay(tmp_path / "a.log", "virtual", "sink-2", from_channel="can4", speed="max")
+    assert (report.wanted, report.other_channel) == (0, 1)
+
+
+def test_a_missing_log_or_bus_is_told(tmp_path):
+    with pytest.raises(LogUnreadableError, match=r"b\.log: no such file"):
+        replay(tmp_path / "b.log", "virtual", "sink-3")
+    with pytest.raises(BusError, match="unknown"):
+        BusSink("no-such-interface", "x")
+
+
+def test_a_receiver_that_takes_nothing_is_told_not_waited_for_forever(monkeypatch):
+    monkeypatch.setattr(sink_module, "SEND_TIMEOUT_S", 0.01)
+    with (
+        can.Bus(interface="virtual", channel="sink-4", rx_queue_size=2, ignore_config=True),
+        BusSink("virtual", "sink-4") as sink,
+        pytest.raises(BusError, match="cannot send on virtual sink-4"),
+    ):
+        sink.send(frames(1.0, 2.0, 3.0))
+
+
+def test_pacing_holds_on_a_real_clock():
+    begun_s = time.monotonic()
+    with BusSink("virtual", "sink-5") as sink:
+        replay_frames([frames(1.0, 1.05)], sink, 1.0)
+    assert time.monotonic() - begun_s >= 0.05

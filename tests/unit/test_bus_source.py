@@ -1,0 +1,261 @@
+"""The live source against interfaces that fail in every way real ones do."""
+
+import errno
+import threading
+import time
+
+import can
+import numpy as np
+import pytest
+
+from gateway.bus import source as source_module
+from gateway.bus.frames import empty_frames
+from gateway.bus.receiver import Burst
+from gateway.bus.signal_map import load_signal_map
+from gateway.bus.source import LiveSource, SourceState
+from gateway.errors import BusError
+from gateway.records import Frames
+
+PATIENCE_S = 10.0
+MAP = load_signal_map("springscale:reference")
+
+
+def frames(n, first_ns=0):
+    return Frames(
+        first_ns + np.arange(n, dtype=np.int64),
+        np.full(n, 0x130, np.uint32),
+        np.full(n, 4, np.uint8),
+        np.zeros((n, 8), np.uint8),
+    )
+
+
+class ScriptedInterface:
+    """Stands in for an interface: plays a script of bursts and faults, then stays silent.
+
+    An exception in the script is raised by receive; wrapped in ``AtOpening`` it is raised by opening.
+    """
+
+    def __init__(self, *script):
+        self.script = list(script)
+        self.n_opened = 0
+        self.n_closed = 0
+        self.dropped_kernel = 0
+        self.is_played = threading.Event()
+
+    def open(self):
+        if self.script and isinstance(self.script[0], AtOpening):
+            raise self.script.pop(0).fault
+        self.n_opened += 1
+        return self
+
+    def receive(self, timeout_s):
+        if not self.script:
+            self.is_played.set()
+            time.sleep(0.01)
+            return Burst(empty_frames(8))
+        if isinstance(self.script[0], AtOpening):
+            raise OSError(errno.ENETDOWN, "Network is down")
+        step = self.script.pop(0)
+        if isinstance(step, BaseException):
+            raise step
+        return step
+
+    def close(self):
+        self.n_closed += 1
+
+
+class AtOpening:
+    def __init__(self, fault):
+        self.fault = fault
+
+
+@pytest.fixture(autouse=True)
+def no_pauses(monkeypatch):
+    monkeypatch.setattr(source_module, "FIRST_PAUSE_S", 0.001)
+    monkeypatch.setattr(source_module, "LONGEST_PAUSE_S", 0.002)
+
+
+@pytest.fixture
+def listen():
+    started = []
+
+    def listen(*script, silence_s=60.0, **options):
+        interface = ScriptedInterface(*script)
+        source = LiveSource("socketcan", "can9", MAP, open_receiver=interface.open, silence_s=silence_s, **options)
+        started.append(source)
+        source.start()
+        return source, interface
+
+    yield listen
+    for source in started:
+        source.stop()
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.002)
+
+
+def test_frames_arrive_in_the_inbox_and_are_counted(listen):
+    source, interface = listen(Burst(frames(3)), Burst(frames(2, 10), remote_frames=1, stamped_at_receipt=2))
+    assert interface.is_played.wait(PATIENCE_S)
+    assert source.inbox.drain(1.0).t_ns.tolist() == [0, 1, 2, 10, 11]
+    counts = source.counts()
+    assert (counts.frames, counts.remote_frames, counts.stamped_at_receipt, counts.reconnects) == (5, 1, 2, 0)
+    assert (source.state, source.reason) == (SourceState.RECEIVING, None)
+
+
+def test_a_full_inbox_shows_in_the_counts(listen):
+    source, interface = listen(Burst(frames(2000)), inbox_frames=1500)
+    assert interface.is_played.wait(PATIENCE_S)
+    assert source.counts().dropped_inbox == 500
+
+
+FAULTS = {
+    "interface down": (OSError(errno.ENETDOWN, "Network is down"), "the interface is down: ip link set can9 up"),
+    "interface removed": (OSError(errno.ENODEV, "No such device"), "does not exist"),
+    "driver error": (can.CanOperationError("adapter unplugged"), "adapter unplugged"),
+    "driver error with a system number": (can.CanOperationError("x", errno.ENETDOWN), "interface is down"),
+    "no permission": (PermissionError(errno.EPERM, "Operation not permitted"), "no permission"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_while_receiving_is_told_and_the_channel_opened_again(fault, listen):
+    error, told = FAULTS[fault]
+    source, interface = listen(Burst(frames(1)), error, error, Burst(frames(1)))
+    assert interface.is_played.wait(PATIENCE_S)
+    assert (interface.n_opened, interface.n_closed) == (3, 2)
+    assert source.counts().reconnects == 2
+    assert source.counts().frames == 2
+    assert source.state is SourceState.RECEIVING
+    assert source.failure is None
+    assert told in source._told(error)
+
+
+def test_a_channel_that_is_not_there_yet_is_waited_for(listen):
+    missing = AtOpening(OSError(errno.ENODEV, "No such device"))
+    source, interface = listen(*[missing] * 5, Burst(frames(4)))
+    assert interface.is_played.wait(PATIENCE_S)
+    assert (source.counts().frames, source.counts().reconnects) == (4, 5)
+
+
+def test_while_a_channel_is_missing_the_state_says_why(listen):
+    source, _ = listen(*[AtOpening(OSError(errno.ENODEV, "No such device"))] * 100_000)
+    assert source.state is SourceState.READER_FAULT
+    assert "does not exist" in source.reason
+    assert source.failure is None
+
+
+def test_a_failing_channel_is_not_spun_on(listen, monkeypatch):
+    monkeypatch.setattr(source_module, "FIRST_PAUSE_S", 0.05)
+    monkeypatch.setattr(source_module, "LONGEST_PAUSE_S", 60.0)
+    source, _ = listen(*[AtOpening(OSError(errno.ENODEV, "No such device"))] * 100_000)
+    time.sleep(0.5)
+    assert 1 <= source.counts().reconnects <= 4  # pauses of 0.1, 0.2, 0.4 s
+
+
+def test_a_silent_bus_is_no_fault(listen):
+    source, _ = listen(Burst(frames(1)), silence_s=0.02)
+    wait_for(lambda: source.state is SourceState.BUS_SILENT)
+    assert source.reason == "no frame for 0.02 s"
+
+
+def test_a_silent_bus_that_talks_of_other_things_is_told_apart(listen, monkeypatch):
+    packets = iter(range(1000, 10**9, 10))
+    monkeypatch.setattr(source_module, "interface_statistics", lambda channel: {"rx_packets": next(packets)})
+    source, _ = listen(Burst(frames(1)), silence_s=0.02)
+    wait_for(lambda: source.reason and "none has a mapped identifier" in source.reason)
+    assert source.state is SourceState.BUS_SILENT
+
+
+def test_a_bus_that_wakes_is_received_again(listen):
+    source, interface = listen(Burst(frames(1)), silence_s=0.02)
+    wait_for(lambda: source.state is SourceState.BUS_SILENT)
+    interface.script.append(Burst(frames(1)))
+    wait_for(lambda: source.counts().frames == 2)
+
+
+def test_bus_off_is_a_fault_until_frames_come_again(listen):
+    bus_off = Burst(empty_frames(8), error_classes={"bus_off": 1, "controller": 1}, error_frames=1)
+    source, interface = listen(Burst(frames(1)), bus_off, Burst(empty_frames(8)))
+    assert interface.is_played.wait(PATIENCE_S)
+    assert source.state is SourceState.READER_FAULT
+    assert source.reason == "bus-off: ip link set can9 type can restart-ms 100"
+    assert source.counts().error_classes == {"bus_off": 1, "controller": 1}
+    interface.script.append(Burst(frames(1)))
+    wait_for(lambda: source.state is SourceState.RECEIVING)
+
+
+def test_what_kills_the_thread_surfaces(listen):
+    source, interface = listen(Burst(frames(1)), ZeroDivisionError("a bug"))
+    wait_for(lambda: source.failure is not None)
+    assert isinstance(source.failure, ZeroDivisionError)
+    assert source.state is SourceState.READER_FAULT
+    assert "the receive thread died" in source.reason
+    assert interface.n_closed == 1
+    assert len(source.inbox.drain(60.0)) == 1  # what had come is not lost, and nobody waits for more
+    assert source.inbox.drain(60.0) is None
+
+
+def test_a_driver_that_is_not_installed_kills_the_source_with_a_clear_word(listen):
+    source, _ = listen(AtOpening(BusError("interface 'pcan' cannot be used here")))
+    assert isinstance(source.failure, BusError)
+
+
+def test_kernel_drops_are_summed_over_reconnects(listen):
+    source, interface = listen(Burst(frames(1)), OSError(errno.ENETDOWN, "down"), Burst(frames(1)))
+    interface.dropped_kernel = 7
+    wait_for(lambda: interface.n_opened == 2 and source.counts().dropped_kernel >= 7)
+
+
+def test_stopping_closes_the_channel(listen):
+    source, interface = listen(Burst(frames(1)))
+    source.stop()
+    assert source.state is SourceState.STOPPED
+    assert interface.n_closed == 1
+    assert source.failure is None
+
+
+def test_stopping_before_starting_does_nothing():
+    LiveSource("virtual", "never-started", MAP).stop()
+
+
+def test_an_unknown_interface_names_the_known():
+    with pytest.raises(BusError, match=r"'sockercan' is unknown; there are .*socketcan"):
+        LiveSource("sockercan", "can0", MAP)
+
+
+def test_options_an_interface_does_not_take_are_told():
+    source = LiveSource("udp_multicast", "not an address", MAP)
+    source.start()
+    wait_for(lambda: source.failure is not None or source.state is SourceState.READER_FAULT)
+    assert source.reason
+    source.stop()
+
+
+def test_frames_without_a_stamp_are_stamped_on_receipt_and_counted():
+    source = LiveSource("virtual", "unstamped", MAP)
+    source.start()
+    before_ns = time.time_ns()
+    with can.Bus(interface="virtual", channel="unstamped", preserve_timestamps=True, ignore_config=True) as bus:
+        bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, data=bytes(4), timestamp=0.0))
+    received = source.inbox.drain(PATIENCE_S)
+    source.stop()
+    assert before_ns <= int(received.t_ns[0]) <= time.time_ns()
+    assert source.counts().stamped_at_receipt == 1
+
+
+def test_other_identifiers_error_and_remote_frames_do_not_reach_the_inbox():
+    source = LiveSource("virtual", "mixed", MAP)
+    source.start()
+    with can.Bus(interface="virtual", channel="mixed", ignore_config=True) as bus:
+        bus.send(can.Message(arbitration_id=0x131, is_extended_id=False, data=bytes(4)))
+        bus.send(can.Message(arbitration_id=0x130, is_extended_id=True, data=bytes(4)))
+        bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, is_remote_frame=True))
+        bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, data=b"\1\2\3\4"))
+    wait_for(lambda: source.counts().frames + source.counts().remote_frames == 2)
+    source.stop()
+    assert source.inbox.drain(0.0).payload.tolist() == [[1, 2, 3, 4, 0, 0, 0, 0]]
