@@ -72,7 +72,8 @@ class BitField:
         """Bits (n,) as the numbers they stand for, before scale and offset."""
         if self.coding is Coding.FLOAT:
             as_integer, as_float = _FLOATS[self.length]
-            return bits.astype(as_integer).view(as_float).astype(np.float64)
+            with np.errstate(invalid="ignore"):  # a signalling NaN is a NaN all the same
+                return bits.astype(as_integer).view(as_float).astype(np.float64)
         if self.coding is Coding.SIGNED:
             sign_bit = np.uint64(1 << self.length - 1)
             return ((bits ^ sign_bit) - sign_bit).view(np.int64).astype(np.float64)
@@ -80,7 +81,8 @@ class BitField:
 
     def physical(self, bits: U64) -> F64:
         """Bits (n,) in the unit of the DBC: number x scale + offset, in that order, as cantools does it."""
-        return self.numbers(bits) * self.scale + self.offset
+        with np.errstate(over="ignore", invalid="ignore"):  # floats beyond a double become inf or NaN, as in cantools
+            return self.numbers(bits) * self.scale + self.offset
 
     @property
     def physical_range(self) -> tuple[float, float]:

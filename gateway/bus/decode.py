@@ -87,7 +87,8 @@ class Decoder:
 def _samples(mapped: MappedSignal, payload: U8) -> tuple[F64, Counter[Rejected]]:
     """SI samples (n,) of payloads (n, width), NaN where rejected, and how often for each reason."""
     bits = mapped.field.bits(payload)
-    samples = mapped.field.physical(bits) * mapped.to_si
+    with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number is rejected below
+        samples = mapped.field.physical(bits) * mapped.to_si
     slack = RANGE_TOLERANCE_STEPS * mapped.resolution if np.isfinite(mapped.resolution) else 0.0
     verdicts = (
         (Rejected.MULTIPLEXED_OUT, ~_all_hold(mapped.multiplexed_by, payload)),

@@ -104,6 +104,12 @@ def test_out_of_the_databases_range_is_no_sample(write_map):
     assert decoder.counts[Signal.SPEED].rejected == {Rejected.OUT_OF_RANGE: 2}
 
 
+def test_a_signalling_nan_is_a_nan():
+    decoder = Decoder(load_signal_map("springscale:pcan_gps"))
+    decoder.decode(frames((0x621, struct.pack("<fI", 0.0, 0x7F800001))))
+    assert decoder.counts[Signal.SPEED].rejected == {Rejected.NOT_A_NUMBER: 1}
+
+
 def test_a_float_that_is_no_number_is_no_sample():
     decoder = Decoder(load_signal_map("springscale:pcan_gps"))
     numbers = (36.0, float("nan"), float("inf"), 1e9)
