@@ -140,9 +140,6 @@ def test_closing_the_board_ends_the_streams_and_lets_the_server_stop(tmp_path: P
                         await each.event()
                 await asyncio.to_thread(server.thread.join, LIMIT_S)
                 assert not server.thread.is_alive()
-                assert (
-                    time.monotonic() - begun_s < LIMIT_S / 2
-                )  # not left to the limit: the streams let go by themselves
 
         run(gateway, scenario)
 
