@@ -1,0 +1,42 @@
+"""How fast the simulator drives: seconds of driving per second of one core.
+
+Run: python benchmarks/simulator.py
+"""
+
+import time
+
+import numpy as np
+
+from gateway.offline.wiring import Wiring
+from gateway.sim.drive import constant
+from gateway.sim.ride import ride
+from gateway.sim.road import PaperRoad, iso_road
+from gateway.sim.scenario import simulate_drive
+from gateway.sim.sensors import REFERENCE
+from gateway.sim.vans import PAPER_VAN
+from gateway.sim.vehicle import Load
+
+DRIVE_S = 900.0
+
+
+def main() -> None:
+    """Print the rate of each stage, warm."""
+    rng = np.random.default_rng(1)
+    drive, loads = constant(50.0 / 3.6, DRIVE_S, rng), (Load(270.0, 1.3),)
+    road = iso_road("B").lay(drive.travelled_m[-1] + 50.0, rng)
+    recording = simulate_drive(PAPER_VAN, loads, PaperRoad(), drive, REFERENCE, 1).recording
+    wiring = Wiring("reference")
+    stages = {
+        "vehicle alone, 1 kHz": lambda: ride(PAPER_VAN, loads, road, drive),
+        "road, vehicle, sensors": lambda: simulate_drive(PAPER_VAN, loads, iso_road("B"), drive, REFERENCE, 1),
+        "encoding to frames": lambda: wiring.frames_of(recording),
+    }
+    for name, run in stages.items():
+        run()
+        begun_s = time.process_time()
+        run()
+        print(f"{name:26s} {DRIVE_S / (time.process_time() - begun_s):8.0f} x real time")
+
+
+if __name__ == "__main__":
+    main()
