@@ -115,8 +115,8 @@ class StoreReader:
         epoch, held = self._held()
         window = _Window(
             _seq_after(cursor, epoch),
-            _FIRST_NS if since_ns is None else max(since_ns, _FIRST_NS),
-            _LAST_NS if until_ns is None else min(until_ns, _LAST_NS),
+            _FIRST_NS if since_ns is None else _within_64_bits(since_ns),
+            _LAST_NS if until_ns is None else _within_64_bits(until_ns),
             newest_first,
         )
         with self._connection() as connection:
@@ -193,6 +193,11 @@ def _seq_after(cursor: str | None, epoch: str) -> int | None:
     if not (of_epoch.isalnum() and digits.isascii() and digits.isdigit() and len(digits) < 19):
         raise ValueError(f"{cursor!r} is not a cursor: take next_cursor of an earlier answer as it is")
     return int(digits) if of_epoch == epoch else None
+
+
+def _within_64_bits(t_ns: int) -> int:
+    """Years before 1677 and after 2262 mean the first and the last instant there is."""
+    return min(max(t_ns, _FIRST_NS), _LAST_NS)
 
 
 def _stored(connection: sqlite3.Connection, window: _Window, limit: int, with_spectra: bool) -> dict[int, str]:

@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 from fastapi import APIRouter, Header, Query, Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
@@ -18,11 +19,11 @@ from gateway.web.reader import Page, Reader
 from gateway.web.schemas import EstimatesPage, Latest, problem_responses
 from gateway.web.settings import PAGE_LIMIT, WebSettings
 from gateway.web.status import Status
-from gateway.web.stream import EventStream
+from gateway.web.stream import EVENT_SCHEMA, EventStream
 
 PREFIX: Final = "/api/v1"
 JSON: Final = "application/json"
-Cursor = Annotated[str, Field(max_length=64, examples=["3f2a9c1e-1048577"])]
+Cursor = Annotated[str, Field(pattern=r"^[0-9a-z]{1,32}-[0-9]{1,18}$", examples=["3f2a9c1e-1048577"])]
 
 
 class EstimatesQuery(BaseModel):
@@ -30,10 +31,10 @@ class EstimatesQuery(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    since: Instant | None = Field(None, description="batches that end at or after this")
-    until: Instant | None = Field(None, description="batches that end before this")
+    since: Instant | SkipJsonSchema[None] = Field(None, description="batches that end at or after this")
+    until: Instant | SkipJsonSchema[None] = Field(None, description="batches that end before this")
     limit: int = Field(100, ge=1, le=PAGE_LIMIT)
-    cursor: Cursor | None = Field(None, description="next_cursor or last_cursor of an earlier answer")
+    cursor: Cursor | SkipJsonSchema[None] = Field(None, description="next_cursor or last_cursor of an earlier answer")
     order: Literal["oldest_first", "newest_first"] = "oldest_first"
     spectra: bool = Field(True, description="false leaves the spectra out")
 
@@ -73,11 +74,11 @@ def api_router(board: Board, reader: Reader, status: Callable[[], Status], setti
         "/stream",
         response_class=Response,
         responses={
-            200: {"content": {EventStream.media_type: {"schema": {"type": "string"}}}},
+            200: {"content": {EventStream.media_type: {"schema": EVENT_SCHEMA}}},
             **problem_responses(422, 503),
         },
     )
-    async def stream(last_event_id: Annotated[Cursor | None, Header()] = None) -> Response:
+    async def stream(last_event_id: Annotated[Cursor | SkipJsonSchema[None], Header()] = None) -> Response:
         """Server-sent events: estimate, rejection, provisional; data is the estimate object.
 
         With Last-Event-ID, what was missed comes first.

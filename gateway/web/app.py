@@ -8,9 +8,11 @@ from typing import Any, Final
 from fastapi import FastAPI
 from starlette.types import ASGIApp
 
+from gateway.core.calibrated import CalibratedVehicle
 from gateway.web import pages, problems
 from gateway.web.api import api_router
 from gateway.web.board import Board
+from gateway.web.export import export_router
 from gateway.web.headers import SecurityHeaders
 from gateway.web.health import health_router
 from gateway.web.latest import LatestFirst
@@ -18,6 +20,7 @@ from gateway.web.metrics import metrics_registry
 from gateway.web.reader import Reader
 from gateway.web.settings import WebSettings
 from gateway.web.status import Status
+from gateway.web.vehicle import vehicle_router
 
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
@@ -26,7 +29,11 @@ Units stand at the end of each name. Unknown is null. Errors are problem details
 
 
 def create_app(
-    board: Board, reader: Reader, status: Callable[[], Status], settings: WebSettings | None = None
+    board: Board,
+    reader: Reader,
+    status: Callable[[], Status],
+    settings: WebSettings | None = None,
+    calibrated: CalibratedVehicle | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe).
@@ -53,6 +60,8 @@ def create_app(
     )
     problems.install(app)
     app.include_router(api_router(board, reader, status, chosen))
+    app.include_router(vehicle_router(board, status, calibrated))
+    app.include_router(export_router(reader))
     app.include_router(health_router(status, metrics_registry(board, status, responses)))
     pages.install(app)
     _describe_problems(app)

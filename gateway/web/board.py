@@ -67,7 +67,7 @@ class Board:
         self._estimate: Record = _nothing_yet()
         self._rejection: Record | None = None
         self._shown = _Shown.of(self._estimate, None, None)
-        self._last_t_end: str | None = None  # of the last full batch
+        self._heard: Record = self._estimate  # the last full batch, answered or not
         self._drive_has_estimate = False
         self.fanout = Fanout()
 
@@ -87,6 +87,7 @@ class Board:
                 self._rejection = json.loads(rejection)
             if estimate is not None:
                 self._estimate = json.loads(estimate)
+            self._heard = max(self._estimate, self._rejection or self._estimate, key=lambda r: r["t_end_ns"] or 0)
             received_s = None if age_s is None or estimate is None else self._clock() - age_s
             self._shown = _Shown.of(self._estimate, self._rejection, received_s)
 
@@ -110,6 +111,12 @@ class Board:
         head = b'{"age_s":' + age + (b',"is_stale":true' if is_stale else b',"is_stale":false')
         return (f"{shown.tag}.stale" if is_stale else shown.tag), head + shown.rest
 
+    def latest_spectra(self) -> dict[str, Any]:
+        """Which batch was heard last, answered or not, and its spectra (None where it has none)."""
+        heard = self._heard
+        names = ("id", "t_start", "t_end", "rejected")
+        return {**{name: heard[name] for name in names}, "spectra": heard.get("spectra")}
+
     def _age_s(self, shown: _Shown) -> float | None:
         return None if shown.received_s is None else max(0.0, self._clock() - shown.received_s)
 
@@ -119,10 +126,10 @@ class Board:
 
     def _show(self, record: Record, now_s: float) -> None:
         kind = kind_of(record)
-        if record["t_start"] != self._last_t_end:  # batches of one drive follow one another without a gap
+        if record["t_start"] != self._heard["t_end"]:  # batches of one drive follow one another without a gap
             self._drive_has_estimate = False
         if kind != PROVISIONAL:
-            self._last_t_end = record["t_end"]
+            self._heard = record
         if kind == REJECTION:
             self._rejection = record
             self._shown = _Shown.of(self._estimate, record, self._shown.received_s)

@@ -53,9 +53,11 @@ async def _http(request: Request, error: Exception) -> Response:
 
 async def _invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    faults = [Fault(where=".".join(map(str, e["loc"])), what=_said(e["msg"])) for e in error.errors()]
-    detail = "; ".join(f"{fault.where}: {fault.what}" for fault in faults)
-    return problem_response(422, detail, request.url.path, faults)
+    said: dict[str, str] = {}
+    for fault in error.errors():  # all parameters are flat; deeper places are pydantic's own branches
+        said.setdefault(".".join(map(str, fault["loc"][:2])), fault["msg"].removeprefix("Value error, "))
+    detail = "; ".join(f"{where}: {what}" for where, what in said.items())
+    return problem_response(422, detail, request.url.path, [Fault(where=w, what=x) for w, x in said.items()])
 
 
 async def _unavailable(request: Request, error: Exception) -> Response:
@@ -64,7 +66,3 @@ async def _unavailable(request: Request, error: Exception) -> Response:
 
 async def _unforeseen(request: Request, _error: Exception) -> Response:
     return problem_response(500, "the service met an error it did not expect; its log has it", request.url.path)
-
-
-def _said(message: str) -> str:
-    return message.removeprefix("Value error, ")

@@ -4,7 +4,7 @@ import asyncio
 import json
 from collections import deque
 from collections.abc import AsyncIterator
-from typing import Final
+from typing import Any, Final
 
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
@@ -17,6 +17,17 @@ GRACE_S: Final = 0.2  # for the last words of a stream that ends
 RETRY_MS: Final = 3000
 _REPLAY_PAGE: Final = 100
 _REMEMBERED: Final = 1024  # replayed rows that may still arrive live: a row is published right after it is stored
+
+EVENT_SCHEMA: Final[dict[str, Any]] = {
+    "type": "object",
+    "description": "one server-sent event; data is JSON: an Estimate, or {detail} where the stream ends",
+    "properties": {
+        "id": {"type": "string", "description": "cursor: send it as Last-Event-ID to go on behind it"},
+        "event": {"enum": ["estimate", "rejection", "provisional", "lagged", "closing"]},
+        "data": {"type": "string"},
+    },
+    "required": ["event", "data"],
+}
 
 LAGGED: Final = (
     b'event: lagged\ndata: {"detail":"this client read too slowly; connect again with Last-Event-ID to go on"}\n\n'

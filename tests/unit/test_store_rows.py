@@ -79,6 +79,8 @@ def test_time_filters_take_the_beginning_and_leave_the_end(store: Store) -> None
     assert found.items == texts(make_record(1), make_record(2))
     everything = store.reader().estimates(since_ns=-(10**30), until_ns=10**30)
     assert len(everything.items) == 5
+    for since_ns, until_ns in ((None, -(10**30)), (10**30, None)):
+        assert store.reader().estimates(since_ns=since_ns, until_ns=until_ns).items == ()
 
 
 def test_spectra_can_be_left_out(store: Store) -> None:

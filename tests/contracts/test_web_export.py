@@ -1,0 +1,117 @@
+"""The history as a file: every batch once, whatever its length, readable by the standard tools."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+from support.estimates import make_record
+from support.web import Client, Gateway
+
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.ratio_index import Band, RatioIndexCalibration
+from gateway.core.vehicle import Vehicle
+from gateway.records import Why
+from gateway.web import Board, SignalHealth, State, Status, create_app
+from gateway.web.export import COLUMNS
+
+N_ROWS = 1203  # several pages of the store, the last one not full
+
+
+def test_every_batch_is_in_the_csv_once(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        gateway.publish(*(make_record(n, *([Why.GAP, Why.TOO_SLOW] if n % 4 == 0 else [])) for n in range(N_ROWS)))
+        answer = Client(gateway.app).get("/api/v1/export.csv")
+        assert answer.headers["content-type"] == "text/csv; charset=utf-8"
+        assert answer.headers["content-disposition"] == 'attachment; filename="springscale.csv"'
+        rows = list(csv.DictReader(io.StringIO(answer.text, newline="")))
+        assert [int(row["t_end_ns"]) for row in rows] == [make_record(n)["t_end_ns"] for n in range(N_ROWS)]
+        assert list(rows[0]) == list(COLUMNS)
+        assert rows[0]["payload_kg"] == rows[0]["payload_low95_kg"] == ""  # unknown is empty, never 0
+        assert rows[0]["rejected"] == "gap too_slow"
+        assert [float(rows[1][c]) for c in ("payload_kg", "payload_low95_kg", "payload_high95_kg")] == [101, 89, 113]
+
+
+def test_every_batch_is_in_the_json_lines_once(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        records = [make_record(n, with_spectra=True) for n in range(N_ROWS)]
+        gateway.publish(*records)
+        client = Client(gateway.app)
+        with_spectra = client.get("/api/v1/export.jsonl?spectra=true").text.splitlines()
+        assert [json.loads(line) for line in with_spectra] == records
+        plain = client.get("/api/v1/export.jsonl").text.splitlines()
+        assert [json.loads(line) for line in plain] == [make_record(n) for n in range(N_ROWS)]
+
+
+def test_a_span_is_cut_out(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        gateway.publish(*(make_record(n) for n in range(4)))
+        query = "?since=1970-01-01T00:10:00Z&until=1970-01-01T00:20:00Z"
+        lines = Client(gateway.app).get(f"/api/v1/export.jsonl{query}").text.splitlines()
+        assert [json.loads(line) for line in lines] == [make_record(1), make_record(2)]
+        empty = Client(gateway.app).get("/api/v1/export.csv?since=2026-01-01T00:00:00Z").text
+        assert empty == ",".join(COLUMNS) + "\r\n"
+
+
+@pytest.mark.parametrize("query", ["since=now", "spectra=perhaps", "limit=5"])
+def test_a_wrong_question_is_a_problem(tmp_path: Path, query: str) -> None:
+    with Gateway(tmp_path) as gateway:
+        answer = Client(gateway.app).get(f"/api/v1/export.jsonl?{query}")
+        assert (answer.status_code, answer.headers["content-type"]) == (422, "application/problem+json")
+
+
+CALIBRATED = CalibratedVehicle(
+    id="sha256:ab",
+    vehicle=Vehicle("van", 1240.0, 2.8, gross_limit_kg=1900.0),
+    payload_seen_kg=(0.0, 420.0),
+    front_share_seen_pct=(42.0, 55.0),
+    ratio_index=RatioIndexCalibration(
+        "amplitude", 512, (Band(2.4, 0.05), Band(3.25, 0.05)), None, None, None, (13.0, 15.0), 3.0
+    ),
+)
+
+
+def test_the_vehicle_is_told_with_its_calibration_and_ranges(tmp_path: Path) -> None:
+    health = SignalHealth(signal="speed", rate_hz=5.0)
+    status = Status(
+        version="1", state=State.COLLECTING, uptime_s=0.0, vehicle_id="van-17", vin="VF1" + "0" * 14, signals=(health,)
+    )
+    with Gateway(tmp_path) as gateway:
+        app = create_app(Board(), gateway.store.reader(), lambda: status, calibrated=CALIBRATED)
+        told = Client(app).get("/api/v1/vehicle").json()
+    assert (told["vehicle_id"], told["vin"]) == ("van-17", "VF1" + "0" * 14)
+    assert told["calibration"] == {
+        "id": "sha256:ab",
+        "payload_seen_kg": [0.0, 420.0],
+        "front_share_seen_pct": [42.0, 55.0],
+    }
+    assert told["figures"]["empty_mass_kg"] == 1240.0
+    assert told["figures"]["rear_axle_limit_kg"] is None
+    assert told["signals"][0]["rate_hz"] == 5.0
+
+
+def test_a_vehicle_without_calibration_says_so(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        told = Client(gateway.app).get("/api/v1/vehicle").json()
+        assert told["calibration"] is None
+        assert told["figures"] is None
+
+
+def test_the_last_spectra_are_those_of_the_last_batch_rejected_or_not(tmp_path: Path) -> None:
+    board = Board()
+    with Gateway(tmp_path) as gateway:
+        client = Client(create_app(board, gateway.store.reader(), lambda: gateway.status, calibrated=CALIBRATED))
+        assert client.get("/api/v1/spectra/latest").json()["spectra"] is None
+        board.publish(make_record(0, with_spectra=True))
+        rejected = make_record(1, Why.NO_CALIBRATION, with_spectra=True)
+        board.publish(rejected)
+        board.publish(make_record(2, is_provisional=True, with_spectra=True))
+        told = client.get("/api/v1/spectra/latest").json()
+    assert (told["id"], told["rejected"]) == (rejected["id"], ["no_calibration"])
+    assert told["spectra"] == rejected["spectra"]
+    assert told["acceleration_bands"] == [
+        {"centre_hz": 2.4, "width_hz": 0.05},
+        {"centre_hz": 3.25, "width_hz": 0.05},
+    ]
+    assert told["pitch_rate_bands"] is None
