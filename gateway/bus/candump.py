@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from gateway.bus.candump_line import LineFrame, NotData, read_line
 from gateway.bus.candump_shape import LineShape, learn_shape
-from gateway.bus.frames import in_order, take
+from gateway.bus.frames import gathered, in_order, take
 from gateway.bus.line_blocks import BLOCK_BYTES, LineBlock, line_blocks
 from gateway.bus.log_report import LogReject, LogReport
 from gateway.bus.mapping import CLASSIC_BYTES, IdFilter
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
+CHUNK_FRAMES: Final = 32_768  # what is handed on at once: large enough that the decoder's own steps cost little
 KEPT_SHAPES: Final = 32
 LONGEST_LINE: Final = 4096  # what an exact read looks at
 _LOWER_CASE: Final = np.uint64(0x2020_2020_2020_2020)
@@ -42,10 +43,7 @@ def read_candump(
     """
     report = LogReport(Path(path)) if report is None else report
     reader = _Reader(filters, channel, width, report)
-    for block in line_blocks(Path(path), report, block_bytes):
-        frames = reader.read(block)
-        if len(frames):
-            yield frames
+    yield from gathered(map(reader.read, line_blocks(Path(path), report, block_bytes)), CHUNK_FRAMES, width)
 
 
 class IdPattern:
@@ -187,8 +185,8 @@ class _Reader:
 def _marks(lines: U8) -> I64:
     """Where the marks between identifier and payload stand; the two characters of a CAN FD ## are one."""
     hashes = np.flatnonzero(lines == ord("#"))
-    is_second = np.diff(hashes, prepend=-2) == 1
-    return hashes[~is_second] if is_second.any() else hashes
+    follows_another = hashes[1:] - hashes[:-1] == 1
+    return np.delete(hashes, np.flatnonzero(follows_another) + 1) if follows_another.any() else hashes
 
 
 def _line_around(block: LineBlock, at: int) -> bytes:

@@ -65,10 +65,8 @@ class LineShape:
         n_columns = len(self.template)
         starts = np.ndarray(len(text) - n_columns + 1, f"V{n_columns}", buffer=text, strides=(1,))
         rows = starts[hashes - self.hash_at].view(np.uint8).reshape(-1, n_columns)
-        lines = np.ascontiguousarray(rows.T)  # one row a column of the line: every step below runs along one
-        fits = (lines[self.literals] == self.template[self.literals, None]).all(axis=0)
-        if not fits.all():
-            lines = lines[:, fits]
+        fits = (rows[:, self.literals] == self.template[self.literals]).all(axis=1)
+        lines = np.ascontiguousarray(rows[fits].T)  # one row a column of the line: every step below runs along one
         t_ns, has_stamp = self._stamps(lines)
         can_id, has_id = self._identifiers(lines)
         payload, has_payload = self._payloads(lines, width)
@@ -86,7 +84,7 @@ class LineShape:
         seconds = seconds_weights @ digits[: self.n_seconds].astype(np.float64)
         fraction_ns = fraction_weights @ digits[self.n_seconds :].astype(np.float64)
         t_ns = seconds.astype(np.int64) * NS_PER_S + fraction_ns.astype(np.int64)
-        return t_ns, (digits <= 9).all(axis=0) & (seconds <= LAST_SECOND)
+        return t_ns, (np.maximum.reduce(digits) <= 9) & (seconds <= LAST_SECOND)
 
     def _identifiers(self, lines: U8) -> tuple[U32, Bool]:
         nibbles = _NIBBLES[lines[self.hash_at - self.n_id : self.hash_at]]
@@ -94,7 +92,7 @@ class LineShape:
         for row in nibbles:
             can_id = (can_id << np.uint32(4)) | row
         last = np.uint32(0x1FFF_FFFF if self.n_id == 8 else 0x7FF)
-        is_sound = (nibbles != _NOT_HEX).all(axis=0) & (can_id <= last)
+        is_sound = (np.maximum.reduce(nibbles) != _NOT_HEX) & (can_id <= last)
         return can_id | np.uint32(EXTENDED_ID if self.n_id == 8 else 0), is_sound
 
     def _payloads(self, lines: U8, width: int) -> tuple[U8, Bool]:
@@ -103,7 +101,7 @@ class LineShape:
         payload = np.zeros((lines.shape[1], width), np.uint8)
         kept = min(self.n_payload, width)
         payload[:, :kept] = ((nibbles[0::2] << np.uint8(4)) | nibbles[1::2])[:kept].T
-        is_sound: Bool = (nibbles != _NOT_HEX).all(axis=0)
+        is_sound: Bool = np.maximum.reduce(nibbles, initial=0) != _NOT_HEX
         return payload, is_sound
 
 

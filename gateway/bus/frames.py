@@ -1,6 +1,6 @@
 """Columns of frames: taken apart, put together."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -29,6 +29,21 @@ def join(parts: Sequence[Frames], width: int) -> Frames:
         np.concatenate([part.length for part in parts]),
         np.concatenate([part.payload for part in parts]),
     )
+
+
+def gathered(chunks: Iterable[Frames], n: int, width: int) -> Iterator[Frames]:
+    """The same frames in chunks of at least ``n``; only the last may hold fewer, and none is empty."""
+    parts: list[Frames] = []
+    n_waiting = 0
+    for chunk in chunks:
+        if len(chunk):
+            parts.append(chunk)
+            n_waiting += len(chunk)
+        if n_waiting >= n:
+            yield join(parts, width)
+            parts, n_waiting = [], 0
+    if parts:
+        yield join(parts, width)
 
 
 def in_order(places: Sequence[I64], parts: Sequence[Frames], width: int) -> Frames:
