@@ -1,0 +1,169 @@
+"""Calibration of the cross-spectral estimator: a half-car fitted to drives of known load.
+
+    calibrate_cross_spectrum(runs, vehicle) -> CrossSpectrumCalibration
+
+The parameters are those most probable given all runs together, under priors any road vehicle
+would meet. Leaving out one run at a time then shows how far the intervals must be widened to be
+true of loads that calibration has not seen.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from gateway.calibration.grey_box_prior import Prior, prior_of
+from gateway.core.cross_spectra import CrossSpectra, cross_spectra_of
+from gateway.core.cross_spectrum import CrossSpectrumCalibration, locate
+from gateway.core.grey_model import PARAMETERS, Ground
+from gateway.core.known_run import KnownRun
+from gateway.core.likelihood import Curvature, Point, Whittle
+from gateway.core.map_fit import Found, most_probable
+from gateway.core.vehicle import Vehicle
+from gateway.errors import CalibrationImpossibleError
+from gateway.records import F64
+
+BAND_HZ: Final = (1.1, 16.0)
+N_SEGMENT: Final = 256
+LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
+UNTESTED_INFLATION: Final = 2.0  # where no run can be left out
+MISFIT_MARGIN: Final = 3.0
+SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
+UNTESTED: Final = "intervals_untested"
+
+_STARTS: Final = ((0.0, 0.0), (0.4, 0.3), (-0.4, -0.3))  # log springs, log dampers, off the prior's centre
+
+
+class _Known:
+    """A run's spectra with its truth."""
+
+    def __init__(self, run: KnownRun, vehicle: Vehicle, spectra: CrossSpectra) -> None:
+        ground = Ground(vehicle.empty_mass_kg, vehicle.empty_front_share_pct / 100.0, vehicle.wheelbase_m)
+        self.run = run
+        self.spectra = spectra
+        self.whittle = Whittle(spectra, ground)
+
+    def at(self, theta: F64) -> Point:
+        return Point(theta, self.run.payload_kg, self.run.front_share_pct / 100.0)
+
+
+def calibrate_cross_spectrum(
+    runs: Sequence[KnownRun], vehicle: Vehicle, progress: Callable[[int, int], None] | None = None
+) -> CrossSpectrumCalibration:
+    """Fit the half-car to ``runs``; one empty run is enough, then with the warning ``springs_from_priors``.
+
+    ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError where no
+    run holds enough steady driving.
+    """
+    known = _usable(runs, vehicle)
+    prior = prior_of(vehicle)
+    can_leave_out = len(known) >= LEAST_RUNS_TO_LEAVE_ONE_OUT
+    n_steps = 1 + len(known) * can_leave_out
+    found = _best_fit(known, prior)
+    _tell(progress, 1, n_steps)
+    calibration = _calibration(known, vehicle, found)
+    if not can_leave_out:
+        return replace(calibration, warnings=(*calibration.warnings, UNTESTED))
+    errors = []
+    for left_out, one in enumerate(known):
+        others = [k for k in known if k is not one]
+        refound = _fit(others, prior, found.x)
+        errors.append(_left_out_errors(one, vehicle, _calibration(others, vehicle, refound)))
+        _tell(progress, 2 + left_out, n_steps)
+    payload_z, share_z, misfits = (np.array(column) for column in zip(*sum(errors, []), strict=True))
+    return replace(
+        calibration,
+        payload_inflation=_inflation(payload_z),
+        front_share_inflation=_inflation(share_z),
+        misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.max(misfits))),
+    )
+
+
+def _tell(progress: Callable[[int, int], None] | None, done: int, n_steps: int) -> None:
+    if progress is not None:
+        progress(done, n_steps)
+
+
+def _usable(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[_Known]:
+    known = []
+    for run in runs:
+        batches = [batch for batch in run.batches if not batch.rejected]
+        spectra = cross_spectra_of(batches, vehicle.wheelbase_m, BAND_HZ, N_SEGMENT)
+        if spectra is not None:
+            known.append(_Known(run, vehicle, spectra))
+    if not known:
+        raise CalibrationImpossibleError(
+            "no run holds enough steady driving for the cross-spectral estimator: drive at least a minute at speed"
+        )
+    return known
+
+
+def _best_fit(known: list[_Known], prior: Prior) -> Found:
+    """The best of several starts: the posterior need not have one peak."""
+    return min((_fit(known, prior, prior.start(*shift)) for shift in _STARTS), key=lambda found: found.cost)
+
+
+def _fit(known: list[_Known], prior: Prior, start: F64) -> Found:
+    everything = list(range(len(PARAMETERS)))
+
+    def cost(theta: F64) -> float:
+        return sum(k.whittle.cost(k.at(theta)) for k in known)
+
+    def curvature(theta: F64) -> Curvature:
+        parts = [k.whittle.curvature(k.at(theta), everything, is_load_free=False) for k in known]
+        return Curvature(
+            cost=sum(part.cost for part in parts),
+            gradient=np.sum([part.gradient for part in parts], axis=0),
+            information=np.sum([part.information for part in parts], axis=0),
+        )
+
+    return most_probable(start, prior.mean, prior.std, cost, curvature, tolerance=0.05)
+
+
+def _calibration(known: list[_Known], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
+    runs = [k.run for k in known]
+    payloads, shares = [r.payload_kg for r in runs], [r.front_share_pct for r in runs]
+    speeds = np.concatenate([vehicle.wheelbase_m / k.spectra.delay_s[:, 0] for k in known])
+    misfits = [k.whittle.misfit(k.at(found.x)) for k in known]
+    return CrossSpectrumCalibration(
+        empty_mass_kg=vehicle.empty_mass_kg,
+        empty_front_share_pct=vehicle.empty_front_share_pct,
+        wheelbase_m=vehicle.wheelbase_m,
+        band_hz=BAND_HZ,
+        n_segment=N_SEGMENT,
+        names=PARAMETERS,
+        parameters=found.x,
+        covariance=found.covariance,
+        payload_inflation=UNTESTED_INFLATION,
+        front_share_inflation=UNTESTED_INFLATION,
+        misfit_limit=MISFIT_MARGIN * float(np.nanmax(misfits)),
+        acceleration_rms_mps2=float(np.median([k.spectra.acceleration_rms_mps2 for k in known])),
+        pitch_rate_rms_radps=float(np.median([k.spectra.pitch_rate_rms_radps for k in known])),
+        payload_seen_kg=(min(payloads), max(payloads)),
+        front_share_seen_pct=(min(shares), max(shares)),
+        speed_seen_mps=(float(speeds.min()), float(speeds.max())),
+        warnings=(SPRINGS_FROM_PRIORS,) if len({*payloads}) == 1 else (),
+    )
+
+
+def _left_out_errors(
+    one: _Known, vehicle: Vehicle, calibration: CrossSpectrumCalibration
+) -> list[tuple[float, float, float]]:
+    """(payload error, share error) in their own standard deviations and the misfit, for each batch of a run not fitted."""
+    errors = []
+    for batch in one.run.batches:
+        spectra = cross_spectra_of([batch], vehicle.wheelbase_m, BAND_HZ, N_SEGMENT)
+        if spectra is None or batch.rejected:
+            continue
+        located = locate(spectra, calibration)
+        std = np.sqrt(np.diag(located.load_covariance))
+        payload_z = (located.point.payload_kg - one.run.payload_kg) / std[0]
+        share_z = (located.point.front_share - one.run.front_share_pct / 100.0) / std[1]
+        errors.append((payload_z, share_z, located.misfit))
+    return errors
+
+
+def _inflation(z: F64) -> float:
+    """Root mean square of errors in their own standard deviations, never below one."""
+    return max(1.0, float(np.sqrt(np.mean(z**2))))

@@ -1,0 +1,94 @@
+"""What any road vehicle's suspension is like, before it has been driven: weak log-normal priors.
+
+Body bounce near 1.3 Hz, damping near 0.3 of critical, tyres about ten times stiffer than springs,
+unsprung mass about 6 % of the sprung per axle, radius of gyration in pitch about 0.46 wheelbase
+(T. D. Gillespie, Fundamentals of Vehicle Dynamics, ch. 5).
+"""
+
+from dataclasses import dataclass
+from math import log, pi
+from typing import Final
+
+import numpy as np
+
+from gateway.core.grey_model import INDEX, PARAMETERS
+from gateway.core.vehicle import Vehicle
+from gateway.records import F64
+
+BOUNCE_HZ: Final = 1.35
+DAMPING_RATIO: Final = 0.3
+TYRE_NPM: Final = 400e3  # both tyres of an axle of a 1250 kg vehicle; scales with mass
+MOUNT_NPM: Final = 500e3
+UNSPRUNG_SHARE: Final = 0.065
+GYRATION_PER_WHEELBASE: Final = 0.46
+SLACK: Final = 0.03
+
+_LOG_STD: Final = {
+    "spring": 0.35,
+    "damper": 0.5,
+    "damper_mount": 1.0,
+    "tyre": 0.3,
+    "unsprung": 0.3,
+    "pitch_inertia": 0.25,
+    "payload_gyration": 0.7,
+    "payload_mode": 0.6,
+    "payload_damping": 0.5,
+    "slack": 1.0,
+}
+WEIGHED_STD: Final = 0.1  # of an unsprung mass that the campaign gives
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """Independent Gaussians over the parameter vector: mean and std (p,)."""
+
+    mean: F64
+    std: F64
+
+    def start(self, log_springs: float, log_dampers: float) -> F64:
+        """The centre, with springs and dampers moved by these logarithms."""
+        theta = self.mean.copy()
+        for end in ("front", "rear"):
+            theta[INDEX[f"spring_{end}_npm"]] += log_springs
+            theta[INDEX[f"damper_{end}_nspm"]] += log_dampers
+        return theta
+
+
+def prior_of(vehicle: Vehicle) -> Prior:
+    """The prior of a vehicle from its mass, wheelbase, share and sensor position."""
+    entries = _body(vehicle) | _axle("front", vehicle) | _axle("rear", vehicle)
+    entries |= {name: (log(SLACK), _LOG_STD["slack"]) for name in PARAMETERS if name.startswith("slack_")}
+    mean, std = np.array([entries[name] for name in PARAMETERS]).T
+    return Prior(mean, std)
+
+
+def _body(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
+    inertia = vehicle.empty_mass_kg * (GYRATION_PER_WHEELBASE * vehicle.wheelbase_m) ** 2
+    return {
+        "pitch_inertia_kgm2": (log(inertia), _LOG_STD["pitch_inertia"]),
+        "sensor_position_m": (vehicle.sensor_position_m, vehicle.sensor_position_std_m),
+        "payload_gyration_m2": (log(0.1), _LOG_STD["payload_gyration"]),
+        "payload_mode_hz": (log(25.0), _LOG_STD["payload_mode"]),
+        "payload_damping_ratio": (log(0.15), _LOG_STD["payload_damping"]),
+        "gyro_lag_s": (0.0, 0.003),
+        "delay_scale": (0.0, 0.02),
+    }
+
+
+def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
+    share = vehicle.empty_front_share_pct / 100.0
+    sprung_kg = vehicle.empty_mass_kg * (share if end == "front" else 1.0 - share)
+    spring_npm = sprung_kg * (2.0 * pi * BOUNCE_HZ) ** 2 * 1.15  # in series with the tyre
+    damper_nspm = 2.0 * DAMPING_RATIO * (spring_npm * sprung_kg) ** 0.5
+    given_kg = vehicle.unsprung_front_kg if end == "front" else vehicle.unsprung_rear_kg
+    unsprung_kg = given_kg or UNSPRUNG_SHARE * vehicle.empty_mass_kg
+    scale = vehicle.empty_mass_kg / 1250.0
+    return {
+        f"spring_{end}_npm": (log(spring_npm), _LOG_STD["spring"]),
+        f"damper_{end}_nspm": (log(damper_nspm), _LOG_STD["damper"]),
+        f"damper_mount_{end}_npm": (log(MOUNT_NPM * scale), _LOG_STD["damper_mount"]),
+        f"tyre_{end}_npm": (log(TYRE_NPM * scale), _LOG_STD["tyre"]),
+        f"unsprung_{end}_kg": (log(unsprung_kg), WEIGHED_STD if given_kg else _LOG_STD["unsprung"]),
+        f"spring_slope_{end}_per_kn": (0.05, 0.07),
+        f"spring_curvature_{end}_per_kn2": (0.0, 0.03),
+    }

@@ -1,0 +1,151 @@
+"""What the likelihood needs of a drive: cross-spectra of the two sensors, grouped by speed.
+
+Segments are short, tapered, detrended, and never cross a masked sample. Each is divided by its own
+power, so that a rough stretch does not drown the others. The road reaches the rear axle later than
+the front by the wheelbase over the speed; the phase of that delay is averaged over the speeds driven
+inside each segment, because averaged spectra hold averaged phases.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
+from gateway.records import C128, F64, I64, Batch
+
+SPEED_BIN = 0.03  # relative width of a group of segments
+SPEED_CHANGE_MAX_MPS2 = 0.3  # braking and pulling away pitch the body without any road
+SPEED_SAMPLE_STEP = 8
+LEAST_SEGMENTS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class CrossSpectra:
+    """Mean spectral matrices of b groups of segments at m frequencies, each segment divided by its power.
+
+    freq_hz (m + 2,) has one guard frequency at either end; acceleration, pitch_rate (b, m) are
+    auto-spectra, cross (b, m) is pitch rate times the conjugate of acceleration; delay_phase
+    (b, m + 2) is the mean of exp(-j 2 pi f l / v), delay_s (b, 1) the mean of l / v and n_segments
+    (b, 1) the number of segments in each group. The two root mean squares are of the segments
+    before division, in m/s2 and rad/s within the band.
+    """
+
+    freq_hz: F64
+    acceleration: F64
+    pitch_rate: F64
+    cross: C128
+    delay_phase: C128
+    delay_s: F64
+    n_segments: F64
+    acceleration_rms_mps2: float
+    pitch_rate_rms_radps: float
+
+    @property
+    def n_total(self) -> int:
+        """Segments in all."""
+        return int(self.n_segments.sum())
+
+    @property
+    def coherence(self) -> F64:
+        """(m,) coherence of the two sensors over all segments, 0..1."""
+        cross = np.abs(np.sum(self.n_segments * self.cross, axis=0)) ** 2
+        auto = np.sum(self.n_segments * self.acceleration, axis=0) * np.sum(self.n_segments * self.pitch_rate, axis=0)
+        return cross / auto
+
+    def with_pitch_reversed(self) -> "CrossSpectra":
+        """As if the pitch rate had the other sign."""
+        return CrossSpectra(
+            self.freq_hz,
+            self.acceleration,
+            self.pitch_rate,
+            -self.cross,
+            self.delay_phase,
+            self.delay_s,
+            self.n_segments,
+            self.acceleration_rms_mps2,
+            self.pitch_rate_rms_radps,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Segments:
+    """Transforms (k, m + 2) of k segments and their wheelbase delays (k, t)."""
+
+    acceleration: C128
+    pitch_rate: C128
+    delays_s: F64
+
+
+def cross_spectra_of(
+    batches: Iterable[Batch], wheelbase_m: float, band_hz: tuple[float, float], n_segment: int
+) -> CrossSpectra | None:
+    """Cross-spectra of all usable segments of ``batches``; None where there are fewer than six.
+
+    ``band_hz`` is inclusive; all batches share one rate.
+    """
+    parts: list[_Segments] = []
+    freq_hz = np.empty(0)
+    for batch in batches:
+        every_hz = frequencies_hz(n_segment, batch.rate_hz)
+        step_hz = every_hz[1]
+        kept = np.flatnonzero((every_hz >= band_hz[0] - step_hz) & (every_hz <= band_hz[1] + step_hz))
+        freq_hz = every_hz[kept]
+        parts.append(_segments(batch, wheelbase_m, kept, n_segment))
+    if sum(len(part.delays_s) for part in parts) < LEAST_SEGMENTS:
+        return None
+    joined = _Segments(
+        np.concatenate([p.acceleration for p in parts]),
+        np.concatenate([p.pitch_rate for p in parts]),
+        np.concatenate([p.delays_s for p in parts]),
+    )
+    return _grouped(joined, freq_hz, n_segment)
+
+
+def _segments(batch: Batch, wheelbase_m: float, kept: I64, n_segment: int) -> _Segments:
+    starts = segment_starts(batch.usable, n_segment, n_segment // 2)
+    if starts.size:
+        speeds_mps = np.lib.stride_tricks.sliding_window_view(batch.speed_mps, n_segment)[starts]
+        is_steady = np.ptp(speeds_mps, axis=1) < SPEED_CHANGE_MAX_MPS2 * n_segment / batch.rate_hz
+        starts, speeds_mps = starts[is_steady], speeds_mps[is_steady]
+    if not starts.size:
+        nothing = np.empty((0, len(kept)), np.complex128)
+        return _Segments(nothing, nothing, np.empty((0, len(range(0, n_segment, SPEED_SAMPLE_STEP)))))
+    return _Segments(
+        segment_transforms(batch.vertical_acceleration_mps2, starts, n_segment, batch.rate_hz)[:, kept],
+        segment_transforms(batch.pitch_rate_radps, starts, n_segment, batch.rate_hz)[:, kept],
+        wheelbase_m / speeds_mps[:, ::SPEED_SAMPLE_STEP],
+    )
+
+
+def _grouped(segments: _Segments, freq_hz: F64, n_segment: int) -> CrossSpectra:
+    weight = np.hanning(n_segment + 1)[:-1:SPEED_SAMPLE_STEP] ** 2
+    weight = weight / weight.sum()
+    mean_delay_s = segments.delays_s @ weight
+    phase = np.exp(-2j * np.pi * segments.delays_s[:, :, None] * freq_hz)
+    phase_k = np.einsum("t,ktf->kf", weight, phase)
+    group = np.round(np.log(mean_delay_s) / SPEED_BIN).astype(np.int64)
+    labels, member = np.unique(group, return_inverse=True)
+    n_segments = np.bincount(member).astype(float)[:, None]
+
+    def mean(per_segment: F64 | C128) -> F64 | C128:
+        total = np.zeros((len(labels), per_segment.shape[1]), per_segment.dtype)
+        np.add.at(total, member, per_segment)
+        return total / n_segments
+
+    inner = slice(1, -1)
+    a, g = segments.acceleration[:, inner], segments.pitch_rate[:, inner]
+    power_a, power_g = np.mean(np.abs(a) ** 2, axis=1), np.mean(np.abs(g) ** 2, axis=1)
+    divisor = np.maximum(np.sqrt(power_a * power_g), np.finfo(float).tiny)[:, None]
+    width_hz = float(freq_hz[-2] - freq_hz[1])
+    return CrossSpectra(
+        freq_hz=freq_hz,
+        acceleration=np.real(mean(np.abs(a) ** 2 / divisor)),
+        pitch_rate=np.real(mean(np.abs(g) ** 2 / divisor)),
+        cross=np.asarray(mean(g * np.conj(a) / divisor), np.complex128),
+        delay_phase=np.asarray(mean(phase_k), np.complex128),
+        delay_s=np.real(mean(mean_delay_s[:, None])),
+        n_segments=n_segments,
+        acceleration_rms_mps2=float(np.sqrt(power_a.mean() * width_hz)),
+        pitch_rate_rms_radps=float(np.sqrt(power_g.mean() * width_hz)),
+    )

@@ -1,0 +1,233 @@
+"""The cross-spectral estimator: payload and front share from both sensors together, phase included.
+
+    CrossSpectrum().estimate(batch, calibration) -> Estimate
+
+Both sensors ride on one vehicle over one road, so their ratio at each frequency and speed does not
+depend on the road. The half-car calibrated by known-load drives is held against the batch's
+cross-spectra; payload and share are what fits best, together with small changes of dampers and of
+the wheelbase delay. The posterior gives the interval, widened by what left-out runs showed in
+calibration. docs/method.md has the derivation.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.core.cross_spectra import CrossSpectra, cross_spectra_of
+from gateway.core.grey_model import INDEX, PARAMETERS, Ground
+from gateway.core.likelihood import Curvature, Point, Whittle
+from gateway.core.map_fit import Found, most_probable
+from gateway.records import F64, Batch, Estimate, Why
+
+DRIFT_STD: Final = {"damper_front_nspm": 0.05, "damper_rear_nspm": 0.05, "delay_scale": 0.005}
+DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
+EVIDENCE_WEIGHT: Final = 0.6  # of the likelihood at run time: model error is shared by neighbouring frequencies
+START_PAYLOAD_SHARES: Final = (0.0, 0.12, 0.24, 0.36)  # of the empty mass
+START_POSITION_SHARES: Final = (0.25, 0.5, 0.9)  # of the wheelbase
+
+COHERENCE_BAND_HZ: Final = (1.4, 4.5)
+LEAST_COHERENCE: Final = 0.35
+LEAST_POWER_SHARE: Final = 0.05  # of the calibrated amplitude
+MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
+Z95: Final = 1.959964
+
+
+@dataclass(frozen=True, slots=True)
+class CrossSpectrumCalibration:
+    """What known-load drives taught, as plain numbers and arrays.
+
+    parameters (p,) and covariance (p, p) follow ``names`` (grey_model.PARAMETERS; logarithms where
+    these are positive quantities). The inflations widen standard deviations; misfit_limit is the
+    largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
+    root mean squares within the band.
+    """
+
+    empty_mass_kg: float
+    empty_front_share_pct: float
+    wheelbase_m: float
+    band_hz: tuple[float, float]
+    n_segment: int
+    names: tuple[str, ...]
+    parameters: F64
+    covariance: F64
+    payload_inflation: float
+    front_share_inflation: float
+    misfit_limit: float
+    acceleration_rms_mps2: float
+    pitch_rate_rms_radps: float
+    payload_seen_kg: tuple[float, float]
+    front_share_seen_pct: tuple[float, float]
+    speed_seen_mps: tuple[float, float]
+    warnings: tuple[str, ...] = ()
+    version: int = 1
+
+    @property
+    def ground(self) -> Ground:
+        """The vehicle as stated, in the core's terms."""
+        return Ground(self.empty_mass_kg, self.empty_front_share_pct / 100.0, self.wheelbase_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """The best point of a batch with its covariance of (payload in kg, front share 0..1), not yet inflated."""
+
+    point: Point
+    load_covariance: F64
+    misfit: float
+    is_reversed: bool
+
+
+class CrossSpectrum:
+    """The estimator behind the common interface."""
+
+    name = "cross_spectrum"
+
+    def estimate(self, batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
+        """Payload and front share of one batch with 95 % intervals, or the reasons why not."""
+        if batch.rejected:
+            return _answer(batch, rejected=batch.rejected)
+        spectra = cross_spectra_of([batch], calibration.wheelbase_m, calibration.band_hz, calibration.n_segment)
+        why = _unfit(batch, spectra, calibration)
+        if spectra is None or why is not None:
+            return _answer(batch, rejected=(why or Why.TOO_SHORT,))
+        located = locate(spectra, calibration)
+        return _judged(batch, spectra, located, calibration)
+
+
+def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Located:
+    """The most probable load of ``spectra`` under a flat prior on payload and share."""
+    whittle = Whittle(spectra, calibration.ground, EVIDENCE_WEIGHT)
+    found = _fit_load(whittle, calibration)
+    point = _point(found.x, calibration)
+    reverse = Whittle(spectra.with_pitch_reversed(), calibration.ground, EVIDENCE_WEIGHT)
+    return Located(
+        point=point,
+        load_covariance=_load_covariance(whittle, point, found, calibration),
+        misfit=whittle.misfit(point) / EVIDENCE_WEIGHT,
+        is_reversed=reverse.cost(point) < whittle.cost(point),
+    )
+
+
+def _point(x: F64, calibration: CrossSpectrumCalibration) -> Point:
+    theta = calibration.parameters.copy()
+    theta[DRIFTING] = x[:-2]
+    return Point(theta, float(x[-2]), float(x[-1]))
+
+
+def _fit_load(whittle: Whittle, calibration: CrossSpectrumCalibration) -> Found:
+    """Drift parameters, then payload (kg) and front share (0..1), from the best of a few starting loads."""
+    usual = calibration.parameters[DRIFTING]
+    prior_mean = np.r_[usual, 0.0, 0.0]
+    prior_std = np.r_[list(DRIFT_STD.values()), np.inf, np.inf]
+
+    def cost(x: F64) -> float:
+        return whittle.cost(_point(x, calibration))
+
+    def curvature(x: F64) -> Curvature:
+        return whittle.curvature(_point(x, calibration), DRIFTING, is_load_free=True)
+
+    starts = [np.r_[usual, load] for load in _starting_loads(calibration)]
+    return most_probable(min(starts, key=cost), prior_mean, prior_std, cost, curvature)
+
+
+def _starting_loads(calibration: CrossSpectrumCalibration) -> list[tuple[float, float]]:
+    """(payload in kg, front share 0..1) for a few loads at a few places."""
+    empty_kg, share = calibration.empty_mass_kg, calibration.empty_front_share_pct / 100.0
+    loads = []
+    for payload_kg in (empty_kg * part for part in START_PAYLOAD_SHARES):
+        for position in START_POSITION_SHARES if payload_kg else (0.5,):
+            front_kg = share * empty_kg + (1.0 - position) * payload_kg
+            loads.append((payload_kg, front_kg / (empty_kg + payload_kg)))
+    return loads
+
+
+def _load_covariance(whittle: Whittle, point: Point, found: Found, calibration: CrossSpectrumCalibration) -> F64:
+    """Covariance (2, 2) of payload and share: the batch's own, and what calibration left open.
+
+    With x the fitted and t the other parameters, x moves by -C I_xt for each t: the calibration's
+    covariance of t comes in through that.
+    """
+    fitted = [*DRIFTING, len(PARAMETERS), len(PARAMETERS) + 1]
+    others = [i for i in range(len(PARAMETERS)) if i not in DRIFTING]
+    information = whittle.curvature(point, list(range(len(PARAMETERS))), is_load_free=True).information
+    moves = found.covariance @ information[np.ix_(fitted, others)]
+    covariance = found.covariance + moves @ calibration.covariance[np.ix_(others, others)] @ moves.T
+    return covariance[-2:, -2:]
+
+
+def _unfit(batch: Batch, spectra: CrossSpectra | None, calibration: CrossSpectrumCalibration) -> Why | None:
+    """Why there is no point in fitting, if so."""
+    if spectra is None:
+        needed_n = 4 * calibration.n_segment
+        return Why.SPEED_SPREAD if np.count_nonzero(batch.usable) > needed_n else Why.TOO_SHORT
+    if (
+        spectra.acceleration_rms_mps2 < LEAST_POWER_SHARE * calibration.acceleration_rms_mps2
+        or spectra.pitch_rate_rms_radps < LEAST_POWER_SHARE * calibration.pitch_rate_rms_radps
+    ):
+        return Why.NOT_ENOUGH_EXCITATION
+    freq_hz = spectra.freq_hz[1:-1]
+    seen = (freq_hz >= COHERENCE_BAND_HZ[0]) & (freq_hz <= COHERENCE_BAND_HZ[1])
+    return Why.SENSOR_DISAGREEMENT if float(np.mean(spectra.coherence[seen])) < LEAST_COHERENCE else None
+
+
+def _judged(
+    batch: Batch, spectra: CrossSpectra, located: Located, calibration: CrossSpectrumCalibration
+) -> Estimate:
+    payload_var, share_var = np.diag(located.load_covariance)
+    payload_std_kg = calibration.payload_inflation * math.sqrt(payload_var)
+    share_std_pct = calibration.front_share_inflation * 100.0 * math.sqrt(share_var)
+    diagnostics = {
+        "misfit": located.misfit,
+        "n_segments": float(spectra.n_total),
+        "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
+        "damper_rear_ratio": _ratio(located, calibration, "damper_rear_nspm"),
+        "delay_scale": float(located.point.theta[INDEX["delay_scale"]]),
+    }
+    why = _disbelieved(located, payload_std_kg, calibration)
+    if why is not None:
+        return _answer(batch, rejected=(why,), diagnostics=diagnostics)
+    payload_kg, share_pct = located.point.payload_kg, 100.0 * located.point.front_share
+    return _answer(
+        batch,
+        payload_kg=payload_kg,
+        payload_std_kg=payload_std_kg,
+        payload_interval95_kg=_interval(payload_kg, payload_std_kg),
+        front_share_pct=share_pct,
+        front_share_std_pct=share_std_pct,
+        front_share_interval95_pct=_interval(share_pct, share_std_pct),
+        diagnostics=diagnostics,
+    )
+
+
+def _disbelieved(located: Located, payload_std_kg: float, calibration: CrossSpectrumCalibration) -> Why | None:
+    if located.is_reversed:
+        return Why.WRONG_SIGN
+    if not located.misfit <= calibration.misfit_limit:
+        return Why.MODEL_MISFIT
+    if not payload_std_kg <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:
+        return Why.NOT_ENOUGH_EXCITATION
+    return None
+
+
+def _ratio(located: Located, calibration: CrossSpectrumCalibration, name: str) -> float:
+    return math.exp(located.point.theta[INDEX[name]] - calibration.parameters[INDEX[name]])
+
+
+def _interval(centre: float, std: float) -> tuple[float, float]:
+    return centre - Z95 * std, centre + Z95 * std
+
+
+def _answer(batch: Batch, **found: object) -> Estimate:
+    return Estimate(  # type: ignore[arg-type]  # the keywords are Estimate's own, from this module alone
+        t_start_ns=batch.t_start_ns,
+        t_end_ns=batch.t_end_ns,
+        estimator=CrossSpectrum.name,
+        mean_speed_mps=batch.mean_speed_mps,
+        gap_share=batch.gap_share,
+        usable_share=batch.usable_share,
+        shares={str(why): share for why, share in batch.shares.items()},
+        is_provisional=batch.is_provisional,
+        **found,
+    )

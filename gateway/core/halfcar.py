@@ -1,0 +1,149 @@
+"""A linear half-car that meets one road twice: first with the front axle, one wheelbase later with the rear.
+
+Heave and pitch of a rigid body on two axles, each a spring, a damper in series with its elastic
+mount, an unsprung mass and a tyre. The payload is a point mass with its own inertia, carried on a
+floor that gives a little. The body is described by the vertical positions of its points over the two
+axles, in which coordinates the suspension is diagonal and the payload enters without dividing by it.
+
+Fields may be numbers or arrays that broadcast against frequency, so that many vehicles are solved at once.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gateway.records import C128, F64
+from gateway.units import STANDARD_GRAVITY_MPS2
+
+Real = float | F64
+
+INVERSE_PAYLOAD_KG = 30.0  # 1/L becomes L / (L^2 + this^2): an empty vehicle has no payload position
+
+
+@dataclass(frozen=True, slots=True)
+class Axle:
+    """Both wheels of one axle together. The spring stiffens with added static load W (kN) as exp(slope W + curvature W^2)."""
+
+    spring_npm: Real
+    spring_slope_per_kn: Real
+    spring_curvature_per_kn2: Real
+    damper_nspm: Real
+    damper_mount_npm: Real
+    tyre_npm: Real
+    unsprung_kg: Real
+
+
+@dataclass(frozen=True, slots=True)
+class HalfCar:
+    """A vehicle on a straight road, without its payload. Masses are of the sprung mass, share 0..1.
+
+    payload_gyration_m2 is the payload's squared radius of gyration in pitch; payload_mode_hz and
+    payload_damping_ratio say how it moves against the floor; gyro_lag_s is by how much the pitch
+    rate comes later than the acceleration.
+    """
+
+    empty_mass_kg: float
+    empty_front_share: float
+    wheelbase_m: float
+    front: Axle
+    rear: Axle
+    pitch_inertia_kgm2: Real
+    sensor_position_m: Real
+    payload_gyration_m2: Real
+    payload_mode_hz: Real
+    payload_damping_ratio: Real
+    gyro_lag_s: Real
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What the sensors read for a unit road displacement under one axle, in the frequency domain.
+
+    Arrays (..., m): acceleration in (m/s2)/m, pitch rate in (rad/s)/m, by the front and the rear axle.
+    """
+
+    acceleration_front: C128
+    acceleration_rear: C128
+    pitch_rate_front: C128
+    pitch_rate_rear: C128
+
+
+def frequency_response(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> Response:
+    """Sensor readings per road displacement at freq_hz (m,) > 0, with the payload aboard.
+
+    ``front_share`` (0..1) is of the sprung mass with payload. At frequency zero the body follows the
+    road: over each axle the displacement is that of the road there.
+    """
+    omega = 2.0 * np.pi * freq_hz
+    mass_ff, mass_rr, mass_fr = _body_mass(car, payload_kg, front_share, freq_hz)
+    added_front_kg, added_rear_kg = _added_axle_masses_kg(car, payload_kg, front_share)
+    body_front, road_front = _axle(car.front, added_front_kg, omega)
+    body_rear, road_rear = _axle(car.rear, added_rear_kg, omega)
+    d_ff = body_front - omega**2 * mass_ff
+    d_rr = body_rear - omega**2 * mass_rr
+    d_fr = -(omega**2) * mass_fr
+    determinant = d_ff * d_rr - d_fr * d_fr
+    by_front = road_front / determinant
+    by_rear = road_rear / determinant
+    from_front = _sensed(car, d_rr * by_front, -d_fr * by_front, omega)
+    from_rear = _sensed(car, -d_fr * by_rear, d_ff * by_rear, omega)
+    return Response(from_front[0], from_rear[0], from_front[1], from_rear[1])
+
+
+def _sensed(car: HalfCar, over_front: C128, over_rear: C128, omega: F64) -> tuple[C128, C128]:
+    """Vertical acceleration at the sensor and pitch rate (nose down), from the body's displacement over the axles."""
+    pitch = (over_rear - over_front) / car.wheelbase_m
+    acceleration = -(omega**2) * (over_front + car.sensor_position_m * pitch)
+    pitch_rate = 1j * omega * pitch * np.exp(-1j * omega * car.gyro_lag_s)
+    return acceleration, pitch_rate
+
+
+def _axle(axle: Axle, added_kg: Real, omega: F64) -> tuple[C128, C128]:
+    """Force on the body per minus its displacement, and per road displacement, in N/m.
+
+    With K the suspension and T = k_t - m_u omega^2 the wheel held by its tyre: K T / (K + T) and
+    K k_t / (K + T); the wheel's own movement is eliminated.
+    """
+    added_kn = added_kg * (STANDARD_GRAVITY_MPS2 / 1000.0)
+    stiffening = np.exp(axle.spring_slope_per_kn * added_kn + axle.spring_curvature_per_kn2 * added_kn**2)
+    damper = 1j * omega * axle.damper_nspm
+    suspension = axle.spring_npm * stiffening + damper / (1.0 + damper / axle.damper_mount_npm)
+    wheel = axle.tyre_npm - omega**2 * axle.unsprung_kg
+    in_series = suspension / (suspension + wheel)
+    return in_series * wheel, in_series * axle.tyre_npm
+
+
+def _added_axle_masses_kg(car: HalfCar, payload_kg: Real, front_share: Real) -> tuple[Real, Real]:
+    """What the payload adds on the front and on the rear axle."""
+    front_kg = front_share * (car.empty_mass_kg + payload_kg) - car.empty_front_share * car.empty_mass_kg
+    return front_kg, payload_kg - front_kg
+
+
+def _body_mass(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> tuple[C128, C128, C128]:
+    """Mass matrix (front-front, rear-rear, front-rear) of body and payload for the displacements over the axles.
+
+    A point mass L at d adds L (1 - d/l)^2, L (d/l)^2 and L (1 - d/l)(d/l); written with the masses
+    F and R it puts on the axles, the last is q = L/4 - (R - F)^2 / (4 L) and the others F - q and R - q.
+    """
+    share, length = car.empty_front_share, car.wheelbase_m
+    front_kg, rear_kg = _added_axle_masses_kg(car, payload_kg, front_share)
+    inverse_payload = payload_kg / (payload_kg**2 + INVERSE_PAYLOAD_KG**2)
+    coupling = (
+        payload_kg / 4.0
+        - (rear_kg - front_kg) ** 2 / 4.0 * inverse_payload
+        - payload_kg * car.payload_gyration_m2 / length**2
+    )
+    felt = _payload_felt(car, freq_hz)
+    turning = car.pitch_inertia_kgm2 / length**2
+    front_front = car.empty_mass_kg * share**2 + turning + felt * (front_kg - coupling)
+    rear_rear = car.empty_mass_kg * (1.0 - share) ** 2 + turning + felt * (rear_kg - coupling)
+    front_rear = car.empty_mass_kg * share * (1.0 - share) - turning + felt * coupling
+    return front_front, rear_rear, front_rear
+
+
+def _payload_felt(car: HalfCar, freq_hz: F64) -> C128:
+    """By which factor the payload feels heavier than it is, moving on its own floor: a base-excited oscillator."""
+    ratio = freq_hz / car.payload_mode_hz
+    damping = 2j * car.payload_damping_ratio * ratio
+    felt: C128 = (1.0 + damping) / (1.0 - ratio**2 + damping)
+    return felt
