@@ -1,0 +1,174 @@
+"""Everything section 4 of the paper needs: campaigns driven, calibrations made, batches judged."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.evaluation import Judged, error_table
+from gateway.calibration.ratio_index_fit import N_SEGMENT, fit_regression
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.estimator import ESTIMATORS
+from gateway.core.known_run import KnownRun
+from gateway.core.ratio_index import PAPER_BANDS, RatioIndexCalibration, indexes_of
+from gateway.core.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
+from gateway.core.settings import BatchSettings
+from gateway.offline.calibrate import calibrate, judge
+from gateway.offline.known_runs import SplitRun, split_runs
+from gateway.offline.simulate import bench_of, write_campaign
+from gateway.records import F64
+
+OnStep = Callable[[str, int, int], None]  # (what is being done, steps done, steps in all)
+
+CAMPAIGNS: Final = (
+    "load-sweep", "share-sweep", "ident", "test1", "test2", "test3", "sensitivity", "experiment", "speeds",
+)  # fmt: skip
+RATIO_INDEX: Final = "ratio_index"
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """How much is driven. The defaults are the paper's; less is for trying it out."""
+
+    seed: int = 1
+    window_s: float = 300.0
+    longest_s: float = math.inf
+    workers: int = 1
+
+    @property
+    def settings(self) -> BatchSettings:
+        return BatchSettings(window_s=self.window_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """One campaign with its batches."""
+
+    campaign: Campaign
+    splits: tuple[SplitRun, ...]
+
+    @property
+    def identification(self) -> list[KnownRun]:
+        return [split.identification for split in self.splits if split.identification.batches]
+
+    @property
+    def validation(self) -> list[KnownRun]:
+        return [split.validation for split in self.splits if split.validation.batches]
+
+    @property
+    def runs(self) -> list[KnownRun]:
+        return [*self.identification, *self.validation]
+
+    def run_named(self, part: str) -> KnownRun:
+        """The first run whose log's name contains ``part``."""
+        return next(run for run in self.runs if part in run.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """One way to estimate: a name for people, the estimator and what it knows of the vehicle."""
+
+    label: str
+    estimator: str
+    calibrated: CalibratedVehicle
+
+    def judge(self, runs: Sequence[KnownRun]) -> list[Judged]:
+        return [one for run in runs for one in judge(run, self.calibrated, self.estimator)]
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Campaigns by kind; the methods calibrated on the paper's simulated grid, and those on the experiment."""
+
+    scope: Scope
+    driven: Mapping[str, Driven]
+    simulated: tuple[Method, ...]
+    experimental: tuple[Method, ...]
+
+    @property
+    def ratio_index(self) -> RatioIndexCalibration:
+        """The one calibrated on the simulated grid."""
+        return ratio_index_of(self.simulated[0])
+
+    def table(self, kind: str, split: str, method: Method) -> dict[str, Any]:
+        """The error table (12) of one part of a campaign."""
+        driven = self.driven[kind]
+        runs = driven.identification if split == "identification" else driven.validation
+        return error_table(method.judge(runs), driven.campaign.vehicle, method.estimator)
+
+
+def ratio_index_of(method: Method) -> RatioIndexCalibration:
+    """The method's ratio index calibration, which every campaign here carries."""
+    found = method.calibrated.ratio_index
+    if found is None:
+        raise ValueError(f"{method.label}: holds no ratio index")
+    return found
+
+
+def gather(output: Path, scope: Scope, on_step: OnStep = lambda what, done, of: None) -> Evidence:
+    """Simulate every campaign into output/campaigns, calibrate, and cut all drives into batches."""
+    driven = {}
+    of = 2 * len(CAMPAIGNS) + 2
+    for number, kind in enumerate(CAMPAIGNS):
+        on_step(f"driving {kind}", 2 * number, of)
+        bench = bench_of(kind, seed=scope.seed, longest_s=scope.longest_s)
+        path = write_campaign(bench, output / "campaigns" / kind, workers=scope.workers)
+        on_step(f"reading {kind}", 2 * number + 1, of)
+        campaign = load_campaign(path)
+        driven[kind] = Driven(campaign, tuple(split_runs(campaign, scope.settings)))
+    on_step("calibrating on the simulated grid", of - 2, of)
+    simulated = _methods(driven["ident"], scope, output / "vehicle_simulated.json")
+    on_step("calibrating on the experiment", of - 1, of)
+    experimental = _methods(driven["experiment"], scope, output / "vehicle_experiment.json")
+    return Evidence(scope, driven, simulated, experimental)
+
+
+def _methods(driven: Driven, scope: Scope, path: Path) -> tuple[Method, ...]:
+    """Every estimator calibrated on the identification part, and the ratio index with the bands of Table 2."""
+    held = calibrate(driven.campaign, scope.settings, estimators=tuple(ESTIMATORS), command="springscale reproduce")
+    path.write_text(held.to_json(), encoding="utf-8")
+    calibrated = held.for_core()
+    others = [name for name in held.estimators if name != RATIO_INDEX]
+    return (
+        Method("ratio index", RATIO_INDEX, calibrated),
+        Method("ratio index, bands of the paper's Table 2", RATIO_INDEX, with_paper_bands(calibrated, driven)),
+        *(Method(name.replace("_", " "), name, calibrated) for name in others),
+    )
+
+
+def with_paper_bands(calibrated: CalibratedVehicle, driven: Driven) -> CalibratedVehicle:
+    """The same vehicle with the bands of Table 2 and regressions (11) fitted to them."""
+    own = calibrated.ratio_index
+    if own is None:
+        return calibrated
+    bands = replace(
+        own,
+        n_segment=N_SEGMENT,
+        acceleration_bands=PAPER_BANDS["acceleration"],
+        pitch_rate_bands=PAPER_BANDS["pitch_rate"],
+    )
+    run, payload_kg, share_pct, ra, rg = index_table(driven.identification, bands)
+    return replace(
+        calibrated,
+        ratio_index=replace(
+            bands,
+            payload=fit_regression(MODEL_11_PAYLOAD, ra, rg, payload_kg, run.astype(np.int64)).model,
+            front_share=fit_regression(MODEL_11_FRONT_SHARE, ra, rg, share_pct, run.astype(np.int64)).model,
+        ),
+    )
+
+
+def index_table(runs: Sequence[KnownRun], calibration: RatioIndexCalibration) -> tuple[F64, F64, F64, F64, F64]:
+    """Run number, payload, front share, R_a and R_g (n,) of every batch that has both indexes."""
+    rows = [
+        (run.number, run.payload_kg, run.front_share_pct, *indexes_of(batch, calibration))
+        for run in runs
+        for batch in run.batches
+        if not batch.rejected
+    ]
+    table = np.array([row for row in rows if all(np.isfinite(row))], dtype=float).reshape(-1, 5)
+    return table[:, 0], table[:, 1], table[:, 2], table[:, 3], table[:, 4]

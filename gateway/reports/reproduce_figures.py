@@ -1,0 +1,289 @@
+"""The figures of the paper's section 4, drawn from our evidence."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from gateway.calibration.evaluation import Judged
+from gateway.calibration.ratio_index_fit import N_SEGMENT, fit_regression
+from gateway.core.known_run import KnownRun
+from gateway.core.ratio_index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum
+from gateway.core.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
+from gateway.records import F64
+from gateway.reports.figures import COLOURS, panels
+from gateway.reports.reproduce_evidence import Evidence, Method, index_table
+from gateway.units import NS_PER_S
+
+ACCELERATION = "acceleration"
+PITCH_RATE = "pitch_rate"
+UNIT = {ACCELERATION: "m/s²/√Hz", PITCH_RATE: "rad/s/√Hz"}
+NAME = {ACCELERATION: "vertical acceleration", PITCH_RATE: "pitch rate"}
+LOAD, SHARE = "payload [kg]", "front share [%]"
+
+
+def spectrum_of(run: KnownRun, sensor: str) -> tuple[F64, F64]:
+    """Mean amplitude spectrum over a run's batches: frequencies (m,) and amplitudes (m,). NaN where none fits."""
+    freq_hz, total, n = np.arange(1.0, 205.0) * (50.0 / N_SEGMENT), np.zeros(204), 0
+    for batch in run.batches:
+        x = batch.vertical_acceleration_mps2 if sensor == ACCELERATION else batch.pitch_rate_radps
+        spectrum = mean_spectrum(x, batch.usable, N_SEGMENT, batch.rate_hz, "amplitude")
+        if spectrum is not None:
+            freq_hz, total, n = spectrum[0], total + spectrum[1], n + 1
+    return freq_hz, total / n if n else np.full(len(freq_hz), np.nan)
+
+
+def figure_1(evidence: Evidence) -> Figure:
+    """Spectra of acceleration for several loads, and of pitch rate for several shares."""
+    figure, (left, right) = panels(1, 2)
+    for run in evidence.driven["load-sweep"].runs[::3]:
+        left.plot(*spectrum_of(run, ACCELERATION), label=f"{run.payload_kg:.0f} kg", linewidth=1.0)
+    for run in evidence.driven["share-sweep"].runs[::4]:
+        right.plot(*spectrum_of(run, PITCH_RATE), label=f"{run.front_share_pct:.0f} %", linewidth=1.0)
+    for axes, sensor in ((left, ACCELERATION), (right, PITCH_RATE)):
+        _label(axes, "frequency [Hz]", f"{NAME[sensor]} [{UNIT[sensor]}]")
+    return figure
+
+
+def band_differences(evidence: Evidence, sensor: str, width_hz: float) -> tuple[F64, F64]:
+    """(4) or (5): frequencies (m,), J (m,) between the extremes of the sweep that concerns the sensor."""
+    runs = evidence.driven["load-sweep" if sensor == ACCELERATION else "share-sweep"].runs
+    (freq_hz, low), (_, high) = spectrum_of(runs[0], sensor), spectrum_of(runs[-1], sensor)
+    n = max(round(width_hz / (freq_hz[1] - freq_hz[0])), 1)
+    return freq_hz, np.convolve(high - low, np.full(n, 1.0 / n), mode="same")
+
+
+def figure_bands(evidence: Evidence) -> Figure:
+    """J_L and J_D over frequency with the bands that calibration chose, and the paper's."""
+    figure, axes_of = panels(1, 2)
+    own = evidence.ratio_index
+    chosen = {ACCELERATION: own.acceleration_bands, PITCH_RATE: own.pitch_rate_bands}
+    for axes, sensor, name in zip(axes_of, (ACCELERATION, PITCH_RATE), ("J_L", "J_D"), strict=True):
+        for width_hz, colour in ((0.05, "#bbbbbb"), (0.5, COLOURS[0])):
+            axes.plot(*band_differences(evidence, sensor, width_hz), color=colour, label=f"{name}, w = {width_hz:g} Hz")
+        for bands, colour, label in ((chosen[sensor], COLOURS[2], "ours"), (PAPER_BANDS[sensor], COLOURS[1], "paper")):
+            for band, style, part in zip(bands or (), ("-", "--"), ("over", "under"), strict=False):
+                axes.axvline(band.centre_hz, color=colour, linestyle=style, linewidth=1.0, label=f"{label}, {part}")
+        axes.axhline(0.0, color="black", linewidth=0.6)
+        _label(axes, "frequency [Hz]", f"{name} [{UNIT[sensor]}]")
+    return figure
+
+
+def figure_2(evidence: Evidence) -> Figure:
+    """Empty and full, whole and through the two band-passes (6)."""
+    figure, axes_of = panels(1, 2)
+    runs = evidence.driven["load-sweep"].runs
+    bands = evidence.ratio_index.acceleration_bands or PAPER_BANDS[ACCELERATION]
+    for axes, run in zip(axes_of, (runs[0], runs[-1]), strict=True):
+        freq_hz, spectrum = spectrum_of(run, ACCELERATION)
+        axes.plot(freq_hz, spectrum, color="#999999", label=f"{run.payload_kg:.0f} kg")
+        for band, colour in zip(bands, COLOURS, strict=False):
+            axes.plot(freq_hz, band_pass_gain(freq_hz, band) * spectrum, color=colour, label=_band_name(band))
+        _label(axes, "frequency [Hz]", f"{NAME[ACCELERATION]} [{UNIT[ACCELERATION]}]")
+    return figure
+
+
+def figure_3_4(evidence: Evidence) -> Figure:
+    """R_a against the load alone with (9), R_g against the share alone with (10)."""
+    figure, (left, right) = panels(1, 2)
+    run, payload_kg, _, ra, rg = index_table(evidence.driven["load-sweep"].runs, evidence.ratio_index)
+    _index_and_fit(left, (ra, rg), payload_kg, run, MODEL_9_PAYLOAD, "R_a")
+    _label(left, "R_a", LOAD)
+    run, _, share_pct, ra, rg = index_table(evidence.driven["share-sweep"].runs, evidence.ratio_index)
+    _index_and_fit(right, (ra, rg), share_pct, run, MODEL_10_FRONT_SHARE, "R_g")
+    _label(right, "R_g", SHARE)
+    return figure
+
+
+def _index_and_fit(
+    axes: Axes, indexes: tuple[F64, F64], target: F64, run: F64, terms: tuple[str, ...], name: str
+) -> None:
+    index = indexes[0] if name == "R_a" else indexes[1]
+    axes.plot(index, target, "o", color=COLOURS[0], label="batches")
+    model = fit_regression(terms, *indexes, target, run.astype(np.int64)).model
+    along = np.linspace(np.min(index), np.max(index), 60)
+    fitted = [model.predict(x, x)[0] for x in along]
+    axes.plot(along, fitted, color=COLOURS[1], label=f"{' + '.join(terms)}, residual {model.residual_std:.2g}")
+
+
+def figure_5_6(evidence: Evidence) -> Figure:
+    """The conditions explored, and the two indexes over them."""
+    figure, (left, middle, right) = panels(1, 3)
+    _, payload_kg, share_pct, ra, rg = index_table(evidence.driven["ident"].runs, evidence.ratio_index)
+    left.plot(payload_kg, share_pct, "o", color=COLOURS[0])
+    _label(left, LOAD, SHARE)
+    by_share = middle.scatter(payload_kg, ra, c=share_pct, s=14, cmap="viridis")
+    _label(middle, LOAD, "R_a")
+    figure.colorbar(by_share, ax=middle, label=SHARE)
+    by_load = right.scatter(share_pct, rg, c=payload_kg, s=14, cmap="plasma")
+    _label(right, SHARE, "R_g")
+    figure.colorbar(by_load, ax=right, label=LOAD)
+    return figure
+
+
+def figure_7(evidence: Evidence) -> Figure:
+    """The joint model (11) and the other estimators on the grid they were calibrated on."""
+    runs = evidence.driven["ident"].runs
+    return _estimated_over_true([(method.label, method.judge(runs), "o") for method in evidence.simulated])
+
+
+def figure_8_9(evidence: Evidence) -> Figure:
+    """Spectra for two roughnesses; the road's low-pass (1) for several speeds, without and with the wheelbase."""
+    figure, (left, right) = panels(1, 2)
+    for iri in ("iri2", "iri8"):
+        run = evidence.driven["sensitivity"].run_named(iri)
+        left.plot(*spectrum_of(run, ACCELERATION), label=f"IRI {iri[3:]}", linewidth=1.0)
+    _label(left, "frequency [Hz]", f"{NAME[ACCELERATION]} [{UNIT[ACCELERATION]}]")
+    freq_hz = np.linspace(0.05, 10.0, 800)
+    wheelbase_m = evidence.driven["ident"].campaign.vehicle.wheelbase_m
+    for kmh, colour in zip((30.0, 50.0, 90.0), COLOURS, strict=False):
+        speed_mps = kmh / 3.6
+        road = 1.0 / np.abs(2j * np.pi * freq_hz + 0.15 * speed_mps)
+        both_axles = road * np.abs(np.cos(np.pi * freq_hz * wheelbase_m / speed_mps))
+        right.semilogy(freq_hz, road, color=colour, linestyle="--", linewidth=0.8)
+        right.semilogy(freq_hz, both_axles, color=colour, linewidth=1.2, label=f"{kmh:.0f} km/h")
+    right.set_ylim(1e-4, 1.0)
+    _label(right, "frequency [Hz]", "road into heave: paper dashed, with the wheelbase solid")
+    return figure
+
+
+def figure_sensitivity(evidence: Evidence) -> Figure:
+    """What each method answers for one load at other speeds and on other roads; the ratio index's gate lifted."""
+    figure, (top, bottom) = panels(2, 1, height_in=2.6)
+    runs = evidence.driven["sensitivity"].runs
+    places = np.arange(len(runs))
+    for method, colour in zip(evidence.simulated, COLOURS, strict=False):
+        errors = np.array([mean_errors(run, method) for run in runs])
+        for axes, column in ((top, 0), (bottom, 1)):
+            axes.plot(places, errors[:, column], "o-", color=colour, label=method.label, linewidth=0.7)
+    for axes, name in ((top, "payload error [kg]"), (bottom, "share error [points]")):
+        axes.axhline(0.0, color="black", linewidth=0.6)
+        axes.set_xticks(places, [condition_of(run) for run in runs], rotation=25, ha="right")
+        _label(axes, "", name)
+    return figure
+
+
+def condition_of(run: KnownRun) -> str:
+    """ "08_L225_D50.0_50kmh_iri2/can.log.gz" -> "50kmh iri2"."""
+    return " ".join(run.name.split("/", maxsplit=1)[0].split("_")[3:])
+
+
+def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
+    """Mean error of payload [kg] and share [points] over a run's batches, the ratio index's own gates lifted."""
+    if method.estimator == "ratio_index" and method.calibrated.ratio_index is not None:
+        calibration = method.calibrated.ratio_index
+        _, payload_kg, share_pct, ra, rg = index_table([run], calibration)
+        models = (calibration.payload, calibration.front_share)
+        estimated = [[m.predict(a, g)[0] if m else np.nan for m in models] for a, g in zip(ra, rg, strict=True)]
+        errors = np.array(estimated).reshape(-1, 2) - np.column_stack([payload_kg, share_pct])
+    else:
+        errors = np.array(
+            [
+                (one.estimate.payload_kg - one.payload_kg, one.estimate.front_share_pct - one.front_share_pct)
+                for one in method.judge([run])
+                if one.estimate.counted
+            ]
+        ).reshape(-1, 2)
+    return (float(np.mean(errors[:, 0])), float(np.mean(errors[:, 1]))) if len(errors) else (np.nan, np.nan)
+
+
+def figure_test(evidence: Evidence, kind: str) -> Figure:
+    """Payload and share over time: the truth as a line, each method's batches with their 95 % intervals."""
+    figure, (top, bottom) = panels(2, 1, height_in=2.4)
+    runs = evidence.driven[kind].runs
+    start_ns = runs[0].batches[0].t_start_ns
+    for method, colour in zip(evidence.simulated, COLOURS, strict=False):
+        counted = [one for one in method.judge(runs) if one.estimate.counted]
+        _with_intervals(top, counted, start_ns, colour, method.label, is_payload=True)
+        _with_intervals(bottom, counted, start_ns, colour, method.label, is_payload=False)
+    for run in runs:
+        when_min = [(t - start_ns) / NS_PER_S / 60.0 for t in (run.batches[0].t_start_ns, run.batches[-1].t_end_ns)]
+        top.plot(when_min, [run.payload_kg] * 2, color="black", linewidth=2.0)
+        bottom.plot(when_min, [run.front_share_pct] * 2, color="black", linewidth=2.0)
+    _label(top, "", LOAD)
+    _label(bottom, "time [min]", SHARE)
+    return figure
+
+
+def figure_drive(evidence: Evidence, kind: str, method: Method) -> Figure:
+    """One method's answer over a drive with changing loads: truth behind the 95 % band."""
+    figure, (top, bottom) = panels(2, 1, height_in=2.2)
+    runs = evidence.driven[kind].runs
+    start_ns = runs[0].batches[0].t_start_ns
+    for n, run in enumerate(runs):
+        counted = [one.estimate for one in method.judge([run]) if one.estimate.counted]
+        for axes, truth in ((top, run.payload_kg), (bottom, run.front_share_pct)):
+            is_payload = axes is top
+            edges = [(t - start_ns) / NS_PER_S / 60.0 for t in (run.batches[0].t_start_ns, run.batches[-1].t_end_ns)]
+            axes.plot(edges, [truth] * 2, color="black", linewidth=2.5, label="truth" if n == 0 else None)
+            for k, e in enumerate(counted):
+                when = [(t - start_ns) / NS_PER_S / 60.0 for t in (e.t_start_ns, e.t_end_ns)]
+                low, high = e.payload_interval95_kg if is_payload else e.front_share_interval95_pct
+                centre = e.payload_kg if is_payload else e.front_share_pct
+                shown = n == 0 and k == 0
+                axes.fill_between(when, low, high, color=COLOURS[0], alpha=0.25, linewidth=0.0,
+                                  label="estimate, 95 % interval" if shown else None)  # fmt: skip
+                axes.plot(when, [centre] * 2, color=COLOURS[0], linewidth=1.5)
+    _label(top, "", LOAD)
+    _label(bottom, "time [min]", SHARE)
+    return figure
+
+
+def figure_13(evidence: Evidence) -> Figure:
+    """The experimental grid."""
+    figure, (axes,) = panels(1, 1)
+    runs = evidence.driven["experiment"].identification
+    axes.plot([run.payload_kg for run in runs], [run.front_share_pct for run in runs], "s", color=COLOURS[0])
+    _label(axes, LOAD, SHARE)
+    return figure
+
+
+def figure_14(evidence: Evidence) -> Figure:
+    """The experiment: estimates over truth, identification hollow, validation filled."""
+    experiment = evidence.driven["experiment"]
+    series = []
+    for method in evidence.experimental:
+        series.append((f"{method.label}, identification", method.judge(experiment.identification), "o"))
+        series.append((f"{method.label}, validation", method.judge(experiment.validation), "s"))
+    return _estimated_over_true(series)
+
+
+def _estimated_over_true(series: Sequence[tuple[str, list[Judged], str]]) -> Figure:
+    figure, (left, right) = panels(1, 2, height_in=3.6)
+    for n, (label, judged, marker) in enumerate(series):
+        counted = [one for one in judged if one.estimate.counted]
+        pairs = (
+            (left, [(one.payload_kg, one.estimate.payload_kg) for one in counted]),
+            (right, [(one.front_share_pct, one.estimate.front_share_pct) for one in counted]),
+        )
+        for axes, points in pairs:
+            axes.plot(*np.array(points).reshape(-1, 2).T, marker, color=COLOURS[n % len(COLOURS)],
+                      markersize=4, alpha=0.7, label=label)  # fmt: skip
+    for axes, name in ((left, LOAD), (right, SHARE)):
+        ends = axes.get_xlim()
+        axes.plot(ends, ends, color="black", linewidth=0.6)
+        _label(axes, f"true {name}", f"estimated {name}")
+    return figure
+
+
+def _with_intervals(
+    axes: Axes, counted: Sequence[Judged], start_ns: int, colour: str, label: str, *, is_payload: bool
+) -> None:
+    estimates = [one.estimate for one in counted]
+    middle_min = [((e.t_start_ns + e.t_end_ns) / 2.0 - start_ns) / NS_PER_S / 60.0 for e in estimates]
+    centre = np.array([e.payload_kg if is_payload else e.front_share_pct for e in estimates])
+    bounds = [e.payload_interval95_kg if is_payload else e.front_share_interval95_pct for e in estimates]
+    reach = np.abs(np.array(bounds).reshape(-1, 2) - centre[:, None]).T
+    axes.errorbar(middle_min, centre, yerr=reach, fmt="o", color=colour, label=label, markersize=3.5, linewidth=0.8)
+
+
+def _band_name(band: Band) -> str:
+    return f"{band.centre_hz:g} Hz, w = {band.width_hz:g} Hz"
+
+
+def _label(axes: Axes, x: str, y: str) -> None:
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=7)

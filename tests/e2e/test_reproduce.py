@@ -1,0 +1,94 @@
+"""The paper's section 4 from nothing, at a small scale: half of the loads, 80-second batches."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.calibration.file import load_calibration
+from gateway.errors import ConfigurationError
+from gateway.offline import simulate
+from gateway.offline.plans import Plan, plan_of
+from gateway.reports.reproduce import reproduce
+from gateway.reports.reproduce_evidence import CAMPAIGNS, Scope
+from gateway.reports.reproduce_page import PLATES
+from gateway.reports.reproduce_table import PAPER_PCT
+
+SMALL = Scope(seed=3, window_s=80.0, longest_s=125.0)
+THINNED = ("load-sweep", "share-sweep", "ident", "speeds")
+
+
+@pytest.fixture(scope="module")
+def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    def thinned(kind, vehicle, seed, longest_s) -> Plan:
+        plan = plan_of(kind, vehicle, seed, longest_s)
+        return replace(plan, drives=plan.drives[:: 2 if kind in THINNED else 1])
+
+    output = tmp_path_factory.mktemp("reproduced")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simulate, "plan_of", thinned)
+        steps: list[tuple[int, int]] = []
+        reproduce(output, SMALL, lambda what, done, of: steps.append((done, of)))
+    assert steps == sorted(steps)
+    assert steps[-1][0] < steps[-1][1]
+    return output
+
+
+def test_every_figure_stands_in_the_page_and_beside_it(reproduced: Path) -> None:
+    page = (reproduced / "report.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == len(PLATES)
+    for plate in PLATES:
+        assert f'id="{plate.name}"' in page
+        assert (reproduced / "figures" / f"{plate.name}.png").stat().st_size > 5_000
+        assert (reproduced / "figures" / f"{plate.name}.svg").read_text(encoding="utf-8").startswith("<?xml")
+
+
+def test_the_page_needs_nothing_from_elsewhere(reproduced: Path) -> None:
+    page = (reproduced / "report.html").read_text(encoding="utf-8")
+    assert not re.search(r"<script|<link|src=\"http|url\(http", page)
+
+
+def test_the_papers_numbers_stand_beside_ours(reproduced: Path) -> None:
+    accuracy = (reproduced / "accuracy.md").read_text(encoding="utf-8")
+    for payload_pct, share_pct in PAPER_PCT.values():
+        assert re.search(rf"the paper .*{payload_pct:.2f}.*{share_pct:.2f}", accuracy)
+    rows = [line for line in accuracy.splitlines() if line.startswith("|")]
+    assert len({line.count("|") for line in rows}) == 1
+
+
+def test_every_method_is_judged_on_every_drive(reproduced: Path) -> None:
+    results = json.loads((reproduced / "results.json").read_text(encoding="utf-8"))
+    methods = {table["method"] for table in results["tables"]}
+    assert {"ratio index", "ratio index, bands of the paper's Table 2"} <= methods
+    assert len(results["tables"]) == 6 * len(methods)
+    of_test_3 = [table for table in results["tables"] if table["drive"].startswith("Test 3")]
+    assert all(table["n_batches"] == 10 for table in of_test_3)
+
+
+def test_the_ratio_index_works_where_it_was_calibrated_and_not_at_other_speeds(reproduced: Path) -> None:
+    """What the report exists to show."""
+    results = json.loads((reproduced / "results.json").read_text(encoding="utf-8"))
+    (test_3,) = (t for t in results["tables"] if t["drive"].startswith("Test 3") and t["method"] == "ratio index")
+    errors_kg = {
+        row["condition"]: row["payload_error_kg"] for row in results["sensitivity"] if row["method"] == "ratio index"
+    }
+    at_50_kmh_kg = test_3["payload"]["mean_abs_kg"]
+    assert at_50_kmh_kg < 60.0
+    assert abs(errors_kg["50kmh"]) < 100.0
+    assert abs(errors_kg["130kmh"]) > 3.0 * at_50_kmh_kg
+
+
+def test_the_numbers_can_be_made_again_from_what_lies_there(reproduced: Path) -> None:
+    for kind in CAMPAIGNS:
+        assert (reproduced / "campaigns" / kind / "campaign.toml").is_file()
+    calibration = load_calibration(reproduced / "vehicle_simulated.json")
+    assert calibration.vehicle.name == "paper_van"
+    assert np.allclose(calibration.seen.speed_mps, 50.0 / 3.6, atol=0.5)
+
+
+def test_a_reproduction_is_not_written_over(reproduced: Path) -> None:
+    with pytest.raises(ConfigurationError, match="there is a reproduction already"):
+        reproduce(reproduced, SMALL)
