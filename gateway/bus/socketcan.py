@@ -22,12 +22,13 @@ from gateway.errors import BusError
 from gateway.records import I64, U32, Frames
 from gateway.units import NS_PER_S
 
-GATHER_S: Final = 0.02  # frames are left to gather this long: few wake-ups, little work
+GATHER_S: Final = 0.05  # frames are left to gather this long: few wake-ups, little work
 BURST_FRAMES: Final = 4096
 RECEIVE_BUFFER_BYTES: Final = 4 << 20
 
 _REMOTE_FLAG: Final = 0x4000_0000
 _ERROR_FLAG: Final = 0x2000_0000
+_NO_DATA_FLAGS: Final = np.uint32(_REMOTE_FLAG | _ERROR_FLAG)
 _ALL_ERROR_CLASSES: Final = 0x1FFF_FFFF
 _CAN_RAW_ERR_FILTER: Final = 2  # linux/can/raw.h; the socket module names neither this nor those below
 _SO_RCVBUFFORCE: Final = 33  # linux/asm-generic/socket.h
@@ -92,12 +93,15 @@ class SocketCanReceiver:
             return Burst(empty_frames(self._width))
         is_classic = all(len(datagram) == _CLASSIC.itemsize for datagram in datagrams)
         layout = _CLASSIC if is_classic else _FD
-        rows = np.frombuffer(b"".join(datagram.ljust(layout.itemsize, b"\0") for datagram in datagrams), layout)
+        rows = np.frombuffer(b"".join(d.ljust(layout.itemsize, b"\0") for d in datagrams), layout)
         t_ns, n_unstamped = _stamps_ns(stamps)
-        is_error = (rows["id"] & _ERROR_FLAG) != 0
-        is_remote = ~is_error & ((rows["id"] & _REMOTE_FLAG) != 0)
-        frames = Frames(t_ns, rows["id"], rows["length"], self._payloads(rows))
-        error_ids: U32 = rows["id"][is_error]
+        can_id = rows["id"].copy()
+        frames = Frames(t_ns, can_id, rows["length"].copy(), self._payloads(rows))
+        if not np.any(can_id & _NO_DATA_FLAGS):
+            return Burst(frames, stamped_at_receipt=n_unstamped)
+        is_error = (can_id & _ERROR_FLAG) != 0
+        is_remote = ~is_error & ((can_id & _REMOTE_FLAG) != 0)
+        error_ids: U32 = can_id[is_error]
         return Burst(
             frames=take(frames, ~(is_error | is_remote)),
             error_classes=Counter(name for error_id in error_ids for name in error_class_names(int(error_id))),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gateway.bus.bit_field import BitField, Coding
-from gateway.bus.decode import Decoder, Rejected, is_j1939_code
+from gateway.bus.decode import Decoder
+from gateway.bus.samples import Rejected, is_j1939_code
 from gateway.bus.signal_map import load_signal_map
 from gateway.records import EXTENDED_ID, Frames, Signal
 

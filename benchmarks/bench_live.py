@@ -1,0 +1,181 @@
+"""The live path: CPU of receiving and decoding, beside python-can's own receive loop in the same run.
+
+    python benchmarks/bench_live.py [--seconds 6] [--json]
+
+Frames come from another process as CAN datagrams over a loopback socket with kernel stamps, so that no CAN
+hardware is needed: everything but the socket's address family is the live path. A kernel-filtered bus is one
+of which only our 8.4 % arrive. Goals: under 3 % of a core on a kernel-filtered bus of 2500 frames/s, under
+150 MB, and nothing dropped at 8000 frames/s.
+"""
+
+import argparse
+import json
+import resource
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+import can
+import cantools
+from can.interfaces.socketcan import socketcan as python_can_socketcan
+
+from gateway.bus.decode import Decoder
+from gateway.bus.mapping import SignalMap
+from gateway.bus.signal_map import load_signal_map, shipped_map
+from gateway.bus.socketcan import SocketCanReceiver, ask_for_stamps
+from gateway.bus.source import LiveSource
+
+OURS_SHARE = 0.084  # of the frames on the bus: two IMU messages at 100 Hz, GNSS at 10 Hz
+DRAIN_S = 0.1  # how often the pipeline looks into the inbox
+RATES = {"2500 frames/s": 2500, "8000 frames/s": 8000, "2500, filtered": 210, "8000, filtered": 672}
+
+
+def send(port: int, frames_per_s: int, seconds: float) -> None:
+    """The other end: frames at an even pace, in groups of a millisecond or more; all ours where filtered."""
+    is_filtered = frames_per_s < 1000
+    frames = [struct.pack("=IB3x8s", *frame) for frame in _mix(is_filtered)]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
+        wire.connect(("127.0.0.1", port))
+        begun, n_sent = time.monotonic(), 0
+        while n_sent < seconds * frames_per_s:
+            due = int((time.monotonic() - begun) * frames_per_s)
+            for i in range(n_sent, due):
+                wire.send(frames[i % len(frames)])
+            n_sent = max(n_sent, due)
+            time.sleep(0.001)
+    print(n_sent)
+
+
+def _mix(is_filtered: bool) -> list[tuple[int, int, bytes]]:
+    ours = [(0x120, 8, bytes(7) + b"\1"), (0x121, 8, bytes(7) + b"\1")] * 10 + [(0x130, 4, b"\0\1\x09\3")]
+    n_others = 0 if is_filtered else round(len(ours) * (1 / OURS_SHARE - 1))
+    others = [(0x200 + i % 57, 8, bytes(range(8))) for i in range(n_others)]
+    mixed = ours + others
+    step = 97  # coprime to the length: spreads ours among the others
+    return [mixed[i * step % len(mixed)] for i in range(len(mixed))]
+
+
+def listening_socket() -> socket.socket:
+    """A loopback socket that stands in for a CAN one."""
+    wire = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    wire.bind(("127.0.0.1", 0))
+    ask_for_stamps(wire)
+    return wire
+
+
+def receive_ours(wire: socket.socket, signal_map: SignalMap, is_over: threading.Event) -> dict:
+    """LiveSource and the decoder, as the service runs them."""
+    source = LiveSource("socketcan", "bench", signal_map, open_receiver=lambda: SocketCanReceiver(wire, 8))
+    decoder = Decoder(signal_map)
+    source.start()
+    n_rows = 0
+    while not is_over.is_set():
+        is_over.wait(DRAIN_S)
+        frames = source.inbox.drain(0.0)
+        n_rows += len(decoder.decode(frames)) if frames is not None else 0
+    counts = source.counts()
+    source.stop()
+    return {"frames": counts.frames, "samples": n_rows, "dropped": counts.dropped_inbox + counts.dropped_kernel}
+
+
+def receive_python_can(wire: socket.socket, signal_map: SignalMap, is_over: threading.Event) -> dict:
+    """python-can's SocketcanBus over the same kind of socket, cantools for the mapped frames."""
+    database = cantools.database.load_file(shipped_map("reference").with_name("springscale_reference.dbc"))
+    messages = {message.frame_id: message for message in database.messages}
+    python_can_socketcan.create_socket = lambda: wire
+    python_can_socketcan.bind_socket = lambda sock, channel: None
+    python_can_socketcan.SocketcanBus._apply_filters = lambda self, filters: None
+    n_frames = n_rows = 0
+    with python_can_socketcan.SocketcanBus("bench", local_loopback=True) as bus:
+        while not is_over.is_set():
+            frame = bus.recv(0.1)
+            if frame is None:
+                continue
+            n_frames += 1
+            if (message := messages.get(frame.arbitration_id)) is not None:
+                message.decode(frame.data, decode_choices=False)
+                n_rows += 1
+    return {"frames": n_frames, "samples": n_rows, "dropped": None}
+
+
+PATHS: dict[str, Callable[[socket.socket, SignalMap, threading.Event], dict]] = {
+    "springscale": receive_ours,
+    "python-can + cantools": receive_python_can,
+}
+
+
+def run(path: str, frames_per_s: int, seconds: float) -> dict:
+    """One path at one rate; CPU is this process's from the first frame sent to the last."""
+    signal_map = load_signal_map("springscale:reference")
+    wire = listening_socket()
+    command = [sys.executable, __file__, "--send", str(wire.getsockname()[1]), "--rate", str(frames_per_s)]
+    sender = subprocess.Popen([*command, "--seconds", str(seconds)], stdout=subprocess.PIPE, text=True)
+    is_over = threading.Event()
+
+    def end_with_the_sender() -> None:
+        sender.wait()
+        time.sleep(0.3)
+        is_over.set()
+
+    threading.Thread(target=end_with_the_sender, daemon=True).start()
+    wire_peek = wire.recv(1, socket.MSG_PEEK)
+    assert wire_peek
+    cpu_s, begun_s = time.process_time(), time.monotonic()
+    result = PATHS[path](wire, signal_map, is_over)
+    result["cpu_pct"] = 100 * (time.process_time() - cpu_s) / (time.monotonic() - begun_s)
+    result["sent"] = int(sender.stdout.read()) if sender.stdout else 0
+    result["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return result
+
+
+def in_own_process(path: str, frames_per_s: int, seconds: float) -> dict:
+    command = [sys.executable, __file__, "--run", path, "--rate", str(frames_per_s), "--seconds", str(seconds)]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def show(results: dict) -> None:
+    print(f"{'bus':<18}{'path':<24}{'CPU of a core':>14}{'received':>18}{'dropped':>9}{'peak MB':>9}")
+    for bus, paths in results.items():
+        for path, row in paths.items():
+            received = f"{row['frames']:,} / {row['sent']:,}"
+            dropped = "?" if row["dropped"] is None else f"{row['dropped']:,}"
+            print(f"{bus:<18}{path:<24}{row['cpu_pct']:>12.2f} %{received:>18}{dropped:>9}{row['peak_mb']:>9.0f}")
+    filtered, fastest = results["2500, filtered"]["springscale"], results["8000 frames/s"]["springscale"]
+    lost = fastest["sent"] - fastest["frames"]
+    print(
+        f"\nfiltered bus of 2500 frames/s: {filtered['cpu_pct']:.2f} % (goal < 3: {_verdict(filtered['cpu_pct'] < 3)})"
+    )
+    print(f"peak memory: {fastest['peak_mb']:.0f} MB (goal < 150: {_verdict(fastest['peak_mb'] < 150)})")
+    print(f"lost at 8000 frames/s: {lost} (goal 0: {_verdict(lost == 0)})")
+
+
+def _verdict(is_met: bool) -> str:
+    return "met" if is_met else "MISSED"
+
+
+def main() -> None:
+    can.set_logging_level("warning")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=6.0, help="how long each path receives at each rate")
+    parser.add_argument("--json", action="store_true", help="print the figures for machines")
+    parser.add_argument("--run", choices=PATHS, help=argparse.SUPPRESS)
+    parser.add_argument("--rate", type=int, default=2500, help=argparse.SUPPRESS)
+    parser.add_argument("--send", type=int, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.send:
+        send(options.send, options.rate, options.seconds)
+    elif options.run:
+        print(json.dumps(run(options.run, options.rate, options.seconds)))
+    else:
+        results = {
+            bus: {path: in_own_process(path, rate, options.seconds) for path in PATHS} for bus, rate in RATES.items()
+        }
+        print(json.dumps(results)) if options.json else show(results)
+
+
+if __name__ == "__main__":
+    main()
