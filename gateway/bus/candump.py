@@ -122,7 +122,7 @@ class _Reader:
             learned = learn_shape(line)
             n_before = len(hits)
             if learned is not None and learned not in self._shapes:
-                self._shapes = [learned, *self._shapes[: KEPT_SHAPES - 1]]
+                self._shapes = [*self._shapes[1 - KEPT_SHAPES :], learned]  # the commonest shape was learned first
                 hits = self._read_shape(block, hits, learned, places, parts)
             if len(hits) == n_before:
                 self._read_exactly(block, int(hits[0]), line, places, parts)
@@ -142,7 +142,7 @@ class _Reader:
     def _read_exactly(self, block: LineBlock, hit: int, line: bytes, places: list[I64], parts: list[Frames]) -> None:
         found = read_line(line)
         if isinstance(found, LogReject):
-            self._report.reject(found, self._line_number(block, hit))
+            self._report.reject(found, self._line_number(block, hit) if self._report.keeps_lines_of(found) else None)
         elif found is NotData.REMOTE_FRAME:
             self._report.remote_frames += 1
         elif isinstance(found, LineFrame) and self._is_ours(found.channel, 1):

@@ -87,7 +87,7 @@ class LineShape:
         return t_ns, (np.maximum.reduce(digits) <= 9) & (seconds <= LAST_SECOND)
 
     def _identifiers(self, lines: U8) -> tuple[U32, Bool]:
-        nibbles = _NIBBLES[lines[self.hash_at - self.n_id : self.hash_at]]
+        nibbles = _NIBBLES.take(lines[self.hash_at - self.n_id : self.hash_at])
         can_id = np.zeros(lines.shape[1], np.uint32)
         for row in nibbles:
             can_id = (can_id << np.uint32(4)) | row
@@ -97,7 +97,7 @@ class LineShape:
 
     def _payloads(self, lines: U8, width: int) -> tuple[U8, Bool]:
         first = self.hash_at + (3 if self.is_fd else 1)
-        nibbles = _NIBBLES[lines[first : first + 2 * self.n_payload]]
+        nibbles = _NIBBLES.take(lines[first : first + 2 * self.n_payload])
         payload = np.zeros((lines.shape[1], width), np.uint8)
         kept = min(self.n_payload, width)
         payload[:, :kept] = ((nibbles[0::2] << np.uint8(4)) | nibbles[1::2])[:kept].T

@@ -59,12 +59,15 @@ class LogReport:
     ended_early: str | None = None
     _last_t_ns: int | None = None
 
+    def keeps_lines_of(self, reason: LogReject) -> bool:
+        """Whether the number of a further line refused for ``reason`` would still be kept."""
+        return reason not in self.rejects or len(self.rejects[reason].first_lines) < KEPT_LINE_NUMBERS
+
     def reject(self, reason: LogReject, line: int | None = None) -> None:
         """Count one refused line."""
-        lines = self.rejects.setdefault(reason, RejectedLines())
-        lines.count += 1
-        if line is not None and len(lines.first_lines) < KEPT_LINE_NUMBERS:
-            lines.first_lines.append(line)
+        if line is not None and self.keeps_lines_of(reason):
+            self.rejects.setdefault(reason, RejectedLines()).first_lines.append(line)
+        self.rejects.setdefault(reason, RejectedLines()).count += 1
 
     def hand_on(self, t_ns: I64) -> None:
         """Count frames handed on, by their stamps in order of arrival."""
