@@ -40,7 +40,7 @@ class LineBlock:
 class GzipStream(io.RawIOBase):
     """A gzip file inflated by isal. Unlike a GzipFile it gives all there is before a damage, then raises.
 
-    Raises EOFError where the stream is cut, ValueError where it is damaged.
+    Raises EOFError where the stream is cut, OSError where it is damaged.
     """
 
     def __init__(self, file: BinaryIO) -> None:
@@ -65,7 +65,7 @@ class GzipStream(io.RawIOBase):
             try:
                 text = self._inflater.decompress(self._packed, min(len(room), INFLATED_BYTES))
             except _IsalError as fault:
-                raise ValueError(f"the gzip stream is damaged: {fault}") from None
+                raise OSError(f"the gzip stream is damaged: {fault}") from None
             self._packed = b""
             if text:
                 room[: len(text)] = text
@@ -141,6 +141,6 @@ def _fill(stream: BinaryIO, free: memoryview, report: LogReport) -> int:
     try:
         while n_read < len(free) and (n := stream.readinto1(free[n_read:])):  # type: ignore[attr-defined] # BufferedIOBase has it
             n_read += n
-    except (EOFError, OSError, ValueError) as fault:
+    except (EOFError, OSError) as fault:
         report.ended_early = str(fault)
     return n_read

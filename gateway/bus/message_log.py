@@ -136,7 +136,7 @@ def _text_messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.M
             try:
                 yield from reader
             except (EOFError, OSError) as fault:
-                report.ended_early = f"the file is damaged: {fault}"
+                report.ended_early = str(fault)
                 return
             except Exception:  # noqa: BLE001 # python-can's parsers raise whatever a garbled line makes int() or split() raise
                 report.reject(LogReject.GARBLED, lines.number)

@@ -200,6 +200,23 @@ def test_a_text_log_cut_anywhere_still_reads(suffix, tmp_path, drive, signal_map
         assert len(motion) > share * 380
 
 
+@pytest.mark.parametrize("suffix", TEXT_FORMATS)
+@pytest.mark.parametrize("fault", ["cut", "damaged"])
+def test_a_broken_gzip_of_any_text_log_ends_with_what_was_readable(suffix, fault, tmp_path, drive, signal_map):
+    write_log(drive, tmp_path / f"drive{suffix}")
+    packed = bytearray(gzip.compress((tmp_path / f"drive{suffix}").read_bytes()))
+    middle = len(packed) // 2
+    if fault == "cut":
+        del packed[middle:]
+    else:
+        packed[middle : middle + 200] = bytes(200)
+    (tmp_path / f"drive{suffix}.gz").write_bytes(packed)
+    motion, report = read(tmp_path / f"drive{suffix}.gz", signal_map)
+    assert len(motion) < 410
+    assert report.ended_early is not None
+    assert report.ended_early.startswith("the gzip stream is")
+
+
 def test_a_cut_blf_gives_what_was_readable_and_says_so(tmp_path, drive, signal_map, monkeypatch):
     monkeypatch.setattr(can.BLFWriter, "max_container_size", 4096)
     path = tmp_path / "drive.blf"
