@@ -3,6 +3,7 @@
 from gateway.web.app import create_app
 from gateway.web.board import Board
 from gateway.web.reader import Reader
+from gateway.web.serving import Tls, refuse_open_address, server_config
 from gateway.web.settings import WebSettings
 from gateway.web.status import (
     BatchCounts,
@@ -13,6 +14,7 @@ from gateway.web.status import (
     Status,
     StoreStatus,
 )
+from gateway.web.tokens import Scope, Token, TokenFile
 
 __all__ = [
     "BatchCounts",
@@ -20,10 +22,16 @@ __all__ = [
     "BusStatus",
     "DecodeCount",
     "Reader",
+    "Scope",
     "SignalHealth",
     "State",
     "Status",
     "StoreStatus",
+    "Tls",
+    "Token",
+    "TokenFile",
     "WebSettings",
     "create_app",
+    "refuse_open_address",
+    "server_config",
 ]

@@ -13,6 +13,7 @@ from gateway.web import pages, problems
 from gateway.web.api import api_router
 from gateway.web.board import Board
 from gateway.web.export import export_router
+from gateway.web.guard import Failures, Guard, describe_guard
 from gateway.web.headers import SecurityHeaders
 from gateway.web.health import health_router
 from gateway.web.latest import LatestFirst
@@ -20,6 +21,7 @@ from gateway.web.metrics import metrics_registry
 from gateway.web.reader import Reader
 from gateway.web.settings import WebSettings
 from gateway.web.status import Status
+from gateway.web.tokens import TokenFile
 from gateway.web.vehicle import vehicle_router
 
 API_VERSION: Final = "1.0.0"
@@ -34,6 +36,7 @@ def create_app(
     status: Callable[[], Status],
     settings: WebSettings | None = None,
     calibrated: CalibratedVehicle | None = None,
+    tokens: TokenFile | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe).
@@ -48,8 +51,9 @@ def create_app(
         yield
         board.close()
 
+    failures = Failures(chosen.n_wrong_tokens_per_min)
     app = _Application(
-        wrap=lambda inner: SecurityHeaders(LatestFirst(inner, board), responses),
+        wrap=lambda inner: SecurityHeaders(Guard(LatestFirst(inner, board), tokens, failures), responses),
         title="Springscale",
         version=API_VERSION,
         description=_DESCRIPTION,
@@ -64,7 +68,7 @@ def create_app(
     app.include_router(export_router(reader))
     app.include_router(health_router(status, metrics_registry(board, status, responses)))
     pages.install(app)
-    _describe_problems(app)
+    _describe(app, is_guarded=tokens is not None)
     return app
 
 
@@ -79,18 +83,17 @@ class _Application(FastAPI):
         return self._wrap(super().build_middleware_stack())
 
 
-def _describe_problems(app: FastAPI) -> None:
-    """Let the description say that problems come as application/problem+json."""
+def _describe(app: FastAPI, *, is_guarded: bool) -> None:
+    """Let the description say that problems come as application/problem+json, and that tokens are needed."""
     describe = app.openapi
 
     def openapi() -> dict[str, Any]:
+        is_known = app.openapi_schema is not None
         schema = describe()
-        for operations in schema["paths"].values():
-            for operation in operations.values():
-                for code, response in operation["responses"].items():
-                    content = response.get("content", {})
-                    if int(code) >= 400 and "application/json" in content:
-                        content[problems.MEDIA_TYPE] = content.pop("application/json")
+        if not is_known:
+            problems.describe_problems(schema)
+            if is_guarded:
+                describe_guard(schema)
         return schema
 
     app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's documented way to extend the description

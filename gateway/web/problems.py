@@ -2,6 +2,7 @@
 
 import http
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -39,6 +40,16 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(StoreError, _unavailable)
     app.add_exception_handler(TimeoutError, _unavailable)
     app.add_exception_handler(Exception, _unforeseen)
+
+
+def describe_problems(schema: dict[str, Any]) -> None:
+    """Say in the API's description under which media type problems come."""
+    for operations in schema["paths"].values():
+        for operation in operations.values():
+            for code, response in operation["responses"].items():
+                content = response.get("content", {})
+                if int(code) >= 400 and "application/json" in content:
+                    content[MEDIA_TYPE] = content.pop("application/json")
 
 
 async def _http(request: Request, error: Exception) -> Response:

@@ -1,4 +1,7 @@
-"""Schemathesis asks what the description allows and what it forbids, and holds every answer to it."""
+"""Schemathesis asks what the description allows and what it forbids, and holds every answer to it.
+
+With tokens on: it also checks that no route answers without one.
+"""
 
 import tempfile
 from collections.abc import Iterator
@@ -13,6 +16,7 @@ from support.estimates import make_record
 from support.web import Gateway
 
 from gateway.records import Why
+from gateway.web import Scope, TokenFile, WebSettings
 
 PATHS = [
     "/api/v1/estimates/latest",
@@ -29,9 +33,23 @@ PATHS = [
 ]
 
 
+PATIENT = WebSettings(n_wrong_tokens_per_min=1_000_000)  # schemathesis tries many
+
+
 @pytest.fixture(scope="module")
-def schema() -> Iterator[BaseSchema]:
-    with tempfile.TemporaryDirectory() as directory, Gateway(Path(directory)) as gateway:
+def token_file() -> Iterator[TokenFile]:
+    with tempfile.TemporaryDirectory() as directory:
+        yield TokenFile(Path(directory) / "tokens.json")
+
+
+@pytest.fixture(scope="module")
+def headers(token_file: TokenFile) -> dict[str, str]:
+    return {"Authorization": f"Bearer {token_file.create('schemathesis', Scope.READ)}"}
+
+
+@pytest.fixture(scope="module")
+def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
+    with tempfile.TemporaryDirectory() as directory, Gateway(Path(directory), PATIENT, token_file) as gateway:
         gateway.publish(*(make_record(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
         assert gateway.store.flush(10.0)
         gateway.board.close()  # so that the stream has an end
@@ -55,10 +73,12 @@ WITH_PARAMETERS = [
     ("path", "mode"),
     [(path, GenerationMode.POSITIVE) for path in PATHS] + [(path, GenerationMode.NEGATIVE) for path in WITH_PARAMETERS],
 )
-def test_every_answer_is_as_described(schema: BaseSchema, path: str, mode: GenerationMode) -> None:
+def test_every_answer_is_as_described(
+    schema: BaseSchema, headers: dict[str, str], path: str, mode: GenerationMode
+) -> None:
     @settings(max_examples=20, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(case=operations(schema)[path].as_strategy(generation_mode=mode))
     def ask(case: schemathesis.Case) -> None:
-        case.call_and_validate()
+        case.call_and_validate(headers=headers)
 
     ask()

@@ -152,7 +152,7 @@ def test_a_client_that_does_not_read_is_left_behind_alone(tmp_path: Path) -> Non
         async def scenario(server: Server) -> None:
             host, port = server.socket.getsockname()
             _, deaf = await asyncio.open_connection(host, port, limit=1024)
-            deaf.write(b"GET /api/v1/stream HTTP/1.1\r\nhost: gateway\r\n\r\n")
+            deaf.write(b"GET /api/v1/stream HTTP/1.1\r\nhost: localhost\r\n\r\n")
             async with listening(server) as listener:
                 await until(lambda: fanout.n_subscribers == 2)
                 n_sent = 0

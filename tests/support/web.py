@@ -14,18 +14,18 @@ import uvicorn
 from fastapi import FastAPI
 
 from gateway.store import Store
-from gateway.web import Board, State, Status, WebSettings, create_app
+from gateway.web import Board, State, Status, TokenFile, WebSettings, create_app, server_config
 
 
 class Gateway:
     """The web room with a real store behind it; ``clock_s`` and ``status`` are the test's to set."""
 
-    def __init__(self, directory: Path, settings: WebSettings | None = None) -> None:
+    def __init__(self, directory: Path, settings: WebSettings | None = None, tokens: TokenFile | None = None) -> None:
         self.clock_s = 1000.0
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
         self.store = Store.open(directory)
         self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
-        self.app: FastAPI = create_app(self.board, self.store.reader(), lambda: self.status, settings)
+        self.app: FastAPI = create_app(self.board, self.store.reader(), lambda: self.status, settings, tokens=tokens)
 
     def publish(self, *records: dict[str, Any]) -> list[str]:
         """As the pipeline does: into the store, then onto the board."""
@@ -46,8 +46,9 @@ class Gateway:
 class Client:
     """Asks the application itself, without a server in between; an error in it is an answer, not an exception."""
 
-    def __init__(self, app: FastAPI) -> None:
+    def __init__(self, app: FastAPI, address: str = "127.0.0.1") -> None:
         self._app = app
+        self._client = (address, 12345)
 
     def get(self, url: str, **options: Any) -> httpx.Response:
         return self.request("GET", url, **options)
@@ -56,18 +57,17 @@ class Client:
         return asyncio.run(self._ask(method, url, **options))
 
     async def _ask(self, method: str, url: str, **options: Any) -> httpx.Response:
-        transport = httpx.ASGITransport(self._app, raise_app_exceptions=False)
-        async with httpx.AsyncClient(transport=transport, base_url="http://gateway") as client:
+        transport = httpx.ASGITransport(self._app, raise_app_exceptions=False, client=self._client)
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost:8000") as client:
             return await client.request(method, url, **options)
 
 
 class Server:
     """The application under uvicorn, on a loopback port of its own."""
 
-    def __init__(self, app: FastAPI) -> None:
+    def __init__(self, config: uvicorn.Config) -> None:
         self.socket = socket.create_server(("127.0.0.1", 0))
         self.url = f"http://127.0.0.1:{self.socket.getsockname()[1]}"
-        config = uvicorn.Config(app, loop="uvloop", http="httptools", access_log=False, log_config=None)
         self.uvicorn = uvicorn.Server(config)
         self.is_up = threading.Event()
         self.thread = threading.Thread(target=self._run)
@@ -84,9 +84,9 @@ class Server:
 
 
 @contextmanager
-def serving(app: FastAPI) -> Iterator[Server]:
+def serving(app: FastAPI, config: uvicorn.Config | None = None) -> Iterator[Server]:
     """A running server; stopped at the end if the test has not done so."""
-    server = Server(app)
+    server = Server(config or server_config(app, "127.0.0.1", 0))
     server.thread.start()
     assert server.is_up.wait(20.0)
     try:

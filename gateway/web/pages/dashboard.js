@@ -1,4 +1,5 @@
 import { follow } from "/pages/event-stream.js";
+import { Refused, load, setToken } from "/pages/gateway.js";
 
 const N_RECENT = 25;
 const STATUS_EVERY_MS = 5000;
@@ -109,12 +110,6 @@ function showStatus(status) {
   ])));
 }
 
-async function load(path) {
-  const response = await fetch(path, { cache: "no-store" });
-  if (!response.ok) throw new Error(`${path}: status ${response.status}`);
-  return response.json();
-}
-
 async function refreshLatest() {
   latest = await load("/api/v1/estimates/latest");
   latestAtMs = performance.now();
@@ -125,8 +120,11 @@ async function refreshStatus() {
   try {
     showStatus(await load("/api/v1/status"));
     await refreshLatest();
+    element("token").hidden = true;
   } catch (error) {
-    write("state", "The gateway does not answer. What is shown is the last it said.");
+    const isRefused = error instanceof Refused;
+    if (isRefused) element("token").hidden = false;
+    write("state", isRefused ? "The gateway wants a token." : "The gateway does not answer. What is shown is the last it said.");
   }
 }
 
@@ -155,5 +153,11 @@ async function begin() {
   setInterval(showAge, 1000);
   await follow("/api/v1/stream", cursor, onEvent, onLink);
 }
+
+element("token").addEventListener("submit", (event) => {
+  event.preventDefault();
+  setToken(element("token-text").value);
+  location.reload();
+});
 
 begin();

@@ -1,5 +1,7 @@
 // Server-sent events over fetch: unlike EventSource it can carry a token, and it says why a connection failed.
 
+import { ask } from "/pages/gateway.js";
+
 const FIRST_PAUSE_MS = 1000;
 const LAST_PAUSE_MS = 30000;
 
@@ -9,8 +11,7 @@ export async function follow(url, lastEventId, onEvent, onLink) {
   let pauseMs = FIRST_PAUSE_MS;
   for (;;) {
     try {
-      const response = await fetch(url, { headers: cursor ? { "Last-Event-ID": cursor } : {}, cache: "no-store" });
-      if (!response.ok) throw new Error(`status ${response.status}`);
+      const response = await ask(url, cursor ? { "Last-Event-ID": cursor } : {});
       onLink(true);
       pauseMs = FIRST_PAUSE_MS;
       for await (const event of parsed(response.body)) {

@@ -1,0 +1,189 @@
+"""Who is answered and who is not, and what the refusal tells."""
+
+import logging
+import ssl
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+import trustme
+from support.web import Client, Gateway, serving
+
+from gateway.errors import ConfigurationError
+from gateway.web import Scope, Tls, TokenFile, WebSettings, refuse_open_address, server_config
+from gateway.web.guard import Failures, is_loopback
+
+GUARDED = ["/api/v1/estimates/latest", "/api/v1/estimates", "/api/v1/status", "/api/v1/stream", "/metrics"]
+GUARDED += ["/api/v1/vehicle", "/api/v1/export.csv", "/health/ready", "/nothing", "/api/v1/estimates/latest/"]
+GUARDED += ["/pages", "/pagesx/../api/v1/status", "/health/live/../ready", "/api/v1/../../metrics"]
+
+
+@pytest.fixture
+def tokens(tmp_path: Path) -> TokenFile:
+    return TokenFile(tmp_path / "tokens.json")
+
+
+@pytest.fixture
+def gateway(tmp_path: Path, tokens: TokenFile) -> Iterator[Gateway]:
+    with Gateway(tmp_path / "store", WebSettings(n_wrong_tokens_per_min=3), tokens) as opened:
+        yield opened
+
+
+@pytest.fixture
+def client(gateway: Gateway) -> Client:
+    return Client(gateway.app)
+
+
+def bearer(text: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {text}"}
+
+
+@pytest.mark.parametrize("path", GUARDED)
+def test_without_a_token_nothing_is_told(client: Client, path: str) -> None:
+    answer = client.get(path)
+    assert answer.status_code == 401
+    assert answer.headers["www-authenticate"] == 'Bearer realm="springscale"'
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert "payload" not in answer.text
+
+
+@pytest.mark.parametrize("path", ["/", "/docs", "/openapi.json", "/health/live", "/pages/dashboard.js"])
+def test_what_tells_nothing_of_the_vehicle_is_public(client: Client, path: str) -> None:
+    assert client.get(path).status_code == 200
+
+
+def test_public_folders_lead_nowhere_else(client: Client) -> None:
+    for path in (
+        "/pages/../api/v1/status",
+        "/pages/%2e%2e/api/v1/status",
+        "/pages//../../app.py",
+        "/swagger/..%2fcore.py",
+    ):
+        assert client.get(path).status_code in (401, 404), path
+
+
+def test_a_token_opens_what_its_scope_allows(client: Client, tokens: TokenFile) -> None:
+    reader, operator = tokens.create("reader", Scope.READ), tokens.create("operator", Scope.OPERATE)
+    for text in (reader, operator):
+        assert client.get("/api/v1/estimates/latest", headers=bearer(text)).status_code == 200
+        assert client.get("/api/v1/status", headers={"authorization": f"bearer  {text} "}).status_code == 200
+    refused = client.request("POST", "/api/v1/status", headers=bearer(reader))
+    assert refused.status_code == 403
+    assert 'scope="operate"' in refused.headers["www-authenticate"]
+    assert client.request("POST", "/api/v1/status", headers=bearer(operator)).status_code == 405
+
+
+@pytest.mark.parametrize(
+    "shown", ["", "Bearer", "Bearer ", "Basic dXNlcjpwYXNz", "Bearer spr_x_y", "spr", "Bearer \xff"]
+)
+def test_garbled_credentials_are_refused(client: Client, tokens: TokenFile, shown: str) -> None:
+    tokens.create("reader", Scope.READ)
+    headers = [(b"authorization", shown.encode("latin-1"))]
+    answer = client.get("/api/v1/status", headers=headers)
+    assert answer.status_code == 401
+    assert 'error="invalid_token"' in answer.headers["www-authenticate"]
+
+
+def test_a_token_in_the_address_does_not_count(client: Client, tokens: TokenFile) -> None:
+    text = tokens.create("reader", Scope.READ)
+    assert client.get(f"/api/v1/status?access_token={text}").status_code == 401
+
+
+def test_many_wrong_tokens_are_told_to_wait_and_right_ones_still_pass(client: Client, tokens: TokenFile) -> None:
+    text = tokens.create("reader", Scope.READ)
+    codes = [client.get("/api/v1/status", headers=bearer("wrong")).status_code for _ in range(5)]
+    assert codes == [401, 401, 401, 429, 429]
+    told = client.get("/api/v1/status", headers=bearer("wrong"))
+    assert 0 < int(told.headers["retry-after"]) <= 60
+    assert client.get("/api/v1/status", headers=bearer(text)).status_code == 200
+
+
+def test_failures_are_forgotten_after_a_minute_and_never_fill_the_memory() -> None:
+    now_s = 0.0
+    failures = Failures(2, clock_s=lambda: now_s)
+    assert [failures.note("a") for _ in range(3)] == [None, None, 60]
+    assert failures.note("b") is None
+    now_s = 60.0
+    assert failures.note("a") is None
+    for n in range(5000):
+        failures.note(str(n))
+    assert len(failures._by_address) <= 1024
+
+
+def test_no_secret_reaches_the_log(
+    client: Client, tokens: TokenFile, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+) -> None:
+    caplog.set_level(logging.DEBUG)
+    text = tokens.create("reader", Scope.READ)
+    for shown in (text, text + "x"):
+        client.get("/api/v1/status", headers=bearer(shown))
+    written = caplog.text + "".join(capfd.readouterr())
+    assert text.split("_", 2)[2] not in written
+
+
+def test_other_origins_are_given_no_permission(client: Client, tokens: TokenFile) -> None:
+    headers = bearer(tokens.create("reader", Scope.OPERATE)) | {"Origin": "https://elsewhere.example"}
+    answer = client.get("/api/v1/status", headers=headers)
+    preflight = client.request("OPTIONS", "/api/v1/status", headers=headers)
+    assert preflight.status_code == 405
+    for each in (answer, preflight):
+        assert not [name for name in each.headers if name.startswith("access-control-")]
+        assert each.headers["cross-origin-resource-policy"] == "same-origin"
+
+
+LOCAL = ["localhost:8000", "127.0.0.1:1", "[::1]:8000", "[::1]", "LOCALHOST"]
+ELSEWHERE = ["evil.example", "localhost.evil.example:8000", "192.168.1.7:8000", "", "evil.example:localhost"]
+
+
+@pytest.mark.parametrize(("host", "code"), [*((h, 200) for h in LOCAL), *((h, 421) for h in ELSEWHERE)])
+def test_without_tokens_only_local_names_are_answered_for(tmp_path: Path, host: str, code: int) -> None:
+    with Gateway(tmp_path) as gateway:
+        assert Client(gateway.app).get("/api/v1/status", headers={"Host": host}).status_code == code
+
+
+def test_without_tokens_only_this_machine_is_answered(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        assert Client(gateway.app, address="192.168.1.7").get("/api/v1/status").status_code == 403
+        assert Client(gateway.app, address="::1").get("/api/v1/status").status_code == 200
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.7", "::", "gateway.local", ""])
+def test_an_open_address_needs_tokens(host: str) -> None:
+    assert not is_loopback(host)
+    with pytest.raises(ConfigurationError, match="springscale token create"):
+        refuse_open_address(host, has_tokens=False)
+    refuse_open_address(host, has_tokens=True)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.1", "::1", "localhost"])
+def test_a_local_address_needs_none(host: str) -> None:
+    refuse_open_address(host, has_tokens=False)
+
+
+def test_tls_and_client_certificates(tmp_path: Path) -> None:
+    authority = trustme.CA()
+    authority.cert_pem.write_to_path(str(tmp_path / "authority.pem"))
+    issued = authority.issue_cert("localhost")
+    issued.cert_chain_pems[0].write_to_path(str(tmp_path / "server.pem"))
+    issued.private_key_pem.write_to_path(str(tmp_path / "server.key"))
+    tls = Tls(tmp_path / "server.pem", tmp_path / "server.key", client_ca=tmp_path / "authority.pem")
+    with (
+        Gateway(tmp_path / "store") as gateway,
+        serving(gateway.app, server_config(gateway.app, "127.0.0.1", 0, tls)) as server,
+    ):
+        address = server.url.replace("http://127.0.0.1", "https://localhost") + "/health/live"
+        client_side = ssl.create_default_context(cafile=str(tmp_path / "authority.pem"))
+        with pytest.raises(httpx.TransportError):
+            httpx.get(address, verify=client_side)
+        authority.issue_cert("fleet@example.org").configure_cert(client_side)
+        assert httpx.get(address, verify=client_side).json() == {"is_alive": True}
+
+
+def test_tls_files_that_cannot_be_used_are_said(tmp_path: Path) -> None:
+    (tmp_path / "server.pem").write_text("no certificate")
+    with (
+        Gateway(tmp_path / "store") as gateway,
+        pytest.raises(ConfigurationError, match=r"server\.pem.*cannot be used"),
+    ):
+        server_config(gateway.app, "127.0.0.1", 0, Tls(tmp_path / "server.pem", tmp_path / "absent.pem"))

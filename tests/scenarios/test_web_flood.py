@@ -1,0 +1,141 @@
+"""Connections that mean no good: slow, endless, too many. Others are answered all the while."""
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from support.web import Gateway, Server, serving
+
+from gateway.web import connection
+
+LIMIT_S = 20.0
+STRANGER = "127.0.0.2"  # another address of this machine
+
+Connection = tuple[asyncio.StreamReader, asyncio.StreamWriter]
+
+
+async def connect(server: Server) -> Connection:
+    host, port = server.socket.getsockname()
+    return await asyncio.open_connection(host, port, local_addr=(STRANGER, 0))
+
+
+async def ended(connection: Connection) -> bytes:
+    """What the server said before it ended the connection."""
+    reader, writer = connection
+    try:
+        said = await asyncio.wait_for(reader.read(), LIMIT_S)
+    except ConnectionResetError:
+        said = b""
+    writer.transport.abort()
+    return said
+
+
+async def assert_others_are_answered(server: Server) -> None:
+    async with httpx.AsyncClient(timeout=LIMIT_S) as client:
+        assert (await client.get(f"{server.url}/api/v1/estimates/latest")).status_code == 200
+
+
+def run(tmp_path: Path, scenario: Callable[[Server], Coroutine[Any, Any, None]]) -> None:
+    with Gateway(tmp_path) as gateway, serving(gateway.app) as server:
+        asyncio.run(scenario(server))
+
+
+def test_a_request_that_never_ends_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "REQUEST_S", 0.3)
+
+    async def scenario(server: Server) -> None:
+        slow = [await connect(server) for _ in range(30)]
+        for n, (_, writer) in enumerate(slow):  # some say nothing at all, some begin, some promise a body
+            begun = [b"", b"GET / HTTP/1.1\r\nHost: local", b"POST / HTTP/1.1\r\nContent-Length: 9\r\n\r\nx"]
+            writer.write(begun[n % 3])
+        await assert_others_are_answered(server)
+        await asyncio.gather(*(ended(each) for each in slow))
+
+    run(tmp_path, scenario)
+
+
+def test_a_connection_that_asked_in_time_is_not_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "REQUEST_S", 0.05)
+
+    async def scenario(server: Server) -> None:
+        reader, writer = await connect(server)
+        for _ in range(2):
+            writer.write(b"GET /health/live HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            assert (await reader.readuntil(b'{"is_alive":true}')).startswith(b"HTTP/1.1 200")
+            await asyncio.sleep(0.2)
+        writer.transport.abort()
+
+    run(tmp_path, scenario)
+
+
+def test_more_connections_than_one_address_may_have_are_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "CONNECTIONS_PER_ADDRESS", 10)
+
+    async def scenario(server: Server) -> None:
+        flood = [await connect(server) for _ in range(25)]
+        refused = await asyncio.gather(*(ended(each) for each in flood[10:]))
+        assert refused == [b""] * 15
+        await assert_others_are_answered(server)
+        for _, writer in flood[:10]:
+            writer.transport.abort()
+        async with asyncio.timeout(LIMIT_S):
+            while len(server.uvicorn.server_state.connections) > 0:
+                await asyncio.sleep(0.005)
+        reader, writer = await connect(server)  # places are given back
+        writer.write(b"GET /health/live HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        assert (await reader.read(12)) == b"HTTP/1.1 200"
+        writer.transport.abort()
+
+    run(tmp_path, scenario)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [b"GET /" + b"a" * 40_000, b"GET / HTTP/1.1\r\nX: " + b"b" * 40_000, b"GET / HTTP/1.1\r\n" + b"C: d\r\n" * 9000],
+)
+def test_an_endless_head_is_refused(tmp_path: Path, head: bytes) -> None:
+    async def scenario(server: Server) -> None:
+        stranger = await connect(server)
+        stranger[1].write(head)
+        said = await ended(stranger)
+        assert said == b"" or said.startswith(b"HTTP/1.1 400")  # the reset may overtake the answer
+        await assert_others_are_answered(server)
+
+    run(tmp_path, scenario)
+
+
+@pytest.mark.parametrize("kind", [b"Content-Length: 100000000", b"Transfer-Encoding: chunked"])
+def test_an_endless_body_is_cut_off(tmp_path: Path, kind: bytes) -> None:
+    async def scenario(server: Server) -> None:
+        stranger = await connect(server)
+        _, writer = stranger
+        writer.write(b"POST /api/v1/status HTTP/1.1\r\nHost: localhost\r\n" + kind + b"\r\n\r\n")
+        writer.write((b"10000\r\n" + b"x" * 0x10000 + b"\r\n") * 16)
+        said = await ended(stranger)
+        assert said == b"" or said.startswith(b"HTTP/1.1 4")
+        await assert_others_are_answered(server)
+
+    run(tmp_path, scenario)
+
+
+@pytest.mark.parametrize(
+    "request_text",
+    [
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"\x16\x03\x01\x02\x00\x01",  # a TLS hello
+        b"GET / HTTP/1.1\r\nHost: localhost\r\nX: a\x00b\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5\r\n\r\n",
+    ],
+)
+def test_what_is_no_request_ends_with_400(tmp_path: Path, request_text: bytes) -> None:
+    async def scenario(server: Server) -> None:
+        stranger = await connect(server)
+        stranger[1].write(request_text)
+        assert (await ended(stranger)).startswith(b"HTTP/1.1 400")
+        await assert_others_are_answered(server)
+
+    run(tmp_path, scenario)

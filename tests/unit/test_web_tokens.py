@@ -1,0 +1,115 @@
+"""Tokens: shown once, kept as hashes, gone when revoked, expired or unreadable."""
+
+import json
+import stat
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.errors import ConfigurationError
+from gateway.web import Scope, TokenFile
+
+
+class Clock:
+    now_s = 1_000_000.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "new folder" / "tokens.json"
+
+
+def test_a_token_is_recognised_and_its_secret_is_not_kept(path: Path) -> None:
+    text = TokenFile(path).create("fleet", Scope.READ)
+    found = TokenFile(path).verify(text)
+    assert found is not None
+    assert (found.name, found.scope) == ("fleet", Scope.READ)
+    kept = path.read_text()
+    assert text.split("_", 2)[2] not in kept
+    assert found.sha256 not in repr(found)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert [entry.name for entry in path.parent.iterdir()] == ["tokens.json"]
+
+
+def test_every_token_is_another(path: Path) -> None:
+    tokens = TokenFile(path)
+    assert len({tokens.create(f"n{i}", Scope.READ) for i in range(20)}) == 20
+
+
+def test_what_another_process_revokes_is_refused_at_once(path: Path) -> None:
+    service, command_line = TokenFile(path), TokenFile(path)
+    first, second = command_line.create("first", Scope.READ), command_line.create("second", Scope.OPERATE)
+    assert service.verify(first) is not None
+    command_line.revoke("first")
+    assert service.verify(first) is None
+    assert service.verify(second) is not None
+    command_line.revoke(second.split("_")[1])  # by its id
+    assert service.verify(second) is None
+
+
+def test_a_token_ends_when_its_time_is_over(path: Path) -> None:
+    clock = Clock()
+    tokens = TokenFile(path, clock)
+    text = tokens.create("short", Scope.READ, lifetime_s=60.0)
+    clock.now_s += 59.0
+    assert tokens.verify(text) is not None
+    clock.now_s += 1.0
+    assert tokens.verify(text) is None
+    assert tokens.tokens()[0].expiry() == "1970-01-12T13:47Z"
+
+
+@given(text=st.text(max_size=80))
+def test_any_other_text_is_no_token(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    tokens = TokenFile(tmp_path_factory.mktemp("tokens") / "tokens.json")
+    tokens.create("one", Scope.READ)
+    assert tokens.verify(text) is None
+
+
+def test_a_token_changed_in_any_place_is_no_token(path: Path) -> None:
+    tokens = TokenFile(path)
+    text = tokens.create("one", Scope.READ)
+    for place, letter in enumerate(text):
+        other = "A" if letter != "A" else "B"
+        assert tokens.verify(text[:place] + other + text[place + 1 :]) is None
+    assert tokens.verify(text + "A") is None
+    assert tokens.verify(text[:-1]) is None
+    assert tokens.verify(text) is not None
+
+
+def test_names_are_unique_and_unknown_ones_are_said(path: Path) -> None:
+    tokens = TokenFile(path)
+    tokens.create("fleet", Scope.READ)
+    with pytest.raises(ConfigurationError, match="already"):
+        tokens.create("fleet", Scope.OPERATE)
+    with pytest.raises(ConfigurationError, match="no token 'flet'"):
+        tokens.revoke("flet")
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"format": "other", "version": 1}'])
+def test_a_file_that_cannot_be_read_lets_nobody_in(path: Path, content: str) -> None:
+    tokens = TokenFile(path)
+    text = tokens.create("fleet", Scope.READ)
+    assert tokens.verify(text) is not None
+    path.write_text(content)
+    assert tokens.verify(text) is None
+    with pytest.raises(ConfigurationError, match="no token file"):
+        tokens.tokens()
+
+
+def test_an_edited_scope_must_be_a_scope(path: Path) -> None:
+    TokenFile(path).create("fleet", Scope.READ)
+    content = json.loads(path.read_text())
+    content["tokens"][0]["scope"] = "everything"
+    path.write_text(json.dumps(content))
+    with pytest.raises(ConfigurationError, match="scope"):
+        TokenFile(path).tokens()
+
+
+def test_who_may_operate_may_read() -> None:
+    allowed = {(held, wanted) for held in Scope for wanted in Scope if held.allows(wanted)}
+    assert allowed == {(Scope.READ, Scope.READ), (Scope.OPERATE, Scope.READ), (Scope.OPERATE, Scope.OPERATE)}
