@@ -91,6 +91,12 @@ def spring_force(corner: Any, travel_m: float) -> float:
 
 
 @compiled
+def saturated(x: float) -> float:
+    """Smooth, odd, of slope 1 at 0, towards -1 and 1: x / sqrt(1 + x^2), several times faster than tanh."""
+    return x / math.sqrt(1.0 + x * x)
+
+
+@compiled
 def damper_force(corner: Any, rate_mps: float) -> float:
     """Digressive asymmetric damper and smoothed Coulomb friction [N] at a compression rate."""
     side = corner["compression_nspm"] if rate_mps > 0.0 else corner["rebound_nspm"]
@@ -98,10 +104,10 @@ def damper_force(corner: Any, rate_mps: float) -> float:
     effective = rate_mps
     if q < 1.0:
         knee = corner["knee_mps"]
-        effective = q * rate_mps + (1.0 - q) * knee * math.tanh(rate_mps / knee)
+        effective = q * rate_mps + (1.0 - q) * knee * saturated(rate_mps / knee)
     force: float = side * effective
     if corner["friction_n"] > 0.0:
-        force += corner["friction_n"] * math.tanh(rate_mps / corner["friction_slip_mps"])
+        force += corner["friction_n"] * saturated(rate_mps / corner["friction_slip_mps"])
     return force
 
 

@@ -26,8 +26,8 @@ class Spring:
 class Damper:
     """Digressive and asymmetric: rate below the knee velocity, digression times it far above.
 
-    F = c (q v + (1 - q) v_k tanh(v / v_k)), c the rate of the side, q the digression. Coulomb
-    friction is friction_n tanh(v / friction_slip_mps).
+    F = c (q v + (1 - q) v_k S(v / v_k)), c the rate of the side, q the digression. Coulomb
+    friction is friction_n S(v / friction_slip_mps). S(x) = x / sqrt(1 + x^2).
     """
 
     compression_nspm: float
