@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
 
-from prometheus_client import CollectorRegistry
+from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from gateway.web.board import Board
@@ -39,6 +39,7 @@ def metrics_registry(board: Board, status: Callable[[], Status], responses: Coun
     """A registry of our own: no process-wide state, two apps do not meet."""
     registry = CollectorRegistry(auto_describe=False)
     registry.register(StatusCollector(board, status, responses))
+    ProcessCollector(namespace="springscale", registry=registry)
     return registry
 
 

@@ -1,0 +1,112 @@
+"""The alert rules and the Grafana dashboard speak PromQL, and only of metrics and labels that /metrics has."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import promql_parser
+import pytest
+import yaml
+from prometheus_client.parser import text_string_to_metric_families
+from support.estimates import make_record
+from support.web import Client, Gateway
+
+from gateway.web import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status
+
+DEPLOY = Path(__file__).parents[2] / "deploy"
+RULES = [
+    rule
+    for group in yaml.safe_load((DEPLOY / "prometheus" / "springscale.rules.yml").read_text())["groups"]
+    for rule in group["rules"]
+]
+DASHBOARD = json.loads((DEPLOY / "grafana" / "springscale.json").read_text())
+TARGETS = [(panel["title"], target["expr"]) for panel in DASHBOARD["panels"] for target in panel["targets"]]
+BY_PROMETHEUS = {"up"}
+LABELS_BY_PROMETHEUS = {"instance", "job"}
+
+
+@pytest.fixture(scope="module")
+def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set[str]]]:
+    """Label values by label, by name of a sample, of a service that has seen everything once."""
+    with Gateway(tmp_path_factory.mktemp("store")) as gateway:
+        gateway.status = Status(
+            version="1.2.3",
+            state=State.ESTIMATING,
+            uptime_s=60.0,
+            bus=BusStatus(n_kernel_dropped=0, last_frame_age_s=0.1),
+            decode=(DecodeCount(signal="speed", reason="ok", n=7),),
+            signals=(SignalHealth(signal="speed", rate_hz=5.0, last_age_s=0.1, rejected_share=0.0),),
+            batches=BatchCounts(n_estimates=1, n_rejected=2, rejected_by_reason={"gap": 2}),
+        )
+        gateway.publish({**make_record(0), "front_share_std_pct": 0.5})
+        Client(gateway.app).get("/health/live")
+        text = Client(gateway.app).get("/metrics").text
+    found: dict[str, dict[str, set[str]]] = {}
+    for family in text_string_to_metric_families(text):
+        for sample in family.samples:
+            labels = found.setdefault(sample.name, {})
+            for label, content in sample.labels.items():
+                labels.setdefault(label, set()).add(content)
+    return found
+
+
+def selectors(expression: str) -> Iterator[Any]:
+    """Every vector selector of a PromQL expression, Grafana's variables filled in."""
+    found: list[Any] = []
+
+    def note(node: Any) -> bool:
+        if isinstance(node, promql_parser.VectorSelector):
+            found.append(node)
+        return True
+
+    promql_parser.walk(promql_parser.parse(expression.replace("$instance", "van-17")), note)
+    assert found
+    return iter(found)
+
+
+def assert_exposed(expression: str, exposed: dict[str, dict[str, set[str]]]) -> None:
+    for selector in selectors(expression):
+        if selector.name in BY_PROMETHEUS:
+            continue
+        assert selector.name in exposed, selector.name
+        for matcher in selector.matchers.matchers:
+            if matcher.name in LABELS_BY_PROMETHEUS:
+                continue
+            known = exposed[selector.name].get(matcher.name, set())
+            assert known, f"{selector.name} has no label {matcher.name}"
+            assert any(re.fullmatch(wanted, k) for wanted in matcher.value.split("|") for k in known), matcher.value
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule["alert"])
+def test_an_alert_can_fire_and_says_what_to_do(rule: dict[str, Any], exposed: dict[str, dict[str, set[str]]]) -> None:
+    assert_exposed(rule["expr"], exposed)
+    assert rule["labels"]["severity"] in ("warning", "critical")
+    assert {"summary", "description"} == set(rule["annotations"])
+    if "for" in rule:
+        promql_parser.parse_duration(rule["for"])
+
+
+@pytest.mark.parametrize(("title", "expression"), TARGETS)
+def test_a_panel_shows_what_is_exposed(title: str, expression: str, exposed: dict[str, dict[str, set[str]]]) -> None:
+    assert title
+    assert_exposed(expression, exposed)
+
+
+def test_the_dashboard_has_no_ambiguous_or_overlapping_panels() -> None:
+    identities = [panel["id"] for panel in DASHBOARD["panels"]]
+    assert len(set(identities)) == len(identities)
+    taken = set[tuple[int, int]]()
+    for panel in DASHBOARD["panels"]:
+        x, y, w, h = (panel["gridPos"][name] for name in "xywh")
+        cells = {(column, row) for column in range(x, x + w) for row in range(y, y + h)}
+        assert not cells & taken, panel["title"]
+        taken |= cells
+    assert max(x for x, _ in taken) < 24
+
+
+def test_names_follow_the_conventions(exposed: dict[str, dict[str, set[str]]]) -> None:
+    for name in exposed:
+        assert re.fullmatch(r"springscale_[a-z0-9_]+", name)
+        assert not re.search(r"_(kg|ms|pct|percent|count|hz)(_|$)", name), name
