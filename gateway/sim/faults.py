@@ -28,8 +28,9 @@ class Fault(StrEnum):
     PITCH_SIGN_FLIPPED = "pitch_sign_flipped"
 
 
-_ACCELERATION_LIMIT_MPS2: Final = 0.3  # beyond gravity
-_RATE_LIMIT_RADPS: Final = 0.01
+_RATTLE: Final = 300.0  # a unit on a loose bracket shakes this much harder than the body
+_ACCELERATION_RANGE_MPS2: Final = 50.0
+_RATE_RANGE_RADPS: Final = 5.0
 
 
 def with_fault(recording: Recording, fault: Fault, from_ns: int) -> Recording:
@@ -46,18 +47,11 @@ def _gyro_stuck(recording: Recording, imu: Bool, gps: Bool) -> Recording:
 
 
 def _accelerometer_saturated(recording: Recording, imu: Bool, gps: Bool) -> Recording:
-    """The vertical range ends just above gravity, as if the wrong one were set."""
-    accel = recording.accel_mps2.copy()
-    middle = np.mean(accel[:, 2])
-    limits = (middle - _ACCELERATION_LIMIT_MPS2, middle + _ACCELERATION_LIMIT_MPS2)
-    accel[imu, 2] = np.clip(accel[imu, 2], *limits)
-    return replace(recording, accel_mps2=accel)
+    return replace(recording, accel_mps2=_rattling(recording.accel_mps2, imu, _ACCELERATION_RANGE_MPS2))
 
 
 def _gyro_saturated(recording: Recording, imu: Bool, gps: Bool) -> Recording:
-    gyro = recording.gyro_radps.copy()
-    gyro[imu] = np.clip(gyro[imu], -_RATE_LIMIT_RADPS, _RATE_LIMIT_RADPS)
-    return replace(recording, gyro_radps=gyro)
+    return replace(recording, gyro_radps=_rattling(recording.gyro_radps, imu, _RATE_RANGE_RADPS))
 
 
 def _imu_unplugged(recording: Recording, imu: Bool, gps: Bool) -> Recording:
@@ -104,6 +98,13 @@ def _pitch_sign_flipped(recording: Recording, imu: Bool, gps: Bool) -> Recording
     gyro = recording.gyro_radps.copy()
     gyro[imu, 1] *= -1.0
     return replace(recording, gyro_radps=gyro)
+
+
+def _rattling(samples: F64, is_faulty: Bool, limit: float) -> F64:
+    """Motion about its mean enlarged until it runs into the ends of the range."""
+    middle = samples.mean(axis=0)
+    shaken = np.clip(middle + _RATTLE * (samples - middle), -limit, limit)
+    return np.where(is_faulty[:, None], shaken, samples)
 
 
 def _held(samples: F64, is_faulty: Bool) -> F64:

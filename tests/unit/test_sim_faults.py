@@ -33,8 +33,8 @@ def is_held(samples: F64) -> bool:
 EFFECTS: dict[Fault, Callable[[Recording, Recording], bool]] = {
     Fault.ACCELEROMETER_STUCK: lambda bad, ok: is_held(bad.accel_mps2[599:]),
     Fault.GYRO_STUCK: lambda bad, ok: is_held(bad.gyro_radps[599:]),
-    Fault.ACCELEROMETER_SATURATED: lambda bad, ok: bool(np.ptp(bad.accel_mps2[600:, 2]) == pytest.approx(0.6)),
-    Fault.GYRO_SATURATED: lambda bad, ok: bool(np.max(np.abs(bad.gyro_radps[600:])) == 0.01),
+    Fault.ACCELEROMETER_SATURATED: lambda bad, ok: bool(np.mean(np.abs(bad.accel_mps2[600:, 2]) == 50.0) > 0.5),
+    Fault.GYRO_SATURATED: lambda bad, ok: bool(np.mean(np.abs(bad.gyro_radps[600:]) == 5.0) > 0.5),
     Fault.IMU_UNPLUGGED: lambda bad, ok: len(bad.imu_t_ns) == len(bad.accel_mps2) == len(bad.gyro_radps) == 600,
     Fault.GPS_UNPLUGGED: lambda bad, ok: len(bad.gps_t_ns) == len(bad.gps_speed_mps) == len(bad.gps_fix) == 30,
     Fault.GPS_NO_FIX: lambda bad, ok: not bad.gps_fix[30:].any() and not bad.gps_speed_mps[30:].any(),

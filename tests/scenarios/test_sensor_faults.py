@@ -1,0 +1,66 @@
+"""Every way a sensor can fail, over the bus and through the gates: (fault, the reason a person is told)."""
+
+import numpy as np
+import pytest
+
+from gateway.bus.decode import Decoder
+from gateway.bus.signal_map import load_signal_map
+from gateway.core.settings import BatchSettings
+from gateway.offline.batches import batches_of_motion
+from gateway.offline.wiring import Wiring
+from gateway.records import Why
+from gateway.sim.drive import constant
+from gateway.sim.faults import Fault, with_fault
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import START_NS, simulate_drive
+from gateway.sim.sensors import REFERENCE, Recording
+from gateway.sim.vans import PAPER_VAN
+from gateway.sim.vehicle import Load
+
+EXPECTED = {
+    Fault.ACCELEROMETER_STUCK: Why.ACCELERATION_STUCK,
+    Fault.GYRO_STUCK: Why.PITCH_RATE_STUCK,
+    Fault.ACCELEROMETER_SATURATED: Why.ACCELERATION_SATURATED,
+    Fault.GYRO_SATURATED: Why.PITCH_RATE_SATURATED,
+    Fault.IMU_UNPLUGGED: Why.GAP,
+    Fault.GPS_UNPLUGGED: Why.SPEED_MISSING,
+    Fault.GPS_NO_FIX: Why.SPEED_MISSING,
+    Fault.GPS_FROZEN: Why.SPEED_FROZEN,
+    Fault.AXES_SWAPPED: Why.GRAVITY_MISSING,
+    Fault.ACCELERATION_SIGN_FLIPPED: Why.GRAVITY_MISSING,
+}
+BEYOND_THE_GATES = {Fault.PITCH_SIGN_FLIPPED}  # a rate has no gravity to tell its sign: calibration must notice
+WINDOW_S = 120.0
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    drive = constant(14.0, WINDOW_S, np.random.default_rng(1))
+    return simulate_drive(PAPER_VAN, (Load(200.0, 2.0),), iso_road("B"), drive, REFERENCE, 3).recording
+
+
+def reasons(recording: Recording) -> list[tuple[Why, ...]]:
+    signal_map = load_signal_map("springscale:reference")
+    motion = Decoder(signal_map).decode(Wiring("reference").frames_of(recording))
+    return [batch.rejected for batch in batches_of_motion(motion, signal_map, BatchSettings(window_s=WINDOW_S))]
+
+
+def test_sound_sensors_pass(recording: Recording) -> None:
+    assert reasons(recording) == [()]
+
+
+def test_every_fault_has_its_expectation() -> None:
+    assert set(EXPECTED) | BEYOND_THE_GATES == set(Fault)
+
+
+@pytest.mark.parametrize("from_s", [0, 30])
+@pytest.mark.parametrize("fault", EXPECTED)
+def test_a_fault_is_named(fault: Fault, from_s: int, recording: Recording) -> None:
+    broken = with_fault(recording, fault, START_NS + from_s * 1_000_000_000)
+    assert reasons(broken) == [(EXPECTED[fault],)]
+
+
+@pytest.mark.parametrize("fault", [Fault.ACCELEROMETER_STUCK, Fault.GYRO_STUCK, Fault.GPS_FROZEN, Fault.IMU_UNPLUGGED])
+def test_a_fault_at_the_very_end_costs_nothing(fault: Fault, recording: Recording) -> None:
+    broken = with_fault(recording, fault, START_NS + 117_000_000_000)
+    assert reasons(broken) == [()]
