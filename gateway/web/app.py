@@ -19,10 +19,13 @@ from gateway.web.health import health_router
 from gateway.web.latest import LatestFirst
 from gateway.web.metrics import metrics_registry
 from gateway.web.reader import Reader
+from gateway.web.rfms import rfms_router
 from gateway.web.settings import WebSettings
 from gateway.web.status import Status
 from gateway.web.tokens import TokenFile
 from gateway.web.vehicle import vehicle_router
+from gateway.web.vss import vss_router
+from gateway.web.weights import Scales, weights_router
 
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
@@ -66,6 +69,10 @@ def create_app(
     app.include_router(api_router(board, reader, status, chosen))
     app.include_router(vehicle_router(board, status, calibrated))
     app.include_router(export_router(reader))
+    scales = Scales(calibrated)
+    app.include_router(weights_router(board, scales))
+    app.include_router(vss_router(board, scales))
+    app.include_router(rfms_router(board, reader, status, scales))
     app.include_router(health_router(status, metrics_registry(board, status, responses)))
     pages.install(app)
     _describe(app, is_guarded=tokens is not None)

@@ -3,6 +3,7 @@
 import json
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -12,6 +13,7 @@ from gateway.web.fanout import Fanout, StreamEvent
 
 Record = Mapping[str, Any]
 
+RECENT: Final = 100
 ESTIMATE: Final = "estimate"
 REJECTION: Final = "rejection"
 PROVISIONAL: Final = "provisional"
@@ -68,6 +70,7 @@ class Board:
         self._rejection: Record | None = None
         self._shown = _Shown.of(self._estimate, None, None)
         self._heard: Record = self._estimate  # the last full batch, answered or not
+        self._recent: deque[Record] = deque(maxlen=RECENT)  # good estimates, oldest first
         self._drive_has_estimate = False
         self.fanout = Fanout()
 
@@ -87,6 +90,7 @@ class Board:
                 self._rejection = json.loads(rejection)
             if estimate is not None:
                 self._estimate = json.loads(estimate)
+                self._recent.append(self._estimate)
             self._heard = max(self._estimate, self._rejection or self._estimate, key=lambda r: r["t_end_ns"] or 0)
             received_s = None if age_s is None or estimate is None else self._clock() - age_s
             self._shown = _Shown.of(self._estimate, self._rejection, received_s)
@@ -111,6 +115,15 @@ class Board:
         head = b'{"age_s":' + age + (b',"is_stale":true' if is_stale else b',"is_stale":false')
         return (f"{shown.tag}.stale" if is_stale else shown.tag), head + shown.rest
 
+    def shown(self) -> Record:
+        """The estimate that ``latest`` shows, without its age; all null before the first."""
+        return self._estimate
+
+    def recent_estimates(self) -> tuple[Record, ...]:
+        """The last good estimates, oldest first."""
+        with self._lock:
+            return tuple(self._recent)
+
     def latest_spectra(self) -> dict[str, Any]:
         """Which batch was heard last, answered or not, and its spectra (None where it has none)."""
         heard = self._heard
@@ -134,6 +147,8 @@ class Board:
             self._rejection = record
             self._shown = _Shown.of(self._estimate, record, self._shown.received_s)
         elif kind == ESTIMATE or not (self._drive_has_estimate or record["rejected"]):
-            self._drive_has_estimate |= kind == ESTIMATE
+            if kind == ESTIMATE:
+                self._drive_has_estimate = True
+                self._recent.append(record)
             self._estimate = record
             self._shown = _Shown.of(record, self._rejection, now_s)

@@ -68,7 +68,9 @@ async def _invalid(request: Request, error: Exception) -> Response:
     for fault in error.errors():  # all parameters are flat; deeper places are pydantic's own branches
         said.setdefault(".".join(map(str, fault["loc"][:2])), fault["msg"].removeprefix("Value error, "))
     detail = "; ".join(f"{where}: {what}" for where, what in said.items())
-    return problem_response(422, detail, request.url.path, [Fault(where=w, what=x) for w, x in said.items()])
+    faults = [Fault(where=where, what=what) for where, what in said.items()]
+    status = 400 if request.url.path.startswith("/rfms/") else 422  # rFMS knows no 422
+    return problem_response(status, detail, request.url.path, faults)
 
 
 async def _unavailable(request: Request, error: Exception) -> Response:

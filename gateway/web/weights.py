@@ -1,0 +1,109 @@
+"""/api/v1/weights/latest: gross weight and axle loads of the latest estimate, and whether they are too much."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.vehicle import Vehicle
+from gateway.core.weights import Weights, is_over_limit, weights_of
+from gateway.web.board import Board
+
+
+class WeightFigure(BaseModel):
+    """One weight; null is unknown. ``is_over_limit`` begins above the limit and ends 3 % below it."""
+
+    kg: float | None = Field(examples=[1894.2])
+    std_kg: float | None = Field(examples=[6.1])
+    limit_kg: float | None = Field(examples=[2100.0])
+    is_over_limit: bool = Field(examples=[False])
+
+
+class LatestWeights(BaseModel):
+    """Static weights, unsprung masses included, of the estimate that ``/estimates/latest`` shows."""
+
+    id: str | None = Field(description="of the estimate")
+    t_end: str | None
+    age_s: float | None
+    is_stale: bool
+    gross: WeightFigure
+    front_axle: WeightFigure
+    rear_axle: WeightFigure
+
+
+class Scales:
+    """Weights of estimates as they are sent: of this vehicle, unknown where nothing is known of it."""
+
+    def __init__(self, calibrated: CalibratedVehicle | None) -> None:
+        self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
+
+    def weigh(self, record: Mapping[str, Any]) -> Weights | None:
+        """Weights of one record; None without an answer in it or without figures of the vehicle."""
+        if self.vehicle is None or record["payload_kg"] is None or record["front_share_pct"] is None:
+            return None
+        return weights_of(
+            self.vehicle,
+            record["payload_kg"],
+            _number(record["payload_std_kg"]),
+            record["front_share_pct"],
+            _number(record["front_share_std_pct"]),
+        )
+
+    def limits_kg(self) -> dict[str, float | None]:
+        """The limits that were stated for this vehicle."""
+        v = self.vehicle
+        return {
+            "gross": None if v is None else v.gross_limit_kg,
+            "front_axle": None if v is None else v.front_axle_limit_kg,
+            "rear_axle": None if v is None else v.rear_axle_limit_kg,
+        }
+
+
+def weights_router(board: Board, scales: Scales) -> APIRouter:
+    """The route that tells weights."""
+    router = APIRouter(prefix="/api/v1", tags=["vehicle"])
+
+    @router.get("/weights/latest")
+    async def latest_weights() -> LatestWeights:
+        """Gross weight and axle loads in kg, with standard deviation, limit and warning."""
+        return weigh_latest(board, scales)
+
+    return router
+
+
+def weigh_latest(board: Board, scales: Scales) -> LatestWeights:
+    """Weights of the estimate shown now; the warnings look back over the last estimates."""
+    shown = json.loads(board.latest()[1])
+    history = [weights for record in board.recent_estimates() if (weights := scales.weigh(record)) is not None]
+    now = scales.weigh(shown)
+    limits = scales.limits_kg()
+    return LatestWeights(
+        id=shown["id"],
+        t_end=shown["t_end"],
+        age_s=shown["age_s"],
+        is_stale=shown["is_stale"],
+        gross=_figure(now, history, "gross", limits["gross"]),
+        front_axle=_figure(now, history, "front_axle", limits["front_axle"]),
+        rear_axle=_figure(now, history, "rear_axle", limits["rear_axle"]),
+    )
+
+
+def _figure(now: Weights | None, history: Sequence[Weights], name: str, limit_kg: float | None) -> WeightFigure:
+    return WeightFigure(
+        kg=None if now is None else _or_none(getattr(now, name).kg),
+        std_kg=None if now is None else _or_none(getattr(now, name).std_kg),
+        limit_kg=limit_kg,
+        is_over_limit=is_over_limit((getattr(weights, name).kg for weights in history), limit_kg),
+    )
+
+
+def _number(x: float | None) -> float:
+    return math.nan if x is None else x
+
+
+def _or_none(x: float) -> float | None:
+    return round(x, 3) if math.isfinite(x) else None

@@ -1,0 +1,194 @@
+"""Our weights in the words of others: rFMS, VSS, and our own figures behind both."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from support.estimates import make_record
+from support.web import Client, Gateway
+
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.vehicle import Vehicle
+from gateway.records import Why
+from gateway.web import create_app
+
+VIN = "VF1" + "0" * 14
+VAN = Vehicle(
+    "van",
+    1240.0,
+    2.8,
+    unsprung_front_kg=90.0,
+    unsprung_rear_kg=110.0,
+    gross_limit_kg=1545.0,
+    front_axle_limit_kg=900.0,
+)
+STATUSES = "/rfms/vehiclestatuses"
+Ask = Callable[..., Any]
+
+
+@pytest.fixture
+def gateway(tmp_path: Path) -> Any:
+    with Gateway(tmp_path) as opened:
+        opened.status = opened.status.model_copy(update={"vin": VIN})
+        yield opened
+
+
+def client(gateway: Gateway, vehicle: Vehicle | None = VAN) -> Client:
+    calibrated = None if vehicle is None else CalibratedVehicle("sha256:ab", vehicle, (0.0, 420.0), (40.0, 60.0))
+    return Client(create_app(gateway.board, gateway.store.reader(), lambda: gateway.status, calibrated=calibrated))
+
+
+def record(n: int, payload_kg: float = 100.0) -> dict[str, Any]:
+    return make_record(n) | {"payload_kg": payload_kg, "front_share_pct": 50.0, "front_share_std_pct": 0.5}
+
+
+def test_weights_are_told_with_deviation_limit_and_warning(gateway: Gateway) -> None:
+    gateway.publish(record(0))
+    told = client(gateway).get("/api/v1/weights/latest").json()
+    assert told["gross"] == {"kg": 1540.0, "std_kg": 6.0, "limit_kg": 1545.0, "is_over_limit": False}
+    assert told["front_axle"] == {"kg": 760.0, "std_kg": 7.341, "limit_kg": 900.0, "is_over_limit": False}
+    assert told["rear_axle"]["limit_kg"] is None
+    assert (told["id"], told["age_s"]) == (record(0)["id"], 0.0)
+
+
+def test_an_overload_is_warned_of_until_it_is_clearly_over(gateway: Gateway) -> None:
+    ask = client(gateway)
+    warned = []
+    for n, payload_kg in enumerate([100.0, 106.0, 104.0, 59.0, 50.0, 104.0]):
+        gateway.publish(record(n, payload_kg))
+        warned.append(ask.get("/api/v1/weights/latest").json()["gross"]["is_over_limit"])
+    assert warned == [False, True, True, True, False, False]
+
+
+@pytest.mark.parametrize("vehicle", [None, replace(VAN, unsprung_front_kg=None)])
+def test_unknown_weights_are_null(gateway: Gateway, vehicle: Vehicle | None) -> None:
+    gateway.publish(record(0))
+    told = client(gateway, vehicle).get("/api/v1/weights/latest").json()
+    assert told["gross"]["kg"] is told["front_axle"]["kg"] is None
+    assert (told["rear_axle"]["kg"] is None) is (vehicle is None)
+
+
+def test_before_any_estimate_there_are_no_weights(gateway: Gateway) -> None:
+    told = client(gateway).get("/api/v1/weights/latest").json()
+    assert (told["id"], told["gross"]["kg"], told["gross"]["is_over_limit"]) == (None, None, False)
+
+
+def test_vss_speaks_core_paths_and_exactly_those_of_the_overlay(gateway: Gateway) -> None:
+    gateway.publish(record(0))
+    points = {point["path"]: point for point in client(gateway).get("/api/v1/vss").json()}
+    overlay = yaml.safe_load((Path(__file__).parents[2] / "docs" / "vss" / "springscale.vspec").read_text())
+    described = {path: node for path, node in overlay.items() if node["type"] != "branch"}
+    core = {"Vehicle.CurrentOverallWeight", "Vehicle.CurbWeight", "Vehicle.GrossWeight"}
+    assert set(points) == set(described) | core
+    for path, node in described.items():
+        assert points[path]["unit"] == node["unit"]
+        assert isinstance(points[path]["value"], float)
+    assert {path: points[path]["value"] for path in core} == {
+        "Vehicle.CurrentOverallWeight": 1540,
+        "Vehicle.CurbWeight": 1440,
+        "Vehicle.GrossWeight": 1545,
+    }
+    assert points["Vehicle.Chassis.Axle.Row1.Load"]["value"] == 760.0
+
+
+def test_rfms_tells_whole_kilograms_of_good_batches(gateway: Gateway) -> None:
+    gateway.publish(record(0), make_record(1, Why.GAP), record(2, 130.6))
+    answer = client(gateway).get(f"{STATUSES}?starttime=1970-01-01T00:00:00Z").json()
+    statuses = answer["vehicleStatusResponse"]["vehicleStatuses"]
+    assert [status["grossCombinationVehicleWeight"] for status in statuses] == [1540, 1571]
+    assert statuses[0]["snapshotData"]["vehicleAxles"] == [
+        {"vehicleAxlePosition": 1, "vehicleAxleLoad": 760},
+        {"vehicleAxlePosition": 2, "vehicleAxleLoad": 780},
+    ]
+    assert statuses[0]["vin"] == VIN
+    assert statuses[0]["createdDateTime"] == "1970-01-01T00:05:00.000000Z"
+    assert statuses[0]["triggerType"] == {"context": "RFMS", "type": "TIMER"}
+    assert answer["moreDataAvailable"] is False
+    assert answer["requestServerDateTime"].endswith("Z")
+
+
+def test_rfms_latest_only_is_the_estimate_shown(gateway: Gateway) -> None:
+    ask = client(gateway)
+    assert ask.get(f"{STATUSES}?latestOnly=true").json()["vehicleStatusResponse"]["vehicleStatuses"] == []
+    gateway.publish(record(0), record(1))
+    (status,) = ask.get(f"{STATUSES}?latestOnly=true&vin={VIN}").json()["vehicleStatusResponse"]["vehicleStatuses"]
+    assert status["createdDateTime"] == record(1)["t_end"]
+
+
+def test_rfms_says_where_more_is_and_nothing_is_missed(gateway: Gateway) -> None:
+    gateway.publish(*(record(n) for n in range(1101)))
+    ask, seen = client(gateway), []
+    link = f"{STATUSES}?starttime=1970-01-01T00:00:00Z&triggerFilter=TIMER"
+    while link:
+        answer = ask.get(link).json()
+        seen += [status["createdDateTime"] for status in answer["vehicleStatusResponse"]["vehicleStatuses"]]
+        assert answer["moreDataAvailable"] is ("moreDataAvailableLink" in answer)
+        link = answer.get("moreDataAvailableLink")
+    assert seen == [record(n)["t_end"] for n in range(1101)]
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "",
+        "latestOnly=false",
+        "stoptime=2026-01-01T00:00:00Z",
+        "latestOnly=true&starttime=2026-01-01T00:00:00Z",
+        "latestOnly=true&stoptime=2026-01-01T00:00:00Z",
+        "starttime=2026-01-02T00:00:00Z&stoptime=2026-01-01T00:00:00Z",
+        "starttime=yesterday",
+        "latestOnly=perhaps",
+        "latestonly=true",
+    ],
+)
+def test_rfms_refuses_with_400(gateway: Gateway, query: str) -> None:
+    answer = client(gateway).get(f"{STATUSES}?{query}")
+    assert (answer.status_code, answer.headers["content-type"]) == (400, "application/problem+json")
+
+
+def test_rfms_knows_its_own_vehicle_only(gateway: Gateway) -> None:
+    ask = client(gateway)
+    assert ask.get(f"{STATUSES}?latestOnly=true&vin=WDB00000000000000").status_code == 404
+    (vehicle,) = ask.get("/rfms/vehicles").json()["vehicleResponse"]["vehicles"]
+    assert (vehicle["vin"], vehicle["customerVehicleName"]) == (VIN, "van-17")
+    assert ask.get(f"/rfms/vehicles?lastVin={VIN}").json()["vehicleResponse"]["vehicles"] == []
+
+
+def test_rfms_without_a_vin_has_no_vehicle(gateway: Gateway) -> None:
+    gateway.publish(record(0))
+    gateway.status = gateway.status.model_copy(update={"vin": None})
+    ask = client(gateway)
+    assert ask.get("/rfms/vehicles").json()["vehicleResponse"]["vehicles"] == []
+    assert ask.get(f"{STATUSES}?latestOnly=true").json()["vehicleStatusResponse"]["vehicleStatuses"] == []
+
+
+def test_rfms_filters_by_trigger(gateway: Gateway) -> None:
+    gateway.publish(record(0))
+    for filtered, n in (("TIMER", 1), ("ignition_on,timer", 1), ("IGNITION_ON", 0)):
+        answer = client(gateway).get(f"{STATUSES}?latestOnly=true&triggerFilter={filtered}").json()
+        assert len(answer["vehicleStatusResponse"]["vehicleStatuses"]) == n
+
+
+@pytest.mark.parametrize(
+    ("accept", "given"),
+    [
+        ("*/*", "application/json"),
+        ("application/json; charset=utf-8", "application/json"),
+        ("application/vnd.fmsstandard.com.Vehiclestatuses.v2.1+json", None),
+        ("application/vnd.fmsstandard.com.vehiclestatuses.v3.0+json; q=0.9", None),
+        ("text/html, application/vnd.FMSstandard.com.VehicleStatuses.v4.0+JSON", None),
+    ],
+)
+def test_rfms_media_types_count_in_any_case(gateway: Gateway, accept: str, given: str | None) -> None:
+    answer = client(gateway).get(f"{STATUSES}?latestOnly=true", headers={"Accept": accept})
+    assert answer.status_code == 200
+    expected = given or accept.rsplit(",", maxsplit=1)[-1].split(";", maxsplit=1)[0].strip()
+    assert answer.headers["content-type"] == expected
+
+
+@pytest.mark.parametrize("accept", ["text/html", "application/vnd.fmsstandard.com.vehicles.v3.0+json", ""])
+def test_rfms_refuses_other_media_types(gateway: Gateway, accept: str) -> None:
+    assert client(gateway).get(f"{STATUSES}?latestOnly=true", headers={"Accept": accept}).status_code == 406
