@@ -70,8 +70,9 @@ def _body(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
         "payload_gyration_m2": (log(0.1), _LOG_STD["payload_gyration"]),
         "payload_mode_hz": (log(25.0), _LOG_STD["payload_mode"]),
         "payload_damping_ratio": (log(0.15), _LOG_STD["payload_damping"]),
-        "gyro_lag_s": (0.0, 0.003),
-        "delay_scale": (0.0, 0.02),
+        "gyro_lag_s": (0.0, 0.01),
+        "delay_scale": (0.0, 0.003),
+        "rear_lag_s": (0.0, 0.005),
     }
 
 

@@ -7,7 +7,7 @@ inside each segment, because averaged spectra hold averaged phases.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,15 @@ SPEED_BIN = 0.03  # relative width of a group of segments
 SPEED_CHANGE_MAX_MPS2 = 0.3  # braking and pulling away pitch the body without any road
 SPEED_SAMPLE_STEP = 8
 LEAST_SEGMENTS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How spectra are taken of a vehicle: band_hz is inclusive, n_segment in samples."""
+
+    wheelbase_m: float
+    band_hz: tuple[float, float]
+    n_segment: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,21 +60,12 @@ class CrossSpectra:
         """(m,) coherence of the two sensors over all segments, 0..1."""
         cross = np.abs(np.sum(self.n_segments * self.cross, axis=0)) ** 2
         auto = np.sum(self.n_segments * self.acceleration, axis=0) * np.sum(self.n_segments * self.pitch_rate, axis=0)
-        return cross / auto
+        coherence: F64 = cross / auto
+        return coherence
 
     def with_pitch_reversed(self) -> "CrossSpectra":
         """As if the pitch rate had the other sign."""
-        return CrossSpectra(
-            self.freq_hz,
-            self.acceleration,
-            self.pitch_rate,
-            -self.cross,
-            self.delay_phase,
-            self.delay_s,
-            self.n_segments,
-            self.acceleration_rms_mps2,
-            self.pitch_rate_rms_radps,
-        )
+        return replace(self, cross=-self.cross)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,21 +77,16 @@ class _Segments:
     delays_s: F64
 
 
-def cross_spectra_of(
-    batches: Iterable[Batch], wheelbase_m: float, band_hz: tuple[float, float], n_segment: int
-) -> CrossSpectra | None:
-    """Cross-spectra of all usable segments of ``batches``; None where there are fewer than six.
-
-    ``band_hz`` is inclusive; all batches share one rate.
-    """
+def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra | None:
+    """Cross-spectra of all usable segments of ``batches``, which share one rate; None if fewer than six."""
     parts: list[_Segments] = []
     freq_hz = np.empty(0)
     for batch in batches:
-        every_hz = frequencies_hz(n_segment, batch.rate_hz)
+        every_hz = frequencies_hz(reading.n_segment, batch.rate_hz)
         step_hz = every_hz[1]
-        kept = np.flatnonzero((every_hz >= band_hz[0] - step_hz) & (every_hz <= band_hz[1] + step_hz))
+        kept = np.flatnonzero((every_hz >= reading.band_hz[0] - step_hz) & (every_hz <= reading.band_hz[1] + step_hz))
         freq_hz = every_hz[kept]
-        parts.append(_segments(batch, wheelbase_m, kept, n_segment))
+        parts.append(_segments(batch, reading, kept))
     if sum(len(part.delays_s) for part in parts) < LEAST_SEGMENTS:
         return None
     joined = _Segments(
@@ -99,10 +94,11 @@ def cross_spectra_of(
         np.concatenate([p.pitch_rate for p in parts]),
         np.concatenate([p.delays_s for p in parts]),
     )
-    return _grouped(joined, freq_hz, n_segment)
+    return _grouped(joined, freq_hz, reading)
 
 
-def _segments(batch: Batch, wheelbase_m: float, kept: I64, n_segment: int) -> _Segments:
+def _segments(batch: Batch, reading: Reading, kept: I64) -> _Segments:
+    n_segment = reading.n_segment
     starts = segment_starts(batch.usable, n_segment, n_segment // 2)
     if starts.size:
         speeds_mps = np.lib.stride_tricks.sliding_window_view(batch.speed_mps, n_segment)[starts]
@@ -114,12 +110,12 @@ def _segments(batch: Batch, wheelbase_m: float, kept: I64, n_segment: int) -> _S
     return _Segments(
         segment_transforms(batch.vertical_acceleration_mps2, starts, n_segment, batch.rate_hz)[:, kept],
         segment_transforms(batch.pitch_rate_radps, starts, n_segment, batch.rate_hz)[:, kept],
-        wheelbase_m / speeds_mps[:, ::SPEED_SAMPLE_STEP],
+        reading.wheelbase_m / speeds_mps[:, ::SPEED_SAMPLE_STEP],
     )
 
 
-def _grouped(segments: _Segments, freq_hz: F64, n_segment: int) -> CrossSpectra:
-    weight = np.hanning(n_segment + 1)[:-1:SPEED_SAMPLE_STEP] ** 2
+def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectra:
+    weight = np.hanning(reading.n_segment + 1)[:-1:SPEED_SAMPLE_STEP] ** 2
     weight = weight / weight.sum()
     mean_delay_s = segments.delays_s @ weight
     phase = np.exp(-2j * np.pi * segments.delays_s[:, :, None] * freq_hz)
@@ -128,10 +124,11 @@ def _grouped(segments: _Segments, freq_hz: F64, n_segment: int) -> CrossSpectra:
     labels, member = np.unique(group, return_inverse=True)
     n_segments = np.bincount(member).astype(float)[:, None]
 
-    def mean(per_segment: F64 | C128) -> F64 | C128:
-        total = np.zeros((len(labels), per_segment.shape[1]), per_segment.dtype)
+    def mean(per_segment: C128 | F64) -> C128:
+        total = np.zeros((len(labels), per_segment.shape[1]), np.complex128)
         np.add.at(total, member, per_segment)
-        return total / n_segments
+        total /= n_segments
+        return total
 
     inner = slice(1, -1)
     a, g = segments.acceleration[:, inner], segments.pitch_rate[:, inner]
@@ -142,8 +139,8 @@ def _grouped(segments: _Segments, freq_hz: F64, n_segment: int) -> CrossSpectra:
         freq_hz=freq_hz,
         acceleration=np.real(mean(np.abs(a) ** 2 / divisor)),
         pitch_rate=np.real(mean(np.abs(g) ** 2 / divisor)),
-        cross=np.asarray(mean(g * np.conj(a) / divisor), np.complex128),
-        delay_phase=np.asarray(mean(phase_k), np.complex128),
+        cross=mean(g * np.conj(a) / divisor),
+        delay_phase=mean(phase_k),
         delay_s=np.real(mean(mean_delay_s[:, None])),
         n_segments=n_segments,
         acceleration_rms_mps2=float(np.sqrt(power_a.mean() * width_hz)),

@@ -10,20 +10,19 @@ calibration. docs/method.md has the derivation.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectra import CrossSpectra, cross_spectra_of
+from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
 from gateway.core.grey_model import INDEX, PARAMETERS, Ground
 from gateway.core.likelihood import Curvature, Point, Whittle
 from gateway.core.map_fit import Found, most_probable
 from gateway.records import F64, Batch, Estimate, Why
 
-DRIFT_STD: Final = {"damper_front_nspm": 0.05, "damper_rear_nspm": 0.05, "delay_scale": 0.005}
+DRIFT_STD: Final = {"damper_front_nspm": 0.04, "damper_rear_nspm": 0.04, "delay_scale": 0.003}
 DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
-EVIDENCE_WEIGHT: Final = 0.6  # of the likelihood at run time: model error is shared by neighbouring frequencies
 START_PAYLOAD_SHARES: Final = (0.0, 0.12, 0.24, 0.36)  # of the empty mass
 START_POSITION_SHARES: Final = (0.25, 0.5, 0.9)  # of the wheelbase
 
@@ -31,6 +30,7 @@ COHERENCE_BAND_HZ: Final = (1.4, 4.5)
 LEAST_COHERENCE: Final = 0.35
 LEAST_POWER_SHARE: Final = 0.05  # of the calibrated amplitude
 MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
+UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
 Z95: Final = 1.959964
 
 
@@ -68,6 +68,11 @@ class CrossSpectrumCalibration:
         """The vehicle as stated, in the core's terms."""
         return Ground(self.empty_mass_kg, self.empty_front_share_pct / 100.0, self.wheelbase_m)
 
+    @property
+    def reading(self) -> Reading:
+        """How spectra of this vehicle are taken."""
+        return Reading(self.wheelbase_m, self.band_hz, self.n_segment)
+
 
 @dataclass(frozen=True, slots=True)
 class Located:
@@ -87,25 +92,25 @@ class CrossSpectrum:
     def estimate(self, batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
         """Payload and front share of one batch with 95 % intervals, or the reasons why not."""
         if batch.rejected:
-            return _answer(batch, rejected=batch.rejected)
-        spectra = cross_spectra_of([batch], calibration.wheelbase_m, calibration.band_hz, calibration.n_segment)
+            return replace(_answer(batch), rejected=batch.rejected)
+        spectra = cross_spectra_of([batch], calibration.reading)
         why = _unfit(batch, spectra, calibration)
         if spectra is None or why is not None:
-            return _answer(batch, rejected=(why or Why.TOO_SHORT,))
+            return replace(_answer(batch), rejected=(why or Why.TOO_SHORT,))
         located = locate(spectra, calibration)
-        return _judged(batch, spectra, located, calibration)
+        return _judged(_answer(batch), spectra, located, calibration)
 
 
 def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Located:
     """The most probable load of ``spectra`` under a flat prior on payload and share."""
-    whittle = Whittle(spectra, calibration.ground, EVIDENCE_WEIGHT)
+    whittle = Whittle(spectra, calibration.ground)
     found = _fit_load(whittle, calibration)
     point = _point(found.x, calibration)
-    reverse = Whittle(spectra.with_pitch_reversed(), calibration.ground, EVIDENCE_WEIGHT)
+    reverse = Whittle(spectra.with_pitch_reversed(), calibration.ground)
     return Located(
         point=point,
         load_covariance=_load_covariance(whittle, point, found, calibration),
-        misfit=whittle.misfit(point) / EVIDENCE_WEIGHT,
+        misfit=whittle.misfit(point),
         is_reversed=reverse.cost(point) < whittle.cost(point),
     )
 
@@ -173,11 +178,12 @@ def _unfit(batch: Batch, spectra: CrossSpectra | None, calibration: CrossSpectru
 
 
 def _judged(
-    batch: Batch, spectra: CrossSpectra, located: Located, calibration: CrossSpectrumCalibration
+    blank: Estimate, spectra: CrossSpectra, located: Located, calibration: CrossSpectrumCalibration
 ) -> Estimate:
     payload_var, share_var = np.diag(located.load_covariance)
-    payload_std_kg = calibration.payload_inflation * math.sqrt(payload_var)
-    share_std_pct = calibration.front_share_inflation * 100.0 * math.sqrt(share_var)
+    unseen = _unseen_speed_inflation(blank.mean_speed_mps, calibration.speed_seen_mps)
+    payload_std_kg = unseen * calibration.payload_inflation * math.sqrt(payload_var)
+    share_std_pct = unseen * calibration.front_share_inflation * 100.0 * math.sqrt(share_var)
     diagnostics = {
         "misfit": located.misfit,
         "n_segments": float(spectra.n_total),
@@ -187,10 +193,10 @@ def _judged(
     }
     why = _disbelieved(located, payload_std_kg, calibration)
     if why is not None:
-        return _answer(batch, rejected=(why,), diagnostics=diagnostics)
+        return replace(blank, rejected=(why,), diagnostics=diagnostics)
     payload_kg, share_pct = located.point.payload_kg, 100.0 * located.point.front_share
-    return _answer(
-        batch,
+    return replace(
+        blank,
         payload_kg=payload_kg,
         payload_std_kg=payload_std_kg,
         payload_interval95_kg=_interval(payload_kg, payload_std_kg),
@@ -211,6 +217,12 @@ def _disbelieved(located: Located, payload_std_kg: float, calibration: CrossSpec
     return None
 
 
+def _unseen_speed_inflation(speed_mps: float, seen_mps: tuple[float, float]) -> float:
+    """How much wider an interval gets at a mean speed outside those of calibration; 1 inside."""
+    beyond = max(0.0, math.log(seen_mps[0] / speed_mps), math.log(speed_mps / seen_mps[1]))
+    return math.hypot(1.0, beyond / UNSEEN_SPEED_SCALE)
+
+
 def _ratio(located: Located, calibration: CrossSpectrumCalibration, name: str) -> float:
     return math.exp(located.point.theta[INDEX[name]] - calibration.parameters[INDEX[name]])
 
@@ -219,8 +231,9 @@ def _interval(centre: float, std: float) -> tuple[float, float]:
     return centre - Z95 * std, centre + Z95 * std
 
 
-def _answer(batch: Batch, **found: object) -> Estimate:
-    return Estimate(  # type: ignore[arg-type]  # the keywords are Estimate's own, from this module alone
+def _answer(batch: Batch) -> Estimate:
+    """An estimate of this batch that says nothing yet."""
+    return Estimate(
         t_start_ns=batch.t_start_ns,
         t_end_ns=batch.t_end_ns,
         estimator=CrossSpectrum.name,
@@ -229,5 +242,4 @@ def _answer(batch: Batch, **found: object) -> Estimate:
         usable_share=batch.usable_share,
         shares={str(why): share for why, share in batch.shares.items()},
         is_provisional=batch.is_provisional,
-        **found,
     )

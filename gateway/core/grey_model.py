@@ -44,6 +44,7 @@ _SIGNED: Final = (
     "spring_curvature_rear_per_kn2",
     "gyro_lag_s",
     "delay_scale",
+    "rear_lag_s",
 )
 PARAMETERS: Final = _POSITIVE + _SIGNED
 INDEX: Final = {name: i for i, name in enumerate(PARAMETERS)}
@@ -63,7 +64,8 @@ class SpectralModel:
     """The matrix of outputs per unit road density, still open in the delay phase c of the rear axle.
 
     Each spectrum is ``still + c * moving + conj(c * moving_back)``; arrays (..., m), one row a
-    parameter vector. Slack is already inside ``still``; delay_scale (..., 1) shortens the delay.
+    parameter vector. Slack is already inside ``still``; the
+    delay is longer by the share delay_scale (..., 1) and by rear_lag_s (..., 1).
     """
 
     freq_hz: F64
@@ -75,6 +77,7 @@ class SpectralModel:
     moving_cross: C128
     moving_cross_back: C128
     delay_scale: F64
+    rear_lag_s: F64
 
 
 def is_positive(name: str) -> bool:
@@ -141,6 +144,7 @@ def spectral_model(theta: F64, payload_kg: F64, front_share: F64, ground: Ground
         moving_cross=r.pitch_rate_rear * np.conj(r.acceleration_front),
         moving_cross_back=r.acceleration_rear * np.conj(r.pitch_rate_front),
         delay_scale=theta[..., INDEX["delay_scale"], None],
+        rear_lag_s=theta[..., INDEX["rear_lag_s"], None],
     )
 
 
@@ -149,9 +153,8 @@ def expected_spectra(model: SpectralModel, spectra: CrossSpectra) -> tuple[F64, 
 
     A Hann taper mixes neighbouring frequencies, weighing them 1:4:1; the road's slope is in.
     """
-    phase = spectra.delay_phase * np.exp(
-        -2j * np.pi * spectra.freq_hz * spectra.delay_s * model.delay_scale[..., None, :]
-    )
+    later_s = spectra.delay_s * model.delay_scale[..., None, :] + model.rear_lag_s[..., None, :]
+    phase = spectra.delay_phase * np.exp(-2j * np.pi * spectra.freq_hz * later_s)
     road = spectra.freq_hz**ROAD_EXPONENT
 
     def at(spectrum: F64 | C128) -> F64 | C128:
@@ -163,9 +166,9 @@ def expected_spectra(model: SpectralModel, spectra: CrossSpectra) -> tuple[F64, 
     return np.real(_tapered(auto_a * road)), np.real(_tapered(auto_g * road)), _tapered(cross * road)
 
 
-def _tapered(spectrum: F64 | C128) -> C128:
-    mixed: C128 = (spectrum[..., :-2] + 4.0 * spectrum[..., 1:-1] + spectrum[..., 2:]) / 6.0
-    return mixed
+def _tapered(spectrum: C128 | F64) -> C128:
+    mixed = (spectrum[..., :-2] + 4.0 * spectrum[..., 1:-1] + spectrum[..., 2:]) / 6.0
+    return np.asarray(mixed, np.complex128)
 
 
 def _slack(theta: F64, sensor: str, freq_hz: F64) -> F64:

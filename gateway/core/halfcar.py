@@ -22,7 +22,10 @@ INVERSE_PAYLOAD_KG = 30.0  # 1/L becomes L / (L^2 + this^2): an empty vehicle ha
 
 @dataclass(frozen=True, slots=True)
 class Axle:
-    """Both wheels of one axle together. The spring stiffens with added static load W (kN) as exp(slope W + curvature W^2)."""
+    """Both wheels of one axle together.
+
+    The spring stiffens with the static load W (kN) that the payload adds, as exp(slope W + curvature W^2).
+    """
 
     spring_npm: Real
     spring_slope_per_kn: Real
@@ -110,7 +113,7 @@ def _axle(axle: Axle, added_kg: Real, omega: F64) -> tuple[C128, C128]:
     suspension = axle.spring_npm * stiffening + damper / (1.0 + damper / axle.damper_mount_npm)
     wheel = axle.tyre_npm - omega**2 * axle.unsprung_kg
     in_series = suspension / (suspension + wheel)
-    return in_series * wheel, in_series * axle.tyre_npm
+    return np.asarray(in_series * wheel, np.complex128), np.asarray(in_series * axle.tyre_npm, np.complex128)
 
 
 def _added_axle_masses_kg(car: HalfCar, payload_kg: Real, front_share: Real) -> tuple[Real, Real]:

@@ -68,10 +68,11 @@ class Whittle:
     def __init__(self, spectra: CrossSpectra, ground: Ground, weight: float = 1.0) -> None:
         self.spectra = spectra
         self.ground = ground
+        self._weight = weight
         self._n = spectra.n_segments * (EFFECTIVE_SHARE * weight)
         freq_hz = spectra.freq_hz[1:-1]
-        self._slope = np.log(freq_hz) - np.mean(np.log(freq_hz))
         self._level_weight = self._n / (0.5 + ROAD_RIPPLE**2 * float(np.sum(self._n)))
+        self._slope = _centred(np.log(freq_hz))
 
     def cost(self, point: Point) -> float:
         """Negative log-likelihood, up to a constant."""
@@ -79,9 +80,10 @@ class Whittle:
         return self._shape_cost(whitened) + self._level_cost(whitened)
 
     def misfit(self, point: Point) -> float:
-        """Likelihood ratio per degree of freedom against matrices free at every group and frequency; about 1 if all is right.
+        """Likelihood ratio per degree of freedom against matrices free at every group and frequency.
 
-        Groups of fewer than three segments are left out: their matrices are near-singular by chance.
+        About 1 if all is right, whatever the weight. Groups of fewer than three segments are left
+        out: their matrices are near-singular by chance.
         """
         whitened = self._whitened(point)
         many = self.spectra.n_segments[:, 0] >= 3
@@ -89,8 +91,8 @@ class Whittle:
             return float("nan")
         determinant = whitened.z_aa * whitened.z_gg - np.abs(whitened.z_ga) ** 2
         excess = 2.0 * np.log(whitened.trace / 2.0) - np.log(np.maximum(determinant, np.finfo(float).tiny))
-        n = np.broadcast_to(self._n, excess.shape)[many]
-        return float(2.0 * np.sum(n * excess[many]) / (3.0 * excess[many].size))
+        evidence = 2.0 * np.sum(self._n[many] * excess[many]) / self._weight
+        return float(evidence / (3.0 * excess[many].size))
 
     def curvature(self, point: Point, free: list[int], is_load_free: bool) -> Curvature:
         """Derivatives for the ``free`` entries of theta, then payload and front share where these are free."""
@@ -140,10 +142,9 @@ class Whittle:
             share[2 * k - 2 :] += (STEP, -STEP)
             step[k - 2] = PAYLOAD_STEP_KG
         per_step = 0.5 / step[:, None, None]
-        m_aa, m_gg, m_ga = (
-            (m[::2] - m[1::2]) * per_step for m in self._expected(theta, payload_kg, share)
-        )
-        return _whiten(at.root_a, at.root_g, at.ratio, m_aa.real, m_gg.real, m_ga)
+        m_aa, m_gg, m_ga = self._expected(theta, payload_kg, share)
+        d_aa, d_gg = (m_aa[::2] - m_aa[1::2]) * per_step, (m_gg[::2] - m_gg[1::2]) * per_step
+        return _whiten(at.root_a, at.root_g, at.ratio, d_aa, d_gg, (m_ga[::2] - m_ga[1::2]) * per_step)
 
     def _shape_cost(self, z: _Whitened) -> float:
         return float(np.sum(self._n * 2.0 * (np.log(z.trace) + np.log(z.root_a) + np.log(z.root_g))))

@@ -41,7 +41,7 @@ def most_probable(
 
     x, damping = start, 1e-3
     best = total(x)
-    information = np.diag(precision)
+    information: F64 = np.diag(precision)
     for _ in range(MOST_STEPS):
         here = curvature(x)
         gradient = here.gradient + precision * (x - prior_mean)
@@ -53,7 +53,7 @@ def most_probable(
         x, best, damping = moved[0], moved[1], max(moved[2] / 5.0, 1e-6)
         if gain < tolerance:
             break
-    return Found(x, best, np.linalg.inv(information))
+    return Found(x, best, np.asarray(np.linalg.inv(information), float))
 
 
 def _damped_step(
