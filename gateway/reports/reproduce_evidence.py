@@ -28,6 +28,7 @@ CAMPAIGNS: Final = (
     "load-sweep", "share-sweep", "ident", "test1", "test2", "test3", "sensitivity", "experiment", "speeds",
 )  # fmt: skip
 RATIO_INDEX: Final = "ratio_index"
+N_STEPS: Final = 2 * len(CAMPAIGNS) + 3  # drive and read each, calibrate twice, judge and draw
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,17 +113,16 @@ def ratio_index_of(method: Method) -> RatioIndexCalibration:
 def gather(output: Path, scope: Scope, on_step: OnStep = lambda what, done, of: None) -> Evidence:
     """Simulate every campaign into output/campaigns, calibrate, and cut all drives into batches."""
     driven = {}
-    of = 2 * len(CAMPAIGNS) + 2
     for number, kind in enumerate(CAMPAIGNS):
-        on_step(f"driving {kind}", 2 * number, of)
+        on_step(f"driving {kind}", 2 * number, N_STEPS)
         bench = bench_of(kind, seed=scope.seed, longest_s=scope.longest_s)
         path = write_campaign(bench, output / "campaigns" / kind, workers=scope.workers)
-        on_step(f"reading {kind}", 2 * number + 1, of)
+        on_step(f"reading {kind}", 2 * number + 1, N_STEPS)
         campaign = load_campaign(path)
         driven[kind] = Driven(campaign, tuple(split_runs(campaign, scope.settings)))
-    on_step("calibrating on the simulated grid", of - 2, of)
+    on_step("calibrating on the simulated grid", N_STEPS - 3, N_STEPS)
     simulated = _methods(driven["ident"], scope, output / "vehicle_simulated.json")
-    on_step("calibrating on the experiment", of - 1, of)
+    on_step("calibrating on the experiment", N_STEPS - 2, N_STEPS)
     experimental = _methods(driven["experiment"], scope, output / "vehicle_experiment.json")
     return Evidence(scope, driven, simulated, experimental)
 

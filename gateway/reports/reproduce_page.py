@@ -97,7 +97,9 @@ def page(evidence: Evidence, rows: Sequence[Row], drawings: Sequence[tuple[Plate
     """The whole page; each drawing is an SVG element."""
     head = "".join(f"<th>{escape(column)}</th>" for column in COLUMNS)
     body = "".join(
-        f'<tr class="{"" if row.errors else "paper"}">' + "".join(f"<td>{escape(c)}</td>" for c in row.cells) + "</tr>"
+        f'<tr class="{"paper" if row.is_paper else ""}">'
+        + "".join(f"<td>{escape(c)}</td>" for c in row.cells)
+        + "</tr>"
         for row in rows
     )
     plates = "".join(

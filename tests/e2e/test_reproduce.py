@@ -15,7 +15,7 @@ from gateway.offline.plans import Plan, plan_of
 from gateway.reports.reproduce import reproduce
 from gateway.reports.reproduce_evidence import CAMPAIGNS, Scope
 from gateway.reports.reproduce_page import PLATES
-from gateway.reports.reproduce_table import PAPER_PCT
+from gateway.reports.reproduce_table import PAPER_PCT, accuracy_page
 
 SMALL = Scope(seed=3, window_s=80.0, longest_s=125.0)  # two thirds of an experiment's drive make one batch
 THINNED = ("load-sweep", "share-sweep", "ident", "speeds")
@@ -59,19 +59,24 @@ def test_the_papers_numbers_stand_beside_ours(reproduced: Path) -> None:
     assert len({line.count("|") for line in rows}) == 1
 
 
+def test_the_accuracy_page_says_what_the_results_say(reproduced: Path) -> None:
+    results = json.loads((reproduced / "results.json").read_text(encoding="utf-8"))
+    assert (reproduced / "accuracy.md").read_text(encoding="utf-8") == accuracy_page(results)
+
+
 def test_every_method_is_judged_on_every_drive(reproduced: Path) -> None:
     results = json.loads((reproduced / "results.json").read_text(encoding="utf-8"))
     methods = {table["method"] for table in results["tables"]}
     assert {"ratio index", "ratio index, bands of the paper's Table 2"} <= methods
     assert len(results["tables"]) == 6 * len(methods)
-    of_test_3 = [table for table in results["tables"] if table["drive"].startswith("Test 3")]
+    of_test_3 = [table for table in results["tables"] if table["drive"] == "test3"]
     assert all(table["n_batches"] == 10 for table in of_test_3)
 
 
 def test_the_ratio_index_works_where_it_was_calibrated_and_not_at_other_speeds(reproduced: Path) -> None:
     """What the report exists to show."""
     results = json.loads((reproduced / "results.json").read_text(encoding="utf-8"))
-    (test_3,) = (t for t in results["tables"] if t["drive"].startswith("Test 3") and t["method"] == "ratio index")
+    (test_3,) = (t for t in results["tables"] if t["drive"] == "test3" and t["method"] == "ratio index")
     errors_kg = {
         row["condition"]: row["payload_error_kg"] for row in results["sensitivity"] if row["method"] == "ratio index"
     }
