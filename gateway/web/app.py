@@ -66,14 +66,14 @@ def create_app(
         redirect_slashes=False,
     )
     problems.install(app)
+    scales = Scales(calibrated)
     app.include_router(api_router(board, reader, status, chosen))
     app.include_router(vehicle_router(board, status, calibrated))
     app.include_router(export_router(reader))
-    scales = Scales(calibrated)
     app.include_router(weights_router(board, scales))
     app.include_router(vss_router(board, scales))
     app.include_router(rfms_router(board, reader, status, scales))
-    app.include_router(health_router(status, metrics_registry(board, status, responses)))
+    app.include_router(health_router(status, metrics_registry(board, scales, status, responses)))
     pages.install(app)
     _describe(app, is_guarded=tokens is not None)
     return app

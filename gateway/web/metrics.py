@@ -10,13 +10,15 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 
 from gateway.web.board import Board
 from gateway.web.status import State, Status
+from gateway.web.weights import LatestWeights, Scales, weigh_latest
 
 
 class StatusCollector:
     """Turns the status of the moment into metrics whenever they are asked for."""
 
-    def __init__(self, board: Board, status: Callable[[], Status], responses: Counter[int]) -> None:
+    def __init__(self, board: Board, scales: Scales, status: Callable[[], Status], responses: Counter[int]) -> None:
         self._board = board
+        self._scales = scales
         self._status = status
         self._responses = responses
 
@@ -33,12 +35,15 @@ class StatusCollector:
         yield from _store(now)
         yield from _web(self._board, self._responses)
         yield from _estimate(self._board)
+        yield from _weights(weigh_latest(self._board, self._scales))
 
 
-def metrics_registry(board: Board, status: Callable[[], Status], responses: Counter[int]) -> CollectorRegistry:
+def metrics_registry(
+    board: Board, scales: Scales, status: Callable[[], Status], responses: Counter[int]
+) -> CollectorRegistry:
     """A registry of our own: no process-wide state, two apps do not meet."""
     registry = CollectorRegistry(auto_describe=False)
-    registry.register(StatusCollector(board, status, responses))
+    registry.register(StatusCollector(board, scales, status, responses))
     ProcessCollector(namespace="springscale", registry=registry)
     return registry
 
@@ -158,6 +163,22 @@ def _estimate(board: Board) -> Iterator[Metric]:
         if latest.get(name) is not None:
             yield _gauge(metric, text, latest[name] * factor)
     yield _gauge("springscale_estimate_stale", "1 while the latest estimate is old.", float(latest["is_stale"]))
+
+
+def _weights(weights: LatestWeights) -> Iterator[Metric]:
+    """One label value for each place a vehicle is weighed at."""
+    families = (
+        ("kg", GaugeMetricFamily("springscale_weight_kilograms", "Weight on the road.", labels=["where"])),
+        ("std_kg", GaugeMetricFamily("springscale_weight_std_kilograms", "Its standard deviation.", labels=["where"])),
+        ("limit_kg", GaugeMetricFamily("springscale_weight_limit_kilograms", "What it may be.", labels=["where"])),
+        ("is_over_limit", GaugeMetricFamily("springscale_overload", "1 while it is too much.", labels=["where"])),
+    )
+    for name, family in families:
+        for where in ("gross", "front_axle", "rear_axle"):
+            reading = getattr(getattr(weights, where), name)
+            if reading is not None:
+                family.add_metric([where], float(reading))
+        yield family
 
 
 def _gauge(name: str, text: str, reading: float) -> Metric:

@@ -13,7 +13,9 @@ from prometheus_client.parser import text_string_to_metric_families
 from support.estimates import make_record
 from support.web import Client, Gateway
 
-from gateway.web import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.vehicle import Vehicle
+from gateway.web import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, create_app
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 RULES = [
@@ -23,6 +25,9 @@ RULES = [
 ]
 DASHBOARD = json.loads((DEPLOY / "grafana" / "springscale.json").read_text())
 TARGETS = [(panel["title"], target["expr"]) for panel in DASHBOARD["panels"] for target in panel["targets"]]
+VAN = Vehicle(
+    "van", 1240.0, 2.8, unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1900.0, front_axle_limit_kg=900.0
+)
 BY_PROMETHEUS = {"up"}
 LABELS_BY_PROMETHEUS = {"instance", "job"}
 
@@ -41,8 +46,12 @@ def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set
             batches=BatchCounts(n_estimates=1, n_rejected=2, rejected_by_reason={"gap": 2}),
         )
         gateway.publish({**make_record(0), "front_share_std_pct": 0.5})
-        Client(gateway.app).get("/health/live")
-        text = Client(gateway.app).get("/metrics").text
+        calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0))
+        client = Client(
+            create_app(gateway.board, gateway.store.reader(), lambda: gateway.status, calibrated=calibrated)
+        )
+        client.get("/health/live")
+        text = client.get("/metrics").text
     found: dict[str, dict[str, set[str]]] = {}
     for family in text_string_to_metric_families(text):
         for sample in family.samples:
