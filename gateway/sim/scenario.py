@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.records import F64
+from gateway.records import F64, I64
 from gateway.sim.drive import Drive
 from gateway.sim.ride import ride
 from gateway.sim.road import Road, RoadRecipe
@@ -32,7 +32,7 @@ class LoadStep:
 class Truth:
     """What was carried, from t_ns (k,) on: payload_kg, front_share_pct (k,), axle_loads_kg (k, 2) front and rear."""
 
-    t_ns: np.ndarray
+    t_ns: I64
     payload_kg: F64
     front_share_pct: F64
     axle_loads_kg: F64

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gateway.records import F64, Bool
+from gateway.records import F64, I64, Bool
 from gateway.sim.compiled import compiled
 from gateway.sim.ride import Ride
 from gateway.sim.sensors import Channel, Engine, Gps, Imu, Mount, Recording, Sensors
@@ -93,7 +93,7 @@ def _sample_times(felt: Felt, rate_hz: float, error_ppm: float) -> F64:
     return np.arange(n, dtype=np.float64) * period_s
 
 
-def _stamps(t_s: F64, jitter_mean_s: float, rng: np.random.Generator, start_ns: int) -> np.ndarray:
+def _stamps(t_s: F64, jitter_mean_s: float, rng: np.random.Generator, start_ns: int) -> I64:
     """Arrival times, never out of order."""
     late_s = rng.exponential(jitter_mean_s, len(t_s)) if jitter_mean_s > 0.0 else 0.0
     offsets = np.rint((t_s + late_s) * NS_PER_S).astype(np.int64)
@@ -103,8 +103,8 @@ def _stamps(t_s: F64, jitter_mean_s: float, rng: np.random.Generator, start_ns: 
 def _read(signal: F64, step_s: float, t_s: F64, imu: Imu, channel: Channel, rng: np.random.Generator) -> F64:
     """Low-pass, sample, scale, bias, drift, noise, limit, round: (m, 3) at t_s."""
     grid_s = np.arange(len(signal)) * step_s
-    columns = [_low_pass(signal[:, axis], step_s, imu.corner_hz) for axis in range(3)]
-    sampled = np.column_stack([np.interp(t_s, grid_s, column) for column in columns])
+    axes = (np.interp(t_s, grid_s, _low_pass(column, step_s, imu.corner_hz)) for column in signal.T)
+    sampled = np.column_stack(tuple(axes))
     scale = 1.0 + channel.scale_std * rng.standard_normal(3)
     bias = channel.bias_std * rng.standard_normal(3)
     walk_std = channel.drift_std / math.sqrt(3600.0 * imu.rate_hz)
