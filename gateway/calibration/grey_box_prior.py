@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.grey_model import INDEX, PARAMETERS
+from gateway.core.grey_model import BEND_SHARES, INDEX, PARAMETERS
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 
@@ -22,6 +22,8 @@ MOUNT_NPM: Final = 500e3
 UNSPRUNG_SHARE: Final = 0.065
 GYRATION_PER_WHEELBASE: Final = 0.46
 SLACK: Final = 0.03
+SLOPE_STD_PER_KN: Final = 0.05
+BEND_STD_PER_KN: Final = 0.1
 
 _LOG_STD: Final = {
     "spring": 0.35,
@@ -90,6 +92,6 @@ def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
         f"damper_mount_{end}_npm": (log(MOUNT_NPM * scale), _LOG_STD["damper_mount"]),
         f"tyre_{end}_npm": (log(TYRE_NPM * scale), _LOG_STD["tyre"]),
         f"unsprung_{end}_kg": (log(unsprung_kg), WEIGHED_STD if given_kg else _LOG_STD["unsprung"]),
-        f"spring_slope_{end}_per_kn": (0.05, 0.07),
-        f"spring_curvature_{end}_per_kn2": (0.0, 0.03),
+        f"spring_slope_{end}_per_kn": (0.03 / scale, SLOPE_STD_PER_KN / scale),
+        **{f"spring_bend_{end}_{i}_per_kn": (0.0, BEND_STD_PER_KN / scale) for i in range(len(BEND_SHARES))},
     }

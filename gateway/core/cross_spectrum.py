@@ -21,9 +21,11 @@ from gateway.core.likelihood import Curvature, Point, Whittle
 from gateway.core.map_fit import Found, most_probable
 from gateway.records import F64, Batch, Estimate, Why
 
-DRIFT_STD: Final = {"damper_front_nspm": 0.04, "damper_rear_nspm": 0.04, "delay_scale": 0.003}
+DRIFT_STD: Final = {"damper_front_nspm": 0.03, "damper_rear_nspm": 0.03, "delay_scale": 0.003}
 DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
-START_PAYLOAD_SHARES: Final = (0.0, 0.12, 0.24, 0.36)  # of the empty mass
+START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
+LEAST_START_SHARE: Final = 0.33
+STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rate bends
 START_POSITION_SHARES: Final = (0.25, 0.5, 0.9)  # of the wheelbase
 
 COHERENCE_BAND_HZ: Final = (1.4, 4.5)
@@ -133,15 +135,17 @@ def _fit_load(whittle: Whittle, calibration: CrossSpectrumCalibration) -> Found:
     def curvature(x: F64) -> Curvature:
         return whittle.curvature(_point(x, calibration), DRIFTING, is_load_free=True)
 
-    starts = [np.r_[usual, load] for load in _starting_loads(calibration)]
-    return most_probable(min(starts, key=cost), prior_mean, prior_std, cost, curvature)
+    starts = sorted((np.r_[usual, load] for load in _starting_loads(calibration)), key=cost)[:STARTS_TRIED]
+    peaks = [most_probable(start, prior_mean, prior_std, cost, curvature) for start in starts]
+    return min(peaks, key=lambda found: found.cost)
 
 
 def _starting_loads(calibration: CrossSpectrumCalibration) -> list[tuple[float, float]]:
     """(payload in kg, front share 0..1) for a few loads at a few places."""
     empty_kg, share = calibration.empty_mass_kg, calibration.empty_front_share_pct / 100.0
     loads = []
-    for payload_kg in (empty_kg * part for part in START_PAYLOAD_SHARES):
+    most_kg = max(calibration.payload_seen_kg[1], LEAST_START_SHARE * empty_kg)
+    for payload_kg in np.linspace(0.0, most_kg, START_PAYLOADS_N).tolist():
         for position in START_POSITION_SHARES if payload_kg else (0.5,):
             front_kg = share * empty_kg + (1.0 - position) * payload_kg
             loads.append((payload_kg, front_kg / (empty_kg + payload_kg)))

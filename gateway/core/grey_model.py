@@ -13,8 +13,10 @@ import numpy as np
 from gateway.core.cross_spectra import CrossSpectra
 from gateway.core.halfcar import Axle, HalfCar, frequency_response
 from gateway.records import C128, F64
+from gateway.units import STANDARD_GRAVITY_MPS2
 
 SLACK_KNOTS_HZ: Final = np.array([1.0, 1.5, 2.2, 3.3, 5.0, 7.0, 9.0, 11.0, 13.0, 15.0])
+BEND_SHARES: Final = (0.0, 0.2, 0.4, 0.6, 0.9, 1.2)  # added axle load over half the empty weight where rates may bend
 SLACK_FLOOR: Final = 0.01
 ROAD_EXPONENT: Final = -2.0  # displacement density of a road falls about as frequency squared (ISO 8608)
 
@@ -40,8 +42,8 @@ _SIGNED: Final = (
     "sensor_position_m",
     "spring_slope_front_per_kn",
     "spring_slope_rear_per_kn",
-    "spring_curvature_front_per_kn2",
-    "spring_curvature_rear_per_kn2",
+    *(f"spring_bend_front_{i}_per_kn" for i in range(len(BEND_SHARES))),
+    *(f"spring_bend_rear_{i}_per_kn" for i in range(len(BEND_SHARES))),
     "gyro_lag_s",
     "delay_scale",
     "rear_lag_s",
@@ -57,6 +59,11 @@ class Ground:
     empty_mass_kg: float
     empty_front_share: float
     wheelbase_m: float
+
+    @property
+    def half_weight_kn(self) -> float:
+        """Half the weight of the empty sprung mass."""
+        return 0.5 * self.empty_mass_kg * STANDARD_GRAVITY_MPS2 / 1000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +109,8 @@ def half_car(theta: F64, ground: Ground) -> HalfCar:
         return Axle(
             spring_npm=of(f"spring_{end}_npm"),
             spring_slope_per_kn=of(f"spring_slope_{end}_per_kn"),
-            spring_curvature_per_kn2=of(f"spring_curvature_{end}_per_kn2"),
+            spring_bends_per_kn=tuple(of(f"spring_bend_{end}_{i}_per_kn") for i in range(len(BEND_SHARES))),
+            bend_loads_kn=tuple(share * ground.half_weight_kn for share in BEND_SHARES),
             damper_nspm=of(f"damper_{end}_nspm"),
             damper_mount_npm=of(f"damper_mount_{end}_npm"),
             tyre_npm=of(f"tyre_{end}_npm"),

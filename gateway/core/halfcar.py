@@ -24,12 +24,15 @@ INVERSE_PAYLOAD_KG = 30.0  # 1/L becomes L / (L^2 + this^2): an empty vehicle ha
 class Axle:
     """Both wheels of one axle together.
 
-    The spring stiffens with the static load W (kN) that the payload adds, as exp(slope W + curvature W^2).
+    The spring stiffens with the static load W (kN) that the payload adds: the logarithm of its rate
+    has a slope at W = 0, which changes by spring_bends_per_kn at each of bend_loads_kn. Helper springs
+    and bump stops bend it sharply, progressive coils gently.
     """
 
     spring_npm: Real
     spring_slope_per_kn: Real
-    spring_curvature_per_kn2: Real
+    spring_bends_per_kn: tuple[Real, ...]
+    bend_loads_kn: tuple[float, ...]
     damper_nspm: Real
     damper_mount_npm: Real
     tyre_npm: Real
@@ -108,9 +111,11 @@ def _axle(axle: Axle, added_kg: Real, omega: F64) -> tuple[C128, C128]:
     K k_t / (K + T); the wheel's own movement is eliminated.
     """
     added_kn = added_kg * (STANDARD_GRAVITY_MPS2 / 1000.0)
-    stiffening = np.exp(axle.spring_slope_per_kn * added_kn + axle.spring_curvature_per_kn2 * added_kn**2)
+    log_stiffening = axle.spring_slope_per_kn * added_kn
+    for bend, load_kn in zip(axle.spring_bends_per_kn, axle.bend_loads_kn, strict=True):
+        log_stiffening = log_stiffening + bend * np.maximum(added_kn - load_kn, 0.0)
     damper = 1j * omega * axle.damper_nspm
-    suspension = axle.spring_npm * stiffening + damper / (1.0 + damper / axle.damper_mount_npm)
+    suspension = axle.spring_npm * np.exp(log_stiffening) + damper / (1.0 + damper / axle.damper_mount_npm)
     wheel = axle.tyre_npm - omega**2 * axle.unsprung_kg
     in_series = suspension / (suspension + wheel)
     return np.asarray(in_series * wheel, np.complex128), np.asarray(in_series * axle.tyre_npm, np.complex128)
