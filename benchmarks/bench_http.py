@@ -1,0 +1,163 @@
+"""The web side: the latest estimate over HTTP, as fast as one core of server gives it.
+
+    python benchmarks/bench_http.py [--seconds 5] [--connections 16] [--json]
+
+Server and client are two processes on the loopback interface; the server holds an estimate with spectra of the
+usual length and publishes a new one every 100 ms into eight open streams. Goal: 5000 requests/s with p99 under
+20 ms.
+"""
+
+import argparse
+import asyncio
+import json
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import uvicorn
+import uvloop
+
+from gateway.records import Estimate, Spectra, estimate_to_json
+from gateway.store import Store
+from gateway.units import NS_PER_S
+from gateway.web import Board, State, Status, create_app, server_config
+
+LATEST = b"GET /api/v1/estimates/latest HTTP/1.1\r\nHost: localhost\r\n\r\n"
+STREAM = b"GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n"
+N_STREAMS = 8
+
+
+def estimate(n: int) -> Estimate:
+    """A batch with spectra of a hundred lines, as the pipeline makes them."""
+    random = np.random.default_rng(n)
+    spectra = Spectra(np.linspace(0.5, 10.0, 98), *(random.uniform(0.0, 1.0, 98) for _ in range(4)))
+    start_ns = n * 300 * NS_PER_S
+    return Estimate(
+        t_start_ns=start_ns,
+        t_end_ns=start_ns + 300 * NS_PER_S,
+        estimator="ratio_index",
+        payload_kg=271.3,
+        front_share_pct=50.4,
+        spectra=spectra,
+    )
+
+
+def serve(directory: str, port: int) -> None:
+    """The server's process: store, board and application, and a thread that publishes."""
+    store, board = Store.open(Path(directory)), Board()
+    status = Status(version="bench", state=State.ESTIMATING, uptime_s=0.0)
+
+    def publish() -> None:
+        for n in range(1_000_000):
+            record = estimate_to_json(estimate(n))
+            board.publish(record, store.write_estimate(record))
+            time.sleep(0.1)
+
+    threading.Thread(target=publish, daemon=True).start()
+    app = create_app(board, store.reader(), lambda: status)
+    uvicorn.Server(server_config(app, "127.0.0.1", port)).run()
+
+
+class Asker(asyncio.Protocol):
+    """One connection that asks again as soon as it is answered; notes how long each answer took."""
+
+    def __init__(self, took_s: list[float], end_s: float, done: asyncio.Future[None]) -> None:
+        self._took_s, self._end_s, self._done = took_s, end_s, done
+        self._missing = 0
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)  # uvloop's own, of another family
+        self._ask()
+
+    def data_received(self, data: bytes) -> None:
+        if self._missing == 0:
+            head, _, body = data.partition(b"\r\n\r\n")
+            assert head.startswith(b"HTTP/1.1 200"), head
+            length = head[head.index(b"content-length: ") + 16 :]
+            self._missing = int(length.split(b"\r\n", 1)[0]) - len(body)
+        else:
+            self._missing -= len(data)
+        if self._missing == 0:
+            self._took_s.append(time.perf_counter() - self._asked_s)
+            self._ask()
+
+    def _ask(self) -> None:
+        self._asked_s = time.perf_counter()
+        if self._asked_s < self._end_s:
+            self._transport.write(LATEST)
+        else:
+            self._transport.close()
+            self._done.set_result(None)
+
+
+async def ask(port: int, n_connections: int, seconds: float) -> list[float]:
+    """All answers' times in seconds."""
+    loop = asyncio.get_running_loop()
+    streams = [await asyncio.open_connection("127.0.0.1", port) for _ in range(N_STREAMS)]
+    listeners = []
+    for reader, writer in streams:
+        writer.write(STREAM)
+        listeners.append(asyncio.create_task(reader.read(1 << 30)))
+    took_s: list[float] = []
+    end_s = time.perf_counter() + seconds
+    done = [loop.create_future() for _ in range(n_connections)]
+    for each in done:
+        await loop.create_connection(lambda each=each: Asker(took_s, end_s, each), "127.0.0.1", port)
+    await asyncio.wait_for(asyncio.gather(*done), seconds + 30.0)
+    for listener in listeners:
+        listener.cancel()
+    return took_s
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return int(listener.getsockname()[1])
+
+
+def wait_until_up(port: int) -> None:
+    for _ in range(400):
+        try:
+            socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
+        except OSError:
+            time.sleep(0.05)
+        else:
+            return
+    raise SystemExit("the server did not come up")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=5.0)
+    parser.add_argument("--connections", type=int, default=16)
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--serve", nargs=2, metavar=("DIRECTORY", "PORT"), help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.serve:
+        serve(arguments.serve[0], int(arguments.serve[1]))
+        return
+    port = free_port()
+    with tempfile.TemporaryDirectory() as directory:
+        server = subprocess.Popen([sys.executable, __file__, "--serve", directory, str(port)])
+        try:
+            wait_until_up(port)
+            took_s = uvloop.run(ask(port, arguments.connections, arguments.seconds))
+        finally:
+            server.terminate()
+            server.wait(10.0)
+    p50_ms, p99_ms = (float(1e3 * x) for x in np.percentile(took_s, [50.0, 99.0]))
+    figures = {"requests_per_s": len(took_s) / arguments.seconds, "p50_ms": p50_ms, "p99_ms": p99_ms}
+    if arguments.json:
+        print(json.dumps(figures))
+    else:
+        print(f"latest estimate, {arguments.connections} connections, {N_STREAMS} streams open")
+        print("  " + ", ".join(f"{name} {x:.4g}" for name, x in figures.items()))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""docs/api.md lists the routes that there are."""
+
+import re
+from pathlib import Path
+
+from gateway.web.export import COLUMNS
+from gateway.web.schemas import Estimate
+from support.web import Client, Gateway
+
+API = (Path(__file__).parents[2] / "docs" / "api.md").read_text()
+
+
+def test_every_route_is_in_the_table_and_no_other(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        described = Client(gateway.app).get("/openapi.json").json()["paths"]
+    assert set(re.findall(r"^\| `(/\S+)` \|", API, re.MULTILINE)) == set(described)
+
+
+def test_every_parameter_of_the_history_is_named(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        history = Client(gateway.app).get("/openapi.json").json()["paths"]["/api/v1/estimates"]["get"]
+    (row,) = [line for line in API.splitlines() if line.startswith("| `/api/v1/estimates` ")]
+    assert {f"`{parameter['name']}`" for parameter in history["parameters"]} <= set(re.findall(r"`\w+`", row))
+
+
+def test_the_columns_of_the_export_are_fields_of_an_estimate() -> None:
+    fields = set(Estimate.model_fields)
+    bounds = {name.replace("low95", "interval95").replace("high95", "interval95") for name in COLUMNS}
+    assert bounds <= fields
