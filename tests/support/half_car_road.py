@@ -1,0 +1,80 @@
+"""A batch of exact spectra: sensors of a known half-car over a random road, made in the frequency domain."""
+
+import numpy as np
+
+from gateway.core.halfcar import Axle, HalfCar, frequency_response
+from gateway.core.vehicle import Vehicle
+from gateway.records import F64, Batch
+
+RATE_HZ = 50.0
+VAN = Vehicle("van", empty_mass_kg=1240.0, wheelbase_m=2.8, empty_front_share_pct=52.0, sensor_position_m=3.1)
+CAR = HalfCar(
+    empty_mass_kg=1240.0,
+    empty_front_share=0.52,
+    wheelbase_m=2.8,
+    front=Axle(62e3, 0.02, (), (), 3.9e3, 8e5, 3.6e5, 82.0),
+    rear=Axle(70e3, 0.04, (), (), 4.1e3, 7e5, 3.8e5, 88.0),
+    pitch_inertia_kgm2=2200.0,
+    sensor_position_m=3.1,
+    payload_gyration_m2=0.1,
+    payload_mode_hz=28.0,
+    payload_damping_ratio=0.15,
+    gyro_lag_s=0.0,
+)
+
+
+def batch_over_road(
+    payload_kg: float,
+    front_share_pct: float,
+    seed: int,
+    duration_s: float = 300.0,
+    speed_mps: float = 14.0,
+    noise: float = 0.02,
+    waviness: float = 2.0,
+    pitch_sign: float = 1.0,
+    incoherent: float = 0.0,
+) -> Batch:
+    """Constant speed; sensor noise is ``noise`` of each signal's standard deviation.
+
+    ``incoherent`` replaces that share of the pitch rate's amplitude by something unrelated to the road.
+    """
+    rng = np.random.default_rng(seed)
+    n = int(duration_s * RATE_HZ)
+    freq_hz = np.fft.rfftfreq(n, 1.0 / RATE_HZ)[1:]
+    road = (rng.standard_normal(len(freq_hz)) + 1j * rng.standard_normal(len(freq_hz))) * freq_hz ** (-waviness / 2)
+    r = frequency_response(CAR, payload_kg, front_share_pct / 100.0, freq_hz)
+    later = np.exp(-2j * np.pi * freq_hz * CAR.wheelbase_m / speed_mps)
+    in_band = (freq_hz > 0.5) & (freq_hz < 22.0)
+    acceleration = _in_time((r.acceleration_front + r.acceleration_rear * later) * road * in_band, n)
+    pitch_rate = _in_time((r.pitch_rate_front + r.pitch_rate_rear * later) * road * in_band, n)
+    scale = 0.8 / acceleration.std()
+    acceleration, pitch_rate = acceleration * scale, pitch_rate * scale
+    unrelated = pitch_rate.std() * rng.standard_normal(n)
+    pitch_rate = pitch_sign * ((1.0 - incoherent) * pitch_rate + incoherent * unrelated)
+    return batch_of(
+        acceleration + noise * acceleration.std() * rng.standard_normal(n),
+        pitch_rate + noise * pitch_rate.std() * rng.standard_normal(n),
+        np.full(n, speed_mps),
+    )
+
+
+def batch_of(acceleration_mps2: F64, pitch_rate_radps: F64, speed_mps: F64) -> Batch:
+    """A batch whose every sample is usable."""
+    n = len(speed_mps)
+    return Batch(
+        t_start_ns=0,
+        t_end_ns=int(n / RATE_HZ * 1e9),
+        drive_start_ns=0,
+        rate_hz=RATE_HZ,
+        vertical_acceleration_mps2=acceleration_mps2,
+        pitch_rate_radps=pitch_rate_radps,
+        speed_mps=speed_mps,
+        usable=np.ones(n, bool),
+        gravity_mps2=9.81,
+        gap_share=0.0,
+        shares={},
+    )
+
+
+def _in_time(spectrum: F64, n: int) -> F64:
+    return np.fft.irfft(np.r_[0.0, spectrum], n)

@@ -1,0 +1,155 @@
+"""Calibrate a known half-car, weigh it, and refuse what cannot be believed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gateway.calibration.grey_box import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum
+from gateway.core.cross_spectrum import CrossSpectrum, CrossSpectrumCalibration
+from gateway.core.grey_model import PARAMETERS, in_units
+from gateway.core.known_run import KnownRun
+from gateway.errors import CalibrationImpossibleError
+from gateway.records import Batch, Estimate, Why
+from tests.support.half_car_road import CAR, VAN, batch_of, batch_over_road
+
+KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
+
+
+def known_run(number: int, payload_kg: float, share_pct: float) -> KnownRun:
+    batches = tuple(batch_over_road(payload_kg, share_pct, seed=10 * number + i) for i in range(2))
+    return KnownRun(number, f"run {number}", payload_kg, share_pct, batches)
+
+
+@pytest.fixture(scope="module")
+def calibration() -> CrossSpectrumCalibration:
+    return calibrate_cross_spectrum([known_run(i, *load) for i, load in enumerate(KNOWN)], VAN)
+
+
+def weigh(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
+    return CrossSpectrum().estimate(batch, calibration)
+
+
+def test_calibration_finds_the_vehicle(calibration: CrossSpectrumCalibration) -> None:
+    theta = calibration.parameters
+    assert calibration.names == PARAMETERS
+    assert in_units(theta, "spring_front_npm") == pytest.approx(CAR.front.spring_npm, rel=0.05)
+    assert in_units(theta, "spring_rear_npm") == pytest.approx(CAR.rear.spring_npm, rel=0.05)
+    assert in_units(theta, "damper_rear_nspm") == pytest.approx(CAR.rear.damper_nspm, rel=0.05)
+    assert in_units(theta, "pitch_inertia_kgm2") == pytest.approx(CAR.pitch_inertia_kgm2, rel=0.02)
+    assert in_units(theta, "sensor_position_m") == pytest.approx(CAR.sensor_position_m, abs=0.02)
+    assert calibration.warnings == ()
+
+
+@pytest.mark.parametrize(("payload_kg", "share_pct"), [(0.0, 52.0), (150.0, 50.0), (350.0, 45.0)])
+@pytest.mark.parametrize("speed_mps", [9.0, 14.0, 25.0])
+def test_it_weighs_at_any_speed_loads_it_never_saw(
+    calibration: CrossSpectrumCalibration, payload_kg: float, share_pct: float, speed_mps: float
+) -> None:
+    found = weigh(batch_over_road(payload_kg, share_pct, seed=99, speed_mps=speed_mps), calibration)
+    assert found.counted
+    assert found.payload_kg == pytest.approx(payload_kg, abs=20.0)
+    assert found.front_share_pct == pytest.approx(share_pct, abs=0.5)
+
+
+@pytest.mark.parametrize("waviness", [1.6, 2.4])
+def test_the_road_drops_out(calibration: CrossSpectrumCalibration, waviness: float) -> None:
+    found = weigh(batch_over_road(300.0, 48.0, seed=5, waviness=waviness), calibration)
+    assert found.payload_kg == pytest.approx(300.0, abs=20.0)
+    assert found.front_share_pct == pytest.approx(48.0, abs=0.5)
+
+
+def test_intervals_hold_the_truth(calibration: CrossSpectrumCalibration) -> None:
+    """Twenty batches of 95 % intervals: fewer than 16 hits have a chance of 1 in 400."""
+    found = [weigh(batch_over_road(200.0, 50.0, seed=seed), calibration) for seed in range(200, 220)]
+    assert sum(e.payload_interval95_kg[0] <= 200.0 <= e.payload_interval95_kg[1] for e in found) >= 16
+    assert sum(e.front_share_interval95_pct[0] <= 50.0 <= e.front_share_interval95_pct[1] for e in found) >= 16
+
+
+def test_more_driving_makes_it_surer(calibration: CrossSpectrumCalibration) -> None:
+    short = weigh(batch_over_road(200.0, 50.0, seed=3, duration_s=60.0), calibration)
+    long = weigh(batch_over_road(200.0, 50.0, seed=3, duration_s=300.0), calibration)
+    assert short.counted
+    assert long.payload_std_kg < short.payload_std_kg
+    assert long.front_share_std_pct < short.front_share_std_pct
+
+
+def test_an_unseen_speed_widens_the_interval(calibration: CrossSpectrumCalibration) -> None:
+    seen = weigh(batch_over_road(200.0, 50.0, seed=3), calibration)
+    at_other_speeds = replace(calibration, speed_seen_mps=(28.0, 29.0))
+    unseen = weigh(batch_over_road(200.0, 50.0, seed=3), at_other_speeds)
+    assert unseen.payload_kg == seen.payload_kg
+    assert unseen.payload_std_kg > 1.5 * seen.payload_std_kg
+
+
+def test_one_empty_run_is_enough_and_says_so() -> None:
+    calibration = calibrate_cross_spectrum([known_run(1, 0.0, 52.0)], VAN)
+    assert calibration.warnings == (SPRINGS_FROM_PRIORS, UNTESTED)
+    found = weigh(batch_over_road(0.0, 52.0, seed=77), calibration)
+    assert found.payload_kg == pytest.approx(0.0, abs=20.0)
+
+
+def test_the_same_batch_gives_the_same_numbers(calibration: CrossSpectrumCalibration) -> None:
+    batch = batch_over_road(120.0, 51.0, seed=8)
+    assert weigh(batch, calibration) == weigh(batch, calibration)
+
+
+def _silent(batch: Batch) -> Batch:
+    return replace(
+        batch,
+        vertical_acceleration_mps2=1e-3 * batch.vertical_acceleration_mps2,
+        pitch_rate_radps=1e-3 * batch.pitch_rate_radps,
+    )
+
+
+def _never_steady(batch: Batch) -> Batch:
+    t_s = np.arange(len(batch.speed_mps)) / batch.rate_hz
+    return replace(batch, speed_mps=14.0 + 6.0 * np.sin(t_s))
+
+
+def _mostly_masked(batch: Batch) -> Batch:
+    return replace(batch, usable=np.arange(len(batch.usable)) < 500)
+
+
+def _unrelated(batch: Batch) -> Batch:
+    noise = np.random.default_rng(1).standard_normal(len(batch.pitch_rate_radps))
+    return replace(batch, pitch_rate_radps=batch.pitch_rate_radps.std() * noise)
+
+
+def _reversed(batch: Batch) -> Batch:
+    return replace(batch, pitch_rate_radps=-batch.pitch_rate_radps)
+
+
+def _rejected(batch: Batch) -> Batch:
+    return replace(batch, rejected=(Why.GAP,))
+
+
+def _gyro_on_another_axis(batch: Batch) -> Batch:
+    """Coherent with the acceleration, but not as any pitching half-car is."""
+    return replace(batch, pitch_rate_radps=np.roll(batch.vertical_acceleration_mps2, 9) * 0.02)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "why"),
+    [
+        (_silent, Why.NOT_ENOUGH_EXCITATION),
+        (_never_steady, Why.SPEED_SPREAD),
+        (_mostly_masked, Why.TOO_SHORT),
+        (_unrelated, Why.SENSOR_DISAGREEMENT),
+        (_reversed, Why.WRONG_SIGN),
+        (_rejected, Why.GAP),
+        (_gyro_on_another_axis, Why.MODEL_MISFIT),
+    ],
+)
+def test_it_refuses_with_the_reason(spoil: object, why: Why, calibration: CrossSpectrumCalibration) -> None:
+    found = weigh(spoil(batch_over_road(200.0, 50.0, seed=4)), calibration)  # type: ignore[operator]
+    assert found.rejected == (why,)
+    assert np.isnan(found.payload_kg)
+    assert np.isnan(found.front_share_pct)
+
+
+def test_calibration_without_driving_says_what_to_do() -> None:
+    still = batch_of(np.zeros(15000), np.zeros(15000), np.zeros(15000))
+    parked = KnownRun(1, "parked", 0.0, 52.0, (replace(still, usable=np.zeros(15000, bool)),))
+    with pytest.raises(CalibrationImpossibleError, match="steady driving"):
+        calibrate_cross_spectrum([parked], VAN)

@@ -1,0 +1,126 @@
+"""The half-car against statics, a rigid block and the simulator's own equations of motion."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.core.halfcar import Axle, HalfCar, frequency_response
+from gateway.sim.vans import PAPER_VAN, SMALL_VAN
+from gateway.sim.vehicle import Axle as SimulatedAxle
+from gateway.sim.vehicle import Load, Vehicle, front_share_pct
+from tests.support.half_car_road import CAR
+from tests.unit.test_sim_half_car import half_car as textbook_half_car
+
+STIFF = 1e12
+PLACE_ROUNDED = 5e-3  # 1/L is rounded off below 30 kg: 1 % of what the place of 300 kg does
+
+
+def test_slowly_the_body_follows_the_road() -> None:
+    """Lifting the front by 1 moves the sensor by 1 - x/l and pitches by -1/l: no dynamics at low frequency."""
+    freq_hz = np.array([1e-3])
+    omega = 2.0 * np.pi * freq_hz
+    r = frequency_response(CAR, 250.0, 0.45, freq_hz)
+    lever = CAR.sensor_position_m / CAR.wheelbase_m
+    assert (r.acceleration_front / -(omega**2)).real == pytest.approx(1.0 - lever, rel=1e-3)
+    assert (r.acceleration_rear / -(omega**2)).real == pytest.approx(lever, rel=1e-3)
+    assert (r.pitch_rate_front / (1j * omega)).real == pytest.approx(-1.0 / CAR.wheelbase_m, rel=1e-3)
+    assert (r.pitch_rate_rear / (1j * omega)).real == pytest.approx(1.0 / CAR.wheelbase_m, rel=1e-3)
+
+
+def test_the_heave_resonance_is_that_of_mass_on_springs() -> None:
+    """Equal ends, no damping, rigid tyres: sqrt(2 k / m) / 2 pi."""
+    axle = Axle(30e3, 0.0, (), (), 1.0, STIFF, STIFF, 1e-6)
+    car = replace(CAR, empty_mass_kg=1000.0, empty_front_share=0.5, front=axle, rear=axle, sensor_position_m=1.4)
+    freq_hz = np.arange(0.5, 3.0, 1e-4)
+    r = frequency_response(car, 200.0, 0.5, freq_hz)
+    peak_hz = freq_hz[np.argmax(np.abs(r.acceleration_front + r.acceleration_rear))]
+    assert peak_hz == pytest.approx(np.sqrt(2 * 30e3 / 1200.0) / (2 * np.pi), rel=1e-3)
+
+
+@given(payload_kg=st.floats(-60.0, 500.0), position=st.floats(0.1, 0.9))
+def test_both_axles_lifted_alike_lift_without_pitch_where_the_vehicle_is_symmetric(
+    payload_kg: float, position: float
+) -> None:
+    """Mirrored about the middle, a mirrored load pitches the other way."""
+    car = replace(CAR, empty_front_share=0.5, rear=CAR.front, sensor_position_m=CAR.wheelbase_m / 2.0)
+    share = (0.5 * car.empty_mass_kg + (1.0 - position) * payload_kg) / (car.empty_mass_kg + payload_kg)
+    freq_hz = np.array([1.3, 4.0, 9.0])
+    one = frequency_response(car, payload_kg, share, freq_hz)
+    mirrored = frequency_response(car, payload_kg, 1.0 - share, freq_hz)
+    np.testing.assert_allclose(one.acceleration_front, mirrored.acceleration_rear, rtol=1e-9)
+    np.testing.assert_allclose(one.pitch_rate_front, -mirrored.pitch_rate_rear, rtol=1e-9)
+
+
+@pytest.mark.parametrize("van", [PAPER_VAN, SMALL_VAN], ids=lambda van: van.name)
+@pytest.mark.parametrize("position_m", [0.6, 2.4])
+def test_it_is_the_half_car_of_the_textbooks(van: Vehicle, position_m: float) -> None:
+    """Lagrange's equations for four coordinates, written independently, give the same heave and pitch."""
+    linear = _without_tyre_damping(replace(van, cog_height_m=0.8).linear())
+    load = Load(300.0, position_m, height_m=0.8, length_m=1.0, tall_m=0.4)
+    freq_hz = np.array([0.7, 1.4, 3.0, 7.0, 11.0])
+    speed_mps = 15.0
+    heave_and_pitch = textbook_half_car(linear, load, speed_mps, freq_hz)
+    omega = 2.0 * np.pi * freq_hz
+    later = np.exp(-1j * omega * linear.wheelbase_m / speed_mps)
+    r = frequency_response(_as_half_car(linear, load), 300.0, front_share_pct(linear, (load,)) / 100.0, freq_hz)
+    pitch = (r.pitch_rate_front + r.pitch_rate_rear * later) / (1j * omega)
+    heave = (r.acceleration_front + r.acceleration_rear * later) / -(omega**2)
+    np.testing.assert_allclose(heave, heave_and_pitch[:, 0], rtol=PLACE_ROUNDED)
+    np.testing.assert_allclose(pitch, heave_and_pitch[:, 1], rtol=PLACE_ROUNDED)
+
+
+def _without_tyre_damping(van: Vehicle) -> Vehicle:
+    def bare(axle: SimulatedAxle) -> SimulatedAxle:
+        return replace(axle, wheel=replace(axle.wheel, tyre_nspm=0.0))
+
+    return replace(van, front=bare(van.front), rear=bare(van.rear))
+
+
+def _as_half_car(van: Vehicle, load: Load) -> HalfCar:
+    def axle(one: SimulatedAxle) -> Axle:
+        return Axle(
+            spring_npm=2 * one.spring.rate_npm,
+            spring_slope_per_kn=0.0,
+            spring_bends_per_kn=(),
+            bend_loads_kn=(),
+            damper_nspm=one.damper.compression_nspm + one.damper.rebound_nspm,
+            damper_mount_npm=STIFF,
+            tyre_npm=2 * one.wheel.tyre_npm,
+            unsprung_kg=2 * one.wheel.unsprung_kg,
+        )
+
+    return HalfCar(
+        empty_mass_kg=van.sprung_kg,
+        empty_front_share=van.empty_front_share_pct / 100.0,
+        wheelbase_m=van.wheelbase_m,
+        front=axle(van.front),
+        rear=axle(van.rear),
+        pitch_inertia_kgm2=van.pitch_inertia_kgm2,
+        sensor_position_m=van.cog_position_m,
+        payload_gyration_m2=load.pitch_inertia_kgm2 / load.mass_kg,
+        payload_mode_hz=1e4,
+        payload_damping_ratio=0.1,
+        gyro_lag_s=0.0,
+    )
+
+
+def test_a_payload_on_a_soft_floor_feels_heavier_below_its_mode() -> None:
+    """At 8 Hz a load ringing at 14 Hz weighs half as much again: 1 / (1 - (8/14)^2) = 1.48."""
+    soft = replace(CAR, payload_mode_hz=14.0, payload_damping_ratio=1e-6, payload_gyration_m2=0.0)
+    rigid = replace(CAR, payload_mode_hz=1e6, payload_gyration_m2=0.0)
+    share = CAR.empty_front_share
+    heavier = 300.0 / (1.0 - (8.0 / 14.0) ** 2)
+    at_soft = frequency_response(soft, 300.0, share, np.array([8.0]))
+    at_rigid = frequency_response(rigid, heavier, share, np.array([8.0]))
+    assert at_soft.acceleration_front == pytest.approx(at_rigid.acceleration_front, rel=0.02)
+
+
+def test_a_bend_stiffens_only_beyond_its_load() -> None:
+    bent = replace(CAR, rear=replace(CAR.rear, spring_bends_per_kn=(0.5,), bend_loads_kn=(1.0,)))
+    freq_hz = np.array([1.5])
+    light, heavy = (50.0, 0.51), (400.0, 0.42)
+    assert frequency_response(bent, *light, freq_hz) == frequency_response(CAR, *light, freq_hz)
+    assert frequency_response(bent, *heavy, freq_hz) != frequency_response(CAR, *heavy, freq_hz)
