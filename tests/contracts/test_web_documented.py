@@ -3,9 +3,10 @@
 import re
 from pathlib import Path
 
+from support.web import Client, Gateway
+
 from gateway.web.export import COLUMNS
 from gateway.web.schemas import Estimate
-from support.web import Client, Gateway
 
 API = (Path(__file__).parents[2] / "docs" / "api.md").read_text()
 
