@@ -25,7 +25,8 @@ class Gateway:
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
         self.store = Store.open(directory)
         self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
-        self.app: FastAPI = create_app(self.board, self.store.reader(), lambda: self.status, settings, tokens=tokens)
+        self._settings, self._tokens = settings, tokens
+        self.app = self._make_app()
 
     def publish(self, *records: dict[str, Any]) -> list[str]:
         """As the pipeline does: into the store, then onto the board."""
@@ -34,6 +35,15 @@ class Gateway:
             cursors.append(self.store.write_estimate(record))
             self.board.publish(record, cursors[-1])
         return cursors
+
+    def restart_board(self) -> None:
+        """As a new start of the service would: a new board and a new application over the same store."""
+        self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
+        self.app = self._make_app()
+
+    def _make_app(self) -> FastAPI:
+        reader = self.store.reader()
+        return create_app(self.board, reader, lambda: self.status, self._settings, tokens=self._tokens)
 
     def __enter__(self) -> "Gateway":
         return self
@@ -65,8 +75,8 @@ class Client:
 class Server:
     """The application under uvicorn, on a loopback port of its own."""
 
-    def __init__(self, config: uvicorn.Config) -> None:
-        self.socket = socket.create_server(("127.0.0.1", 0))
+    def __init__(self, config: uvicorn.Config, port: int = 0) -> None:
+        self.socket = socket.create_server(("127.0.0.1", port))
         self.url = f"http://127.0.0.1:{self.socket.getsockname()[1]}"
         self.uvicorn = uvicorn.Server(config)
         self.is_up = threading.Event()
@@ -84,9 +94,9 @@ class Server:
 
 
 @contextmanager
-def serving(app: FastAPI, config: uvicorn.Config | None = None) -> Iterator[Server]:
+def serving(app: FastAPI, config: uvicorn.Config | None = None, port: int = 0) -> Iterator[Server]:
     """A running server; stopped at the end if the test has not done so."""
-    server = Server(config or server_config(app, "127.0.0.1", 0))
+    server = Server(config or server_config(app, "127.0.0.1", port), port)
     server.thread.start()
     assert server.is_up.wait(20.0)
     try:
