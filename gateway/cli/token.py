@@ -1,0 +1,58 @@
+"""springscale token: who may ask the gateway from elsewhere."""
+
+import json
+from pathlib import Path
+
+import click
+
+from gateway.config import load_settings
+from gateway.web import Scope, TokenFile
+
+SECONDS_PER_DAY = 86_400.0
+
+_config = click.option(
+    "--config", "config_path", type=click.Path(path_type=Path), required=True, help="springscale.toml of the service"
+)
+
+
+def token_file(config_path: Path) -> TokenFile:
+    """The tokens of the service that this file configures: tokens.json beside its database."""
+    return TokenFile(load_settings(config_path).store.directory / "tokens.json")
+
+
+@click.group("token")
+def token_commands() -> None:
+    """Make, list and revoke the tokens with which others may ask."""
+
+
+@token_commands.command("create")
+@click.argument("name")
+@click.option("--scope", type=click.Choice([str(scope) for scope in Scope]), default="read", show_default=True)
+@click.option(
+    "--days", type=click.FloatRange(min=0.0, min_open=True), help="how long it is good for; else until revoked"
+)
+@_config
+def create(name: str, scope: str, days: float | None, config_path: Path) -> None:
+    """Make a token called NAME and print it, this once."""
+    lifetime_s = None if days is None else days * SECONDS_PER_DAY
+    click.echo(token_file(config_path).create(name, Scope(scope), lifetime_s))
+
+
+@token_commands.command("list")
+@click.option("--json", "as_json", is_flag=True, help="one JSON object a line")
+@_config
+def list_tokens(as_json: bool, config_path: Path) -> None:
+    """Show the tokens there are; what they are made of cannot be shown."""
+    for token in token_file(config_path).tokens():
+        if as_json:
+            click.echo(json.dumps({"id": token.id, "name": token.name, "scope": token.scope, "ends": token.expiry()}))
+        else:
+            click.echo(f"{token.id}  {token.scope:8}{token.expiry():>18}  {token.name}")
+
+
+@token_commands.command("revoke")
+@click.argument("name")
+@_config
+def revoke(name: str, config_path: Path) -> None:
+    """Refuse from now on the token of this NAME (or id); a running service follows at once."""
+    token_file(config_path).revoke(name)
