@@ -12,7 +12,7 @@ APPLICATION_ID: Final = 0x53505253  # "SPRS" in the file's header
 # Entry i turns schema i into schema i + 1. Entries are never edited, only added.
 MIGRATIONS: Final[tuple[str, ...]] = (
     """
-    CREATE TABLE epochs (id TEXT NOT NULL) STRICT;
+    CREATE TABLE epochs (id TEXT NOT NULL);
     CREATE TABLE estimates (
         seq INTEGER PRIMARY KEY AUTOINCREMENT,
         id TEXT NOT NULL UNIQUE,
@@ -23,7 +23,7 @@ MIGRATIONS: Final[tuple[str, ...]] = (
         is_rejected INTEGER NOT NULL,
         received_ns INTEGER NOT NULL,
         text TEXT NOT NULL
-    ) STRICT;
+    );
     CREATE INDEX estimates_by_time ON estimates (t_end_ns);
     CREATE INDEX estimates_by_outcome ON estimates (is_rejected, seq);
     CREATE TABLE events (
@@ -31,12 +31,12 @@ MIGRATIONS: Final[tuple[str, ...]] = (
         t_ns INTEGER NOT NULL,
         kind TEXT NOT NULL,
         text TEXT NOT NULL
-    ) STRICT;
+    );
     CREATE TABLE calibrations (
         id TEXT PRIMARY KEY,
         received_ns INTEGER NOT NULL,
         text TEXT NOT NULL
-    ) STRICT;
+    );
     """,
 )
 

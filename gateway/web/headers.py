@@ -19,10 +19,11 @@ SECURITY_HEADERS: Final = (
     ),
 )
 _NO_STORE: Final = (b"cache-control", b"no-store")
+_NO_CACHE: Final = (b"cache-control", b"no-cache")  # may be kept, and must be asked about
 
 
 class SecurityHeaders:
-    """ASGI middleware. What says nothing about caching is not cached."""
+    """ASGI middleware. What says nothing about caching is not cached, or asked about where it has an ETag."""
 
     def __init__(self, app: ASGIApp, counts: Counter[int]) -> None:
         self._app = app
@@ -36,9 +37,10 @@ class SecurityHeaders:
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 self._counts[message["status"]] += 1
+                names = {name for name, _ in message["headers"]}
                 headers = [*message["headers"], *SECURITY_HEADERS]
-                if all(name != b"cache-control" for name, _ in headers):
-                    headers.append(_NO_STORE)
+                if b"cache-control" not in names:
+                    headers.append(_NO_CACHE if b"etag" in names else _NO_STORE)
                 message["headers"] = headers
             await send(message)
 

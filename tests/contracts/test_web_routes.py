@@ -213,6 +213,13 @@ def test_every_answer_carries_the_security_headers(client: Client, path: str) ->
     assert headers["cache-control"] in ("no-store", "no-cache")
 
 
+def test_the_files_of_the_pages_are_sent_once(client: Client) -> None:
+    first = client.get("/swagger/swagger-ui.css")
+    assert first.headers["cache-control"] == "no-cache"
+    again = client.get("/swagger/swagger-ui.css", headers={"if-none-match": first.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+
+
 def test_the_description_covers_the_contract_with_units_and_examples(client: Client) -> None:
     described = client.get("/openapi.json").json()
     assert described["openapi"].startswith("3.1")

@@ -171,7 +171,7 @@ def test_an_older_schema_is_brought_up_to_date(tmp_path: Path) -> None:
 def test_a_migration_that_fails_leaves_the_old_schema(tmp_path: Path) -> None:
     path = tmp_path / "springscale.db"
     schema.connect_writer(path).close()
-    broken = (*schema.MIGRATIONS, "CREATE TABLE half (x) STRICT; nonsense")
+    broken = (*schema.MIGRATIONS, "CREATE TABLE half (x); nonsense")
     with pytest.raises(sqlite3.OperationalError):
         schema.connect_writer(path, broken)
     with closing(schema.connect_writer(path)) as database:
