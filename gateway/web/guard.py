@@ -14,7 +14,7 @@ from gateway.web.problems import problem_response
 from gateway.web.tokens import Scope, TokenFile
 
 # Nothing of the vehicle is in these: the pages' own files, the API's description, and whether the process lives.
-PUBLIC: Final = ("/pages/", "/swagger/")
+PUBLIC: Final = ("/assets/", "/swagger/")
 PUBLIC_PATHS: Final = frozenset({"/", "/docs", "/openapi.json", "/health/live"})
 _SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _LOCAL_NAMES: Final = frozenset({"localhost", "127.0.0.1", "[::1]"})

@@ -8,7 +8,7 @@ from fastapi import FastAPI
 from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
-PAGES: Final = Path(str(files("gateway.web"))) / "pages"
+ASSETS: Final = Path(str(files("gateway.web"))) / "assets"
 SWAGGER_FILES: Final = Path(str(files("fastapi_offline"))) / "static"
 
 
@@ -17,11 +17,11 @@ def install(app: FastAPI) -> None:
 
     @app.get("/", include_in_schema=False)
     async def dashboard() -> Response:
-        return FileResponse(PAGES / "dashboard.html", headers={"cache-control": "no-cache"})
+        return FileResponse(ASSETS / "dashboard.html", headers={"cache-control": "no-cache"})
 
     @app.get("/docs", include_in_schema=False)
     async def docs() -> Response:
-        return FileResponse(PAGES / "docs.html", headers={"cache-control": "no-cache"})
+        return FileResponse(ASSETS / "docs.html", headers={"cache-control": "no-cache"})
 
-    app.mount("/pages", StaticFiles(directory=PAGES), name="pages")
+    app.mount("/assets", StaticFiles(directory=ASSETS), name="assets")
     app.mount("/swagger", StaticFiles(directory=SWAGGER_FILES), name="swagger")

@@ -16,7 +16,7 @@ from gateway.web.guard import Failures, is_loopback
 
 GUARDED = ["/api/v1/estimates/latest", "/api/v1/estimates", "/api/v1/status", "/api/v1/stream", "/metrics"]
 GUARDED += ["/api/v1/vehicle", "/api/v1/export.csv", "/health/ready", "/nothing", "/api/v1/estimates/latest/"]
-GUARDED += ["/pages", "/pagesx/../api/v1/status", "/health/live/../ready", "/api/v1/../../metrics"]
+GUARDED += ["/assets", "/assetsx/../api/v1/status", "/health/live/../ready", "/api/v1/../../metrics"]
 
 
 @pytest.fixture
@@ -48,16 +48,16 @@ def test_without_a_token_nothing_is_told(client: Client, path: str) -> None:
     assert "payload" not in answer.text
 
 
-@pytest.mark.parametrize("path", ["/", "/docs", "/openapi.json", "/health/live", "/pages/dashboard.js"])
+@pytest.mark.parametrize("path", ["/", "/docs", "/openapi.json", "/health/live", "/assets/dashboard.js"])
 def test_what_tells_nothing_of_the_vehicle_is_public(client: Client, path: str) -> None:
     assert client.get(path).status_code == 200
 
 
 def test_public_folders_lead_nowhere_else(client: Client) -> None:
     for path in (
-        "/pages/../api/v1/status",
-        "/pages/%2e%2e/api/v1/status",
-        "/pages//../../app.py",
+        "/assets/../api/v1/status",
+        "/assets/%2e%2e/api/v1/status",
+        "/assets//../../app.py",
         "/swagger/..%2fcore.py",
     ):
         assert client.get(path).status_code in (401, 404), path

@@ -102,7 +102,7 @@ def test_a_question_that_cannot_be_answered_is_a_problem_that_says_where(
 
 
 def test_what_is_not_there_is_a_problem(client: Client) -> None:
-    for path in ("/api/v1/nothing", "/pages/nothing.js", "/pages/../app.py", "/swagger/%2e%2e/core.py", "/health"):
+    for path in ("/api/v1/nothing", "/assets/nothing.js", "/assets/../app.py", "/swagger/%2e%2e/core.py", "/health"):
         answer = client.get(path)
         assert answer.status_code == 404, path
         assert answer.headers["content-type"] == "application/problem+json"

@@ -1,5 +1,5 @@
-import { follow } from "/pages/event-stream.js";
-import { Refused, load, setToken } from "/pages/gateway.js";
+import { follow } from "/assets/event-stream.js";
+import { Refused, load, setToken } from "/assets/gateway.js";
 
 const N_RECENT = 25;
 const STATUS_EVERY_MS = 5000;
