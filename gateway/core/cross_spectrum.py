@@ -21,7 +21,7 @@ from gateway.core.likelihood import Curvature, Point, Whittle
 from gateway.core.map_fit import Found, most_probable
 from gateway.records import F64, Batch, Estimate, Why
 
-DRIFT_STD: Final = {"damper_front_nspm": 0.03, "damper_rear_nspm": 0.03, "delay_scale": 0.003}
+DRIFT_STD: Final = {"damper_front_nspm": 0.015, "damper_rear_nspm": 0.015, "delay_scale": 0.003}
 DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
 START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
 LEAST_START_SHARE: Final = 0.33
@@ -33,6 +33,7 @@ LEAST_COHERENCE: Final = 0.35
 LEAST_POWER_SHARE: Final = 0.05  # of the calibrated amplitude
 MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
+ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
 Z95: Final = 1.959964
 
 
@@ -96,7 +97,7 @@ class CrossSpectrum:
         if batch.rejected:
             return replace(_answer(batch), rejected=batch.rejected)
         spectra = cross_spectra_of([batch], calibration.reading)
-        why = _unfit(batch, spectra, calibration)
+        why = _unfit(batch, spectra, calibration) or _off_its_speeds(batch, calibration)
         if spectra is None or why is not None:
             return replace(_answer(batch), rejected=(why or Why.TOO_SHORT,))
         located = locate(spectra, calibration)
@@ -179,6 +180,15 @@ def _unfit(batch: Batch, spectra: CrossSpectra | None, calibration: CrossSpectru
     freq_hz = spectra.freq_hz[1:-1]
     seen = (freq_hz >= COHERENCE_BAND_HZ[0]) & (freq_hz <= COHERENCE_BAND_HZ[1])
     return Why.SENSOR_DISAGREEMENT if float(np.mean(spectra.coherence[seen])) < LEAST_COHERENCE else None
+
+
+def _off_its_speeds(batch: Batch, calibration: CrossSpectrumCalibration) -> Why | None:
+    """A zero point drifts with speed as the model errs, and one load shows no error: stay near its speeds."""
+    if calibration.payload_seen_kg[0] < calibration.payload_seen_kg[1]:
+        return None
+    slowest, fastest = calibration.speed_seen_mps
+    margin = 1.0 + ZERO_POINT_SPEED_MARGIN
+    return None if slowest / margin <= batch.mean_speed_mps <= fastest * margin else Why.SPEED_UNCALIBRATED
 
 
 def _judged(

@@ -89,6 +89,11 @@ def test_one_empty_run_is_enough_and_says_so() -> None:
     assert found.payload_kg == pytest.approx(0.0, abs=20.0)
 
 
+def test_a_zero_point_is_not_believed_at_other_speeds() -> None:
+    calibration = calibrate_cross_spectrum([known_run(1, 0.0, 52.0)], VAN)
+    assert weigh(batch_over_road(0.0, 52.0, seed=77, speed_mps=20.0), calibration).rejected == (Why.SPEED_UNCALIBRATED,)
+
+
 def test_the_same_batch_gives_the_same_numbers(calibration: CrossSpectrumCalibration) -> None:
     batch = batch_over_road(120.0, 51.0, seed=8)
     assert weigh(batch, calibration) == weigh(batch, calibration)
