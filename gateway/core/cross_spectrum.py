@@ -29,7 +29,7 @@ STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rat
 START_POSITION_SHARES: Final = (0.25, 0.5, 0.9)  # of the wheelbase
 
 COHERENCE_BAND_HZ: Final = (1.4, 4.5)
-LEAST_COHERENCE: Final = 0.35
+LEAST_COHERENCE: Final = 0.2
 LEAST_POWER_SHARE: Final = 0.05  # of the calibrated amplitude
 MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance

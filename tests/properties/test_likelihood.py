@@ -1,0 +1,98 @@
+"""The likelihood's derivatives, and what it must not depend on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gateway.calibration.grey_box_prior import prior_of
+from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
+from gateway.core.grey_model import PARAMETERS, Ground
+from gateway.core.likelihood import Point, Whittle
+from tests.support.half_car_road import VAN, batch_over_road
+
+GROUND = Ground(VAN.empty_mass_kg, VAN.empty_front_share_pct / 100.0, VAN.wheelbase_m)
+READING = Reading(VAN.wheelbase_m, (1.1, 14.0), 256)
+
+
+@pytest.fixture(scope="module")
+def spectra() -> CrossSpectra:
+    found = cross_spectra_of([batch_over_road(200.0, 50.0, seed=1, duration_s=60.0)], READING)
+    assert found is not None
+    return found
+
+
+def test_the_gradient_is_the_slope_of_the_cost(spectra: CrossSpectra) -> None:
+    whittle = Whittle(spectra, GROUND)
+    prior = prior_of(VAN)
+    free = list(range(len(PARAMETERS)))
+    point = Point(prior.mean, 150.0, 0.49)
+    gradient = whittle.curvature(point, free, is_load_free=True).gradient
+    for entry, name in enumerate(PARAMETERS):
+        up, down = prior.mean.copy(), prior.mean.copy()
+        up[entry] += 1e-4
+        down[entry] -= 1e-4
+        slope = (whittle.cost(Point(up, 150.0, 0.49)) - whittle.cost(Point(down, 150.0, 0.49))) / 2e-4
+        assert gradient[entry] == pytest.approx(slope, rel=1e-3, abs=1e-2), name
+    by_payload = (whittle.cost(Point(prior.mean, 151.0, 0.49)) - whittle.cost(Point(prior.mean, 149.0, 0.49))) / 2.0
+    by_share = (whittle.cost(Point(prior.mean, 150.0, 0.4901)) - whittle.cost(Point(prior.mean, 150.0, 0.4899))) / 2e-4
+    assert gradient[-2] == pytest.approx(by_payload, rel=1e-3)
+    assert gradient[-1] == pytest.approx(by_share, rel=1e-3)
+
+
+@settings(max_examples=20, deadline=None)
+@given(gain=st.floats(1e-3, 1e3))
+def test_the_roads_level_does_not_matter(gain: float, spectra: CrossSpectra) -> None:
+    louder = replace(
+        spectra,
+        acceleration=gain * spectra.acceleration,
+        pitch_rate=gain * spectra.pitch_rate,
+        cross=gain * spectra.cross,
+    )
+    prior = prior_of(VAN)
+    here, there = Point(prior.mean, 0.0, 0.52), Point(prior.mean, 300.0, 0.47)
+    difference = Whittle(spectra, GROUND).cost(here) - Whittle(spectra, GROUND).cost(there)
+    assert Whittle(louder, GROUND).cost(here) - Whittle(louder, GROUND).cost(there) == pytest.approx(difference)
+
+
+def test_a_batch_scaled_gives_the_same_spectra() -> None:
+    batch = batch_over_road(200.0, 50.0, seed=2, duration_s=60.0)
+    quieter = replace(
+        batch,
+        vertical_acceleration_mps2=0.5 * batch.vertical_acceleration_mps2,
+        pitch_rate_radps=0.5 * batch.pitch_rate_radps,
+    )
+    one, other = cross_spectra_of([batch], READING), cross_spectra_of([quieter], READING)
+    assert one is not None
+    assert other is not None
+    np.testing.assert_allclose(one.cross, other.cross, rtol=1e-9)
+    assert other.acceleration_rms_mps2 == pytest.approx(0.5 * one.acceleration_rms_mps2)
+
+
+def test_masked_samples_leave_no_trace() -> None:
+    """Whatever stands in a masked stretch, the spectra are the same."""
+    batch = batch_over_road(200.0, 50.0, seed=3, duration_s=120.0)
+    masked = (np.arange(len(batch.usable)) < 2000) | (np.arange(len(batch.usable)) > 2400)
+    spoilt = batch.vertical_acceleration_mps2.copy()
+    spoilt[~masked] = np.nan
+    one = cross_spectra_of([replace(batch, usable=masked)], READING)
+    other = cross_spectra_of([replace(batch, usable=masked, vertical_acceleration_mps2=spoilt)], READING)
+    assert one is not None
+    assert other is not None
+    np.testing.assert_array_equal(one.cross, other.cross)
+
+
+def test_the_bound_shrinks_with_the_root_of_time() -> None:
+    from gateway.calibration.grey_box import calibrate_cross_spectrum
+    from gateway.core.bounds import Drive, cramer_rao
+    from gateway.core.known_run import KnownRun
+
+    run = KnownRun(1, "empty", 0.0, 52.0, (batch_over_road(0.0, 52.0, seed=4),))
+    calibration = calibrate_cross_spectrum([run], VAN)
+    short = cramer_rao(calibration, 200.0, 50.0, Drive(300.0, 14.0))
+    long = cramer_rao(calibration, 200.0, 50.0, Drive(1200.0, 14.0))
+    assert long.payload_std_kg == pytest.approx(short.payload_std_kg / 2.0, rel=0.1)
+    unsure = cramer_rao(calibration, 200.0, 50.0, Drive(300.0, 14.0), {"spring_rear_npm": 0.1})
+    assert unsure.payload_std_kg > short.payload_std_kg
