@@ -21,7 +21,7 @@ from gateway.core.likelihood import Curvature, Point, Whittle
 from gateway.core.map_fit import Found, most_probable
 from gateway.records import F64, Batch, Estimate, Why
 
-DRIFT_STD: Final = {"damper_front_nspm": 0.015, "damper_rear_nspm": 0.015, "delay_scale": 0.003}
+DRIFT_STD: Final = {"damper_front_nspm": 0.02, "damper_rear_nspm": 0.02, "delay_scale": 0.003}
 DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
 START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
 LEAST_START_SHARE: Final = 0.33
