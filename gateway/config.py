@@ -27,6 +27,9 @@ class VehicleSection(Section):
     """Who this vehicle is."""
 
     id: str = Field("vehicle", min_length=1, max_length=64, description="name under which the fleet knows the vehicle")
+    calibrated_as: str | None = Field(
+        None, description="name the vehicle has in its calibration file; where given, another vehicle's file is refused"
+    )
     vin: str | None = Field(
         None, pattern=r"^[A-HJ-NPR-Z0-9]{17}$", description="vehicle identification number (ISO 3779)"
     )

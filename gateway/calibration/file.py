@@ -9,6 +9,8 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError, WithJsonSchema
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cross_spectrum import CrossSpectrumCalibration
+from gateway.core.grey_model import PARAMETERS
 from gateway.core.ratio_index import Band, RatioIndexCalibration
 from gateway.core.regression import TERMS, RegressionModel
 from gateway.core.vehicle import Vehicle
@@ -114,6 +116,43 @@ def _regression_part(model: RegressionModel | None) -> RegressionPart | None:
     return RegressionPart(**{name: getattr(model, name) for name in RegressionPart.model_fields})
 
 
+class CrossSpectrumPart(_Part):
+    """The half-car of this vehicle; see core.cross_spectrum.CrossSpectrumCalibration."""
+
+    empty_mass_kg: float = Field(gt=0.0)
+    empty_front_share_pct: float
+    wheelbase_m: float = Field(gt=0.0)
+    band_hz: tuple[float, float]
+    n_segment: int = Field(ge=64)
+    names: tuple[str, ...]
+    parameters: Array
+    covariance: Array
+    payload_inflation: float = Field(gt=0.0)
+    front_share_inflation: float = Field(gt=0.0)
+    misfit_limit: float = Field(gt=0.0)
+    acceleration_rms_mps2: float = Field(gt=0.0)
+    pitch_rate_rms_radps: float = Field(gt=0.0)
+    payload_seen_kg: tuple[float, float]
+    front_share_seen_pct: tuple[float, float]
+    speed_seen_mps: tuple[float, float]
+    warnings: tuple[str, ...] = ()
+    version: int = 1
+
+    @classmethod
+    def of(cls, calibration: CrossSpectrumCalibration) -> "CrossSpectrumPart":
+        """The core's calibration as the file holds it."""
+        return cls(**{name: getattr(calibration, name) for name in cls.model_fields})
+
+    def for_core(self) -> CrossSpectrumCalibration:
+        """The same in the core's terms. Raises CalibrationFileError where the model has other parameters today."""
+        if self.names != tuple(PARAMETERS):
+            raise CalibrationFileError(
+                "the cross_spectrum part was fitted with another vehicle model than this springscale has: "
+                "calibrate again"
+            )
+        return CrossSpectrumCalibration(**dict(self))
+
+
 class VehiclePart(_Part):
     """The vehicle as the campaign stated it."""
 
@@ -179,6 +218,7 @@ class CalibrationFile(_Part):
     version: Literal[1] = VERSION
     vehicle: VehiclePart
     seen: SeenPart
+    cross_spectrum: CrossSpectrumPart | None = None
     ratio_index: RatioIndexPart | None = None
     expected_errors: dict[str, ExpectedErrorsPart] = Field(default_factory=dict)
     warnings: tuple[str, ...] = ()
@@ -201,12 +241,14 @@ class CalibrationFile(_Part):
             payload_seen_kg=self.seen.payload_kg,
             front_share_seen_pct=self.seen.front_share_pct,
             ratio_index=self.ratio_index.for_core() if self.ratio_index else None,
+            cross_spectrum=self.cross_spectrum.for_core() if self.cross_spectrum else None,
         )
 
     @property
     def estimators(self) -> tuple[str, ...]:
         """Estimators that this file holds a calibration for, the better first."""
-        return ("ratio_index",) if self.ratio_index else ()
+        held = {"cross_spectrum": self.cross_spectrum, "ratio_index": self.ratio_index}
+        return tuple(name for name, part in held.items() if part is not None)
 
 
 def content_id(content: dict[str, Any]) -> str:

@@ -1,1 +1,71 @@
-"""The command line: springscale."""
+"""The command line: springscale. Commands are loaded when they are called, so that --help is quick."""
+
+import os
+import sys
+from importlib import import_module
+from importlib.metadata import version
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads only cost
+
+import click  # noqa: E402 - the line above must come before numpy, wherever it is imported
+
+from gateway.errors import SpringscaleError  # noqa: E402
+
+_COMMANDS = {
+    "calibrate": ("gateway.cli.calibrate", "calibrate", "Known-load drives to a calibration file."),
+    "check-config": (
+        "gateway.cli.check_config",
+        "check_config",
+        "Check everything that can be checked without the bus.",
+    ),
+    "demo": ("gateway.cli.demo", "demo", "The whole service on a simulated drive: no hardware, no configuration."),
+    "estimate": ("gateway.cli.estimate", "estimate", "Logs to estimates, one line per batch."),
+    "evaluate": ("gateway.cli.evaluate", "evaluate", "The error table over known-load drives."),
+    "replay": ("gateway.cli.replay", "replay", "Send a log to a bus, paced by its time stamps."),
+    "reproduce": ("gateway.cli.reproduce", "reproduce", "The paper's section 4 with our simulator, as a report."),
+    "run": ("gateway.cli.run", "run", "The service."),
+    "simulate": ("gateway.cli.simulate", "simulate", "Simulated drives, as logs or onto a bus."),
+    "token": ("gateway.cli.token", "token_commands", "Who may ask the gateway from elsewhere."),
+}
+
+
+class _Lazy(click.Group):
+    """A group that imports a command's module only when the command is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in order."""
+        return sorted(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command itself, imported now; None where there is none of that name."""
+        if cmd_name not in _COMMANDS:
+            return None
+        module, attribute, _ = _COMMANDS[cmd_name]
+        command: click.Command = getattr(import_module(module), attribute)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of --help, without importing anything."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, _COMMANDS[name][2]) for name in sorted(_COMMANDS)])
+
+
+@click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(version("springscale"), prog_name="springscale")
+def springscale() -> None:
+    """Weighs a vehicle by listening to its springs.
+
+    Exit codes: 0 done, 1 the work failed, 2 a wrong option or configuration.
+    """
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point. A person's mistake ends in one clear line, never in a traceback."""
+    try:
+        springscale.main(args=arguments, prog_name="springscale")
+    except SpringscaleError as fault:
+        click.echo(f"springscale: {fault}", err=True)
+        sys.exit(fault.exit_code)
+    except BrokenPipeError:  # the reader of our output has gone, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)

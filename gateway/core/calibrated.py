@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from gateway.core.cross_spectrum import CrossSpectrumCalibration
 from gateway.core.ratio_index import RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
 
@@ -17,6 +18,7 @@ class CalibratedVehicle:
     payload_seen_kg: tuple[float, float]
     front_share_seen_pct: tuple[float, float]
     ratio_index: RatioIndexCalibration | None = None
+    cross_spectrum: CrossSpectrumCalibration | None = None
 
     def is_out_of_range(self, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]) -> bool:
         """True where a 95 % interval lies wholly outside what calibration saw, plus a quarter of its span.

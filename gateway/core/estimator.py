@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cross_spectrum import CrossSpectrum
 from gateway.core.ratio_index import indexes_of
 from gateway.core.spectrum import spectra_of
 from gateway.records import Batch, Estimate, Why
@@ -90,4 +91,30 @@ def by_ratio_index(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate)
     return found
 
 
-ESTIMATORS: Mapping[str, Estimator] = MappingProxyType({"ratio_index": by_ratio_index})
+def by_cross_spectrum(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:
+    """The half-car held against both sensors' cross-spectra; see core.cross_spectrum.
+
+    The ratio indexes are shown beside it where the file holds their bands.
+    """
+    if calibrated.cross_spectrum is None:
+        return replace(blank, rejected=(Why.NO_CALIBRATION,))
+    found = CrossSpectrum().estimate(batch, calibrated.cross_spectrum)
+    ra, rg = indexes_of(batch, calibrated.ratio_index) if calibrated.ratio_index else (np.nan, np.nan)
+    return replace(
+        blank,
+        payload_kg=found.payload_kg,
+        payload_std_kg=found.payload_std_kg,
+        payload_interval95_kg=found.payload_interval95_kg,
+        front_share_pct=found.front_share_pct,
+        front_share_std_pct=found.front_share_std_pct,
+        front_share_interval95_pct=found.front_share_interval95_pct,
+        ratio_index_acceleration=ra,
+        ratio_index_pitch_rate=rg,
+        rejected=found.rejected,
+        diagnostics=found.diagnostics,
+    )
+
+
+ESTIMATORS: Mapping[str, Estimator] = MappingProxyType(
+    {"cross_spectrum": by_cross_spectrum, "ratio_index": by_ratio_index}  # the better first
+)

@@ -11,6 +11,7 @@ from gateway.calibration.campaign import Campaign
 from gateway.calibration.evaluation import Judged, error_table
 from gateway.calibration.file import (
     CalibrationFile,
+    CrossSpectrumPart,
     ExpectedErrorsPart,
     ProvenancePart,
     RatioIndexPart,
@@ -18,8 +19,10 @@ from gateway.calibration.file import (
     SeenPart,
     VehiclePart,
 )
+from gateway.calibration.grey_box import calibrate_cross_spectrum
 from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cross_spectrum import CrossSpectrumCalibration
 from gateway.core.estimator import estimate
 from gateway.core.known_run import KnownRun
 from gateway.core.settings import BatchSettings
@@ -49,7 +52,7 @@ def calibrate(
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
     if not counted:
         raise CalibrationImpossibleError(f"{campaign.path}: no identification batch can be used: {_why_none(runs)}")
-    parts, warnings = _fit(estimators, runs, campaign)
+    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign)
     with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
     speeds = [batch.mean_speed_mps for batch in counted]
     return CalibrationFile(
@@ -59,8 +62,9 @@ def calibrate(
             front_share_pct=_span([run.front_share_pct for run in with_batches]),
             speed_mps=_span(speeds),
         ),
-        ratio_index=RatioIndexPart.of(parts["ratio_index"].calibration) if "ratio_index" in parts else None,
-        expected_errors={name: _expected(fit) for name, fit in parts.items()},
+        cross_spectrum=CrossSpectrumPart.of(cross_spectrum) if cross_spectrum else None,
+        ratio_index=RatioIndexPart.of(ratio_index.calibration) if ratio_index else None,
+        expected_errors={"ratio_index": _expected(ratio_index)} if ratio_index else {},
         warnings=tuple(warnings),
         provenance=_provenance(campaign, split, command),
     )
@@ -68,18 +72,23 @@ def calibrate(
 
 def _fit(
     estimators: Sequence[str], runs: Sequence[KnownRun], campaign: Campaign
-) -> tuple[dict[str, RatioIndexFit], list[str]]:
-    """Fits by name, and a warning for each estimator that could not be fitted."""
-    fits: dict[str, RatioIndexFit] = {}
+) -> tuple[RatioIndexFit | None, CrossSpectrumCalibration | None, list[str]]:
+    """What each named estimator learned, and a warning for each that these runs cannot carry."""
+    ratio_index: RatioIndexFit | None = None
+    cross_spectrum: CrossSpectrumCalibration | None = None
     warnings: list[str] = []
     for name in estimators:
         try:
-            fits[name] = fit_ratio_index(runs, campaign.vehicle)
+            if name == "ratio_index":
+                ratio_index = fit_ratio_index(runs, campaign.vehicle)
+            else:
+                cross_spectrum = calibrate_cross_spectrum(runs, campaign.vehicle)
+                warnings.extend(cross_spectrum.warnings)
         except CalibrationImpossibleError as fault:
             warnings.append(f"{name}: {fault}")
-    if not fits:
+    if ratio_index is None and cross_spectrum is None:
         raise CalibrationImpossibleError(f"{campaign.path}: " + "; ".join(warnings))
-    return fits, warnings
+    return ratio_index, cross_spectrum, warnings
 
 
 def _why_none(runs: Sequence[KnownRun]) -> str:

@@ -1,0 +1,33 @@
+"""springscale check-config: everything that can be checked without the bus."""
+
+from pathlib import Path
+
+import click
+
+from gateway.cli.options import FILE, as_json
+from gateway.config import load_settings
+from gateway.offline.estimates import setup_of
+from gateway.records import json_line
+
+
+@click.command("check-config")
+@click.argument("config", type=FILE)
+@as_json
+def check_config(config: Path, as_json: bool) -> None:
+    """Check CONFIG, its signal map, its DBC files and its calibration; name every fault."""
+    settings = load_settings(config)
+    setup = setup_of(settings)
+    found = {
+        "config": str(config),
+        "signals": [str(signal) for signal in setup.signal_map.signals],
+        "calibration_id": setup.calibration.id if setup.calibration else None,
+        "estimator": setup.estimator,
+        "interface": settings.bus.interface,
+        "channel": settings.bus.channel,
+    }
+    if as_json:
+        click.echo(json_line(found))
+        return
+    click.echo(f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {settings.bus.channel}.")
+    if setup.calibration is None:
+        click.echo("No calibration is configured: batches will carry spectra and rejected = no_calibration.")

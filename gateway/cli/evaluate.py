@@ -1,0 +1,65 @@
+"""springscale evaluate: the error table of (12)."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gateway.calibration.campaign import load_campaign
+from gateway.calibration.file import load_calibration
+from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
+from gateway.cli.progress import bar
+from gateway.errors import ConfigurationError
+from gateway.offline.calibrate import Split
+from gateway.offline.calibrate import evaluate as judge_campaign
+from gateway.records import json_line
+
+
+@click.command("evaluate")
+@click.argument("campaign", type=FILE)
+@click.option("--calibration", type=FILE, required=True, help="calibration file")
+@one_estimator
+@click.option("--split", type=click.Choice(["identification", "validation", "all"]), default="validation")
+@window
+@as_json
+def evaluate(
+    campaign: Path, calibration: Path, estimator: str | None, split: Split, window_s: float | None, as_json: bool
+) -> None:
+    """Hold estimates against the known loads of CAMPAIGN."""
+    loaded, held = load_campaign(campaign), load_calibration(calibration)
+    chosen = estimator or held.estimators[0]
+    if chosen not in held.estimators:
+        raise ConfigurationError(f"{calibration}: holds no calibration for {chosen}, only {', '.join(held.estimators)}")
+    with bar(len(loaded.runs), "reading drives") as progress:
+        table = judge_campaign(
+            loaded,
+            held.for_core(),
+            batch_settings(window_s),
+            estimator=chosen,
+            split=split,
+            on_run=lambda done, of: progress.update(done - progress.pos),
+        )
+    click.echo(json_line(table) if as_json else _table(table))
+
+
+def _table(table: dict[str, Any]) -> str:
+    lines = [
+        f"{table['estimator']}: {table['n_batches']} batches, {table['n_rejected']} rejected "
+        f"{table['rejected_by_reason'] or ''}".rstrip(),
+        f"{'':14}{'mean |e|':>10}{'+ misses':>10}{'bias':>9}{'std':>9}{'max':>9}{'mean |e|':>12}{'covered':>9}",
+        _row("payload", table["payload"], "kg"),
+        _row("front share", table["front_share"], "pp"),
+    ]
+    return "\n".join(lines)
+
+
+def _row(name: str, errors: dict[str, Any], unit: str) -> str:
+    percents = ("mean_abs_pct", "mean_abs_pct_with_misses", "bias_pct", "std_pct", "max_abs_pct")
+    shown = [_shown(errors[key], " %", width) for key, width in zip(percents, (10, 10, 9, 9, 9), strict=True)]
+    covered = errors["coverage95"]
+    share = _shown(None if covered is None else 100.0 * covered, " %", 9)
+    return f"{name:14}{''.join(shown)}{_shown(errors[f'mean_abs_{unit}'], f' {unit}', 12)}{share}"
+
+
+def _shown(number: float | None, unit: str, width: int) -> str:
+    return f"{'-' if number is None else f'{number:.2f}{unit}':>{width}}"

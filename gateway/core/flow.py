@@ -1,0 +1,60 @@
+"""Rows in, estimates out: the one path that the live service and the offline tools share."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from gateway.core.batch import Traits
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.estimator import estimate
+from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, fields_of, fused
+from gateway.core.scheduler import Scheduler
+from gateway.core.settings import BatchSettings
+from gateway.records import Batch, Estimate, Motion
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Whose estimates these are."""
+
+    vehicle_id: str | None = None
+    vin: str | None = None
+
+
+class Flow:
+    """Scheduler and estimator in a row. Feed it decoded rows in order of arrival."""
+
+    def __init__(
+        self,
+        settings: BatchSettings,
+        traits: Traits,
+        calibrated: CalibratedVehicle | None,
+        estimator: str,
+        identity: Identity,
+    ) -> None:
+        self.scheduler = Scheduler(settings, traits)
+        self._calibrated = calibrated
+        self._estimator = estimator
+        self._identity = identity
+        self._epoch: LoadEpoch | None = None
+        self._drive_start_ns: int | None = None
+
+    def feed(self, motion: Motion) -> Iterator[Estimate]:
+        """Estimates and rejections of the batches that end with these rows, provisional ones among them."""
+        return map(self._estimate, self.scheduler.feed(motion))
+
+    def flush(self) -> Iterator[Estimate]:
+        """The stream has ended: what the open window still tells."""
+        return map(self._estimate, self.scheduler.flush())
+
+    def _estimate(self, batch: Batch) -> Estimate:
+        found = estimate(batch, self._calibrated, self._estimator)
+        found = replace(found, vehicle_id=self._identity.vehicle_id, vin=self._identity.vin)
+        return found if batch.is_provisional else replace(found, epoch=self._fused(batch, found))
+
+    def _fused(self, batch: Batch, found: Estimate) -> Mapping[str, float]:
+        """Fields of the load epoch that this batch belongs to; a new drive or a long stop opens a new one."""
+        is_new_drive = batch.drive_start_ns != self._drive_start_ns
+        self._drive_start_ns = batch.drive_start_ns
+        could_have_changed = is_new_drive or batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
+        self._epoch = fused(self._epoch, found, could_have_changed)
+        return fields_of(self._epoch) if self._epoch and found.counted else {}

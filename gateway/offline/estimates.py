@@ -1,0 +1,72 @@
+"""Logs in, estimates out: what `springscale estimate` prints."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from gateway.bus.logs import motion_of_log
+from gateway.bus.signal_map import SignalMap, load_signal_map
+from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.config import Settings
+from gateway.core.flow import Flow, Identity
+from gateway.core.settings import BatchSettings
+from gateway.errors import ConfigurationError
+from gateway.records import Estimate
+
+NOBODY = Identity()  # a log without a configuration belongs to no named vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """Everything that turns frames into estimates, loaded and checked."""
+
+    signal_map: SignalMap
+    calibration: CalibrationFile | None
+    estimator: str
+    identity: Identity
+
+    def flow(self, settings: BatchSettings) -> Flow:
+        """A fresh pipeline."""
+        calibrated = self.calibration.for_core() if self.calibration else None
+        return Flow(settings, self.signal_map.traits, calibrated, self.estimator, self.identity)
+
+
+def load_setup(
+    signals: Path | str, calibration: Path | None, estimator: str | None, identity: Identity = NOBODY
+) -> Setup:
+    """Loads the signal map and the calibration file; the best estimator of the file where none is named.
+
+    Raises SignalMapError, CalibrationFileError, or ConfigurationError where the file lacks the estimator.
+    """
+    held = load_calibration(calibration) if calibration else None
+    chosen = estimator or (held.estimators[0] if held else "cross_spectrum")
+    if held and chosen not in held.estimators:
+        raise ConfigurationError(
+            f"{calibration}: holds no calibration for the estimator {chosen!r}, only for "
+            f"{', '.join(held.estimators)}: choose one of these or calibrate again"
+        )
+    return Setup(load_signal_map(signals), held, chosen, identity)
+
+
+def setup_of(settings: Settings, estimator: str | None = None) -> Setup:
+    """The setup that a springscale.toml describes. Raises as :func:`load_setup`, and for another vehicle's file."""
+    identity = Identity(settings.vehicle.id, settings.vehicle.vin)
+    setup = load_setup(settings.signals, settings.calibration, estimator or settings.estimator, identity)
+    wanted = settings.vehicle.calibrated_as
+    if wanted and setup.calibration and setup.calibration.vehicle.name != wanted:
+        raise ConfigurationError(
+            f"{settings.calibration}: was made for the vehicle {setup.calibration.vehicle.name!r}, "
+            f"vehicle.calibrated_as says {wanted!r}"
+        )
+    return setup
+
+
+def estimates_of_logs(logs: Sequence[Path], setup: Setup, settings: BatchSettings) -> Iterator[Estimate]:
+    """Every batch of every log in turn; each log is a drive of its own. Raises LogUnreadableError."""
+    for log in logs:
+        flow = setup.flow(settings)
+        motions, report, _ = motion_of_log(log, setup.signal_map)
+        for motion in motions:
+            yield from flow.feed(motion)
+        report.require_frames()
+        yield from flow.flush()
