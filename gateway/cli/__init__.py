@@ -7,9 +7,9 @@ from importlib.metadata import version
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads only cost
 
-import click  # noqa: E402 - the line above must come before numpy, wherever it is imported
+import click
 
-from gateway.errors import SpringscaleError  # noqa: E402
+from gateway.errors import SpringscaleError
 
 _COMMANDS = {
     "calibrate": ("gateway.cli.calibrate", "calibrate", "Known-load drives to a calibration file."),

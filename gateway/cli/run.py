@@ -1,0 +1,21 @@
+"""springscale run: the service."""
+
+import os
+from pathlib import Path
+
+import click
+
+from gateway.cli.options import FILE
+from gateway.config import load_settings
+from gateway.offline.estimates import setup_of
+from gateway.service.gateway import Gateway
+from gateway.service.log import set_up_log
+
+
+@click.command("run")
+@click.option("--config", "config_path", type=FILE, required=True, help="springscale.toml")
+def run(config_path: Path) -> None:
+    """Read the bus, estimate, store and serve until SIGTERM."""
+    settings = load_settings(config_path)
+    set_up_log(settings.log.level, under_journald="JOURNAL_STREAM" in os.environ)
+    Gateway(settings, setup_of(settings)).run()

@@ -1,0 +1,154 @@
+"""The service itself: starts every part in order, watches them, stops them in the reverse order."""
+
+import asyncio
+import contextlib
+import logging
+import signal
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+
+import uvicorn
+
+from gateway.bus.decode import Decoder
+from gateway.bus.source import LiveSource
+from gateway.config import Settings
+from gateway.errors import SpringscaleError
+from gateway.offline.estimates import Setup
+from gateway.service.log import log_event
+from gateway.service.notify import Notifier
+from gateway.service.pipeline import Pipeline
+from gateway.service.status import StatusReport
+from gateway.store import Retention, Store
+from gateway.web import Board, TokenFile, create_app, refuse_open_address, server_config
+
+SUPERVISE_S = 0.25
+SECONDS_PER_DAY = 86_400.0
+BYTES_PER_MB = 1_000_000
+
+OnStarted = Callable[["Gateway"], None]
+
+
+class GatewayFailedError(SpringscaleError):
+    """A part of the running service died; the process ends so that systemd starts it anew."""
+
+
+class _Server(uvicorn.Server):
+    """uvicorn without its own signal handling: it would raise the signal again after stopping."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Signals are the gateway's."""
+        yield
+
+
+class Gateway:
+    """One vehicle's service. :meth:`run` returns when it was asked to stop, and raises when a part died."""
+
+    def __init__(self, settings: Settings, setup: Setup, *, on_started: OnStarted = lambda gateway: None) -> None:
+        self._settings = settings
+        self._on_started = on_started
+        token_file = TokenFile(settings.store.directory / "tokens.json")
+        tokens = token_file if token_file.tokens() else None
+        refuse_open_address(settings.web.host, has_tokens=tokens is not None)
+        self.store = Store.open(
+            settings.store.directory,
+            Retention(
+                max_age_s=settings.store.max_age_days * SECONDS_PER_DAY,
+                max_bytes=round(settings.store.max_size_mb * BYTES_PER_MB),
+            ),
+        )
+        if setup.calibration is not None:
+            self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
+        self.board = Board(stale_after_s=settings.web.stale_after_s)
+        self.board.restore(**asdict(self.store.reader().latest()))
+        self.source = LiveSource(
+            settings.bus.interface,
+            settings.bus.channel,
+            setup.signal_map,
+            options=settings.bus.options,
+            inbox_frames=settings.bus.inbox_frames,
+            silence_s=settings.bus.silence_s,
+        )
+        flow = setup.flow(settings.batch.for_core(is_live=True))
+        self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board)
+        self.status = StatusReport(settings, setup, self.source, self.pipeline, self.store, self.board)
+        calibrated = setup.calibration.for_core() if setup.calibration else None
+        app = create_app(self.board, self.store.reader(), self.status, calibrated=calibrated, tokens=tokens)
+        self._server = _Server(server_config(app, settings.web.host, settings.web.port))
+        self._notifier = Notifier()
+        self._stopping = asyncio.Event()
+        self._failure: str | None = None
+
+    @property
+    def url(self) -> str:
+        """Where the dashboard is, once started."""
+        port = self._server.servers[0].sockets[0].getsockname()[1]
+        return f"http://{self._settings.web.host}:{port}"
+
+    def request_stop(self) -> None:
+        """Begin to stop; from the event loop's thread (other threads: loop.call_soon_threadsafe)."""
+        self._stopping.set()
+
+    def run(self) -> None:
+        """Serve until SIGTERM or SIGINT. Raises GatewayFailedError with a clear line when a part dies."""
+        asyncio.run(self._serve())
+        if self._failure is not None:
+            raise GatewayFailedError(self._failure)
+
+    async def _serve(self) -> None:
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, self.request_stop)
+        self.source.start()
+        self.pipeline.start()
+        self.store.write_event("started", {"interface": self._settings.bus.interface})
+        serving = asyncio.create_task(self._server.serve())
+        supervising = asyncio.create_task(self._supervise(serving))
+        await supervising
+        self._stop_parts()
+        self._server.should_exit = True
+        with contextlib.suppress(SystemExit):  # uvicorn's way to say that the port is taken; told already
+            await serving
+        self._notifier.close()
+
+    async def _supervise(self, serving: asyncio.Task[None]) -> None:
+        """Until asked to stop or a part dies: readiness, watchdog by progress, status line."""
+        is_ready, seen, sentence = False, -1, ""
+        while not self._stopping.is_set() and self._failure is None:
+            self._failure = self._dead_part(serving)
+            if self._server.started and not is_ready:
+                is_ready = True
+                self._notifier.send(READY="1")
+                log_event("ready", url=self.url)
+                self._on_started(self)
+            if self.pipeline.progress != seen:
+                seen = self.pipeline.progress
+                self._notifier.send(WATCHDOG="1")
+            if (told := self.status().sentence()) != sentence:
+                sentence = told
+                self._notifier.send(STATUS=told)
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._stopping.wait(), SUPERVISE_S)
+
+    def _dead_part(self, serving: asyncio.Task[None]) -> str | None:
+        """Which part died, and of what; None while all live."""
+        if self.source.failure is not None:
+            return f"the bus reader died: {self.source.failure!r}"
+        if self.pipeline.failure is not None or not self.pipeline.is_alive():
+            return f"the pipeline died: {self.pipeline.failure!r}"
+        if not self.store.is_alive():
+            return "the database writer died"
+        if serving.done():
+            return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: see above"
+        return None
+
+    def _stop_parts(self) -> None:
+        """Bus first, then what it fed; every accepted estimate reaches the disk."""
+        self._notifier.send(STOPPING="1", STATUS="Stopping.")
+        self.source.stop()
+        self.pipeline.stop()
+        self.board.close()
+        self.store.write_event("stopped", {"failure": self._failure})
+        n_lost = self.store.close()
+        level = logging.ERROR if n_lost or self._failure else logging.INFO
+        log_event("stopped", level=level, failure=self._failure, rows_lost=n_lost)

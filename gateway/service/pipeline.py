@@ -1,0 +1,125 @@
+"""The pipeline thread: inbox -> decode -> batches -> estimates -> store and board. It owns all of that state."""
+
+import logging
+import threading
+import time
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from gateway.bus.decode import Decoder
+from gateway.bus.inbox import Inbox
+from gateway.core.flow import Flow
+from gateway.records import Estimate, Motion, Signal, estimate_to_json
+from gateway.service.log import log_event
+from gateway.store import Store
+from gateway.units import NS_PER_S
+from gateway.web import Board
+
+DRAIN_S = 0.1  # how long the inbox may gather before it is decoded: a hundred frames in one array operation
+
+
+class SignalWatch:
+    """When each signal last spoke and how often, for the status page. Written by one thread, read by any."""
+
+    def __init__(self, signals: tuple[Signal, ...]) -> None:
+        self.last_heard: dict[Signal, float] = {}
+        self.rate_hz: dict[Signal, float] = {}
+        self._signals = signals
+        self._window: dict[Signal, tuple[int, int]] = {}  # first stamp and count since
+
+    def saw(self, motion: Motion) -> None:
+        """Note which signals these rows carry."""
+        now = time.monotonic()
+        for column, signal in enumerate(self._signals):
+            known = np.isfinite(motion.columns[:, column])
+            if not known.any():
+                continue
+            self.last_heard[signal] = now
+            newest_ns = int(motion.t_ns[known][-1])
+            first_ns, n = self._window.get(signal, (newest_ns, 0))
+            n += int(np.count_nonzero(known))
+            elapsed_s = (newest_ns - first_ns) / NS_PER_S
+            if elapsed_s >= 2.0 or elapsed_s < 0.0:
+                self.rate_hz[signal] = max(0.0, n / elapsed_s) if elapsed_s > 0.0 else 0.0
+                first_ns, n = newest_ns, 0
+            self._window[signal] = (first_ns, n)
+
+
+class Pipeline:
+    """Runs until :meth:`stop`; what kills it is kept in ``failure``."""
+
+    def __init__(self, inbox: Inbox, decoder: Decoder, flow: Flow, store: Store, board: Board) -> None:
+        self.decoder = decoder
+        self.flow = flow
+        self.watch = SignalWatch(decoder.signals)
+        self.n_estimates = self.n_rejected = self.n_provisional = 0
+        self.rejected_by_reason: Counter[str] = Counter()
+        self.failure: BaseException | None = None
+        self.progress = 0  # grows with every turn of the loop: what the watchdog follows
+        self._inbox = inbox
+        self._store = store
+        self._board = board
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="pipeline", daemon=True)
+
+    def start(self) -> None:
+        """Begin to read the inbox."""
+        self._thread.start()
+
+    def stop(self, timeout_s: float = 1.0) -> None:
+        """Take what is left in the inbox, close the open window, and end."""
+        self._stop.set()
+        self._thread.join(timeout_s)
+
+    def is_alive(self) -> bool:
+        """True while the thread runs."""
+        return self._thread.is_alive()
+
+    def _run(self) -> None:
+        try:
+            while not self._stop.is_set():
+                self._turn(DRAIN_S)
+            while self._turn(0.0):
+                pass
+            self._hand_over(self.flow.flush())
+        except BaseException as failure:  # noqa: BLE001 - kept for the service, which ends the process with it
+            self.failure = failure
+            log_event("pipeline died", level=logging.CRITICAL, failure=repr(failure))
+
+    def _turn(self, timeout_s: float) -> bool:
+        """One drain of the inbox; True where there were frames."""
+        frames = self._inbox.drain(timeout_s)
+        self.progress += 1
+        if frames is None:
+            return False
+        motion = self.decoder.decode(frames)
+        if len(motion):
+            self.watch.saw(motion)
+            self._hand_over(self.flow.feed(motion))
+        return True
+
+    def _hand_over(self, estimates: Any) -> None:
+        for found in estimates:
+            self._count(found)
+            record = estimate_to_json(found)
+            cursor = None if found.is_provisional else self._store.write_estimate(record)
+            self._board.publish(record, cursor)
+            log_event(
+                "provisional estimate" if found.is_provisional else "estimate" if found.counted else "batch rejected",
+                batch=record["id"],
+                payload_kg=record["payload_kg"],
+                payload_std_kg=record["payload_std_kg"],
+                front_share_pct=record["front_share_pct"],
+                rejected=record["rejected"],
+            )
+
+    def _count(self, found: Estimate) -> None:
+        if found.is_provisional:
+            self.n_provisional += 1
+        elif found.counted:
+            self.n_estimates += 1
+        else:
+            self.n_rejected += 1
+            self.rejected_by_reason.update(map(str, found.rejected))

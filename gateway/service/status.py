@@ -1,0 +1,117 @@
+"""How the service is, gathered from all its parts for the web and for systemd."""
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import version
+
+from gateway.bus.source import LiveSource, SourceState
+from gateway.config import Settings
+from gateway.offline.estimates import Setup
+from gateway.records import Signal
+from gateway.service.pipeline import Pipeline
+from gateway.store import Store
+from gateway.web import BatchCounts, Board, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
+
+SPEED_LOST_S = 10.0  # without a valid speed for this long the service waits for one
+
+
+class StatusReport:
+    """Callable that tells the present :class:`Status`; quick, and safe from any thread."""
+
+    def __init__(
+        self, settings: Settings, setup: Setup, source: LiveSource, pipeline: Pipeline, store: Store, board: Board
+    ) -> None:
+        self._settings = settings
+        self._setup = setup
+        self._source = source
+        self._pipeline = pipeline
+        self._store = store
+        self._board = board
+        self._started = time.monotonic()
+
+    def __call__(self) -> Status:
+        """The status as of now."""
+        state = self._state()
+        not_ready = self._source.reason if state is State.READER_FAULT else None
+        return Status(
+            version=version("springscale"),
+            state=state,
+            uptime_s=time.monotonic() - self._started,
+            vehicle_id=self._setup.identity.vehicle_id,
+            vin=self._setup.identity.vin,
+            calibration_id=self._setup.calibration.id if self._setup.calibration else None,
+            estimator=self._setup.estimator,
+            bus=self._bus(),
+            decode=self._decode(),
+            signals=self._signals(),
+            batches=BatchCounts(
+                n_estimates=self._pipeline.n_estimates,
+                n_rejected=self._pipeline.n_rejected,
+                n_provisional=self._pipeline.n_provisional,
+                rejected_by_reason=dict(self._pipeline.rejected_by_reason),
+            ),
+            store=StoreStatus.model_validate(asdict(self._store.health())),
+            is_ready=not_ready is None,
+            not_ready_reason=not_ready,
+        )
+
+    def _state(self) -> State:
+        """The first that holds, worst first."""
+        speed_age_s = self._age_s(Signal.SPEED)
+        claims: tuple[tuple[State, Callable[[], bool]], ...] = (
+            (State.READER_FAULT, lambda: self._source.state is SourceState.READER_FAULT),
+            (State.STARTING, lambda: self._source.state is SourceState.STARTING),
+            (State.WAITING_FOR_BUS, lambda: self._source.state is not SourceState.RECEIVING),
+            (
+                State.WAITING_FOR_SPEED,
+                lambda: self._pipeline.flow.scheduler.is_parked or speed_age_s is None or speed_age_s > SPEED_LOST_S,
+            ),
+            (State.COLLECTING, lambda: self._board.age_s() is None),
+            (State.STALE, self._board.is_stale),
+        )
+        return next((state for state, holds in claims if holds()), State.ESTIMATING)
+
+    def _age_s(self, signal: Signal) -> float | None:
+        heard = self._pipeline.watch.last_heard.get(signal)
+        return None if heard is None else time.monotonic() - heard
+
+    def _bus(self) -> BusStatus:
+        counts = self._source.counts()
+        ages = [age for signal in self._setup.signal_map.signals if (age := self._age_s(signal)) is not None]
+        return BusStatus(
+            interface=self._settings.bus.interface,
+            channel=self._settings.bus.channel,
+            state=str(self._source.state),
+            n_frames=counts.frames,
+            n_error_frames=counts.error_frames,
+            n_reconnects=counts.reconnects,
+            n_inbox_dropped=counts.dropped_inbox,
+            n_kernel_dropped=counts.dropped_kernel,
+            last_frame_age_s=min(ages, default=None),
+            last_fault=self._source.reason,
+        )
+
+    def _decode(self) -> tuple[DecodeCount, ...]:
+        rows = []
+        for signal, counts in self._pipeline.decoder.counts.items():
+            rows.append(DecodeCount(signal=str(signal), reason="ok", n=counts.samples))
+            rows.extend(
+                DecodeCount(signal=str(signal), reason=str(reason), n=n) for reason, n in counts.rejected.items() if n
+            )
+        return tuple(rows)
+
+    def _signals(self) -> tuple[SignalHealth, ...]:
+        health = []
+        for signal, counts in self._pipeline.decoder.counts.items():
+            n_rejected = sum(counts.rejected.values())
+            total = counts.samples + n_rejected
+            health.append(
+                SignalHealth(
+                    signal=str(signal),
+                    rate_hz=self._pipeline.watch.rate_hz.get(signal),
+                    last_age_s=self._age_s(signal),
+                    rejected_share=n_rejected / total if total else None,
+                )
+            )
+        return tuple(health)
