@@ -1,0 +1,115 @@
+"""springscale demo: the whole service on a simulated drive, with no hardware and no configuration."""
+
+import asyncio
+import json
+import threading
+import time
+from collections.abc import Iterator
+from importlib.resources import as_file, files
+from itertools import count
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final, Literal
+
+import click
+
+from gateway.bus.sink import BusSink, replay_frames
+from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
+from gateway.offline.demo_drive import demo_frames
+from gateway.offline.estimates import setup_of
+from gateway.records import Frames, json_line
+from gateway.service.gateway import Gateway
+from gateway.service.log import set_up_log
+from gateway.store import Store
+
+CHANNEL: Final = "springscale-demo"
+QUIET_S: Final = 0.5  # no new frame for this long: the service has taken all that was sent
+
+
+@click.command("demo")
+@click.option("--once", is_flag=True, help="end after the first drives' estimates and print them")
+@click.option("--json", "as_json", is_flag=True, help="print estimates as JSON lines")
+@click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="port of the dashboard")
+@click.option("--speed", type=click.FloatRange(min=1.0), default=30.0, show_default=True, help="times real time")
+def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
+    """A van drives empty, stops, is loaded with 270 kg and drives on; watch the service weigh it."""
+    set_up_log("warning", under_journald=False)
+    with TemporaryDirectory(prefix="springscale-demo-") as folder, as_file(files("gateway") / "demo") as shipped:
+        settings = Settings(
+            signals="springscale:reference",
+            calibration=shipped / "paper_van.json",
+            vehicle=VehicleSection(id="demo-van"),
+            bus=BusSection(interface="virtual", channel=CHANNEL),
+            web=WebSection(port=0 if once else port),
+            store=StoreSection(directory=Path(folder)),
+        )
+        driver = _Driver("max" if once else speed, is_endless=not once)
+        Gateway(settings, setup_of(settings), on_started=driver.start).run()
+        driver.end()
+        if once:
+            _print_estimates(Path(folder), as_json)
+
+
+class _Driver:
+    """Sends the demonstration drives to the bus from a thread of its own."""
+
+    def __init__(self, speed: float | Literal["max"], *, is_endless: bool) -> None:
+        self._stop = threading.Event()
+        self._speed = speed
+        self._is_endless = is_endless
+        self._thread: threading.Thread | None = None
+
+    def start(self, gateway: Gateway) -> None:
+        """Begin to drive; called in the service's event loop once it is ready."""
+        if self._is_endless:
+            click.echo(f"Dashboard: {gateway.url}   (Ctrl-C ends; the drive runs at {self._speed:g} times real time)")
+        loop = asyncio.get_running_loop()
+        self._thread = threading.Thread(target=self._drive, args=(gateway, loop), name="demo-drive", daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        """Stop driving."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join(5.0)
+
+    def _drive(self, gateway: Gateway, loop: asyncio.AbstractEventLoop) -> None:
+        try:
+            with BusSink("virtual", CHANNEL) as sink:
+                replay_frames(self._frames(), sink, self._speed, None, self._stop)
+                self._wait_until_taken(gateway)
+        finally:
+            if not self._stop.is_set():
+                loop.call_soon_threadsafe(gateway.request_stop)
+
+    def _frames(self) -> Iterator[Frames]:
+        for seed in count(1):
+            yield from demo_frames(seed)
+            if not self._is_endless:
+                return
+
+    def _wait_until_taken(self, gateway: Gateway) -> None:
+        n, since = -1, time.monotonic()
+        while not self._stop.wait(0.05) and time.monotonic() - since < QUIET_S:
+            if (now := gateway.source.counts().frames) != n:
+                n, since = now, time.monotonic()
+
+
+def _print_estimates(folder: Path, as_json: bool) -> None:
+    store = Store.open(folder)
+    try:
+        records: list[dict[str, Any]] = [json.loads(text) for text in store.reader().estimates().items]
+    finally:
+        store.close()
+    for record in records:
+        click.echo(json_line(record) if as_json else _sentence(record))
+
+
+def _sentence(record: dict[str, Any]) -> str:
+    when = f"{record['t_start'][:19]}Z"
+    if record["rejected"]:
+        return f"{when}  no estimate: {', '.join(record['rejected'])}"
+    return (
+        f"{when}  payload {record['payload_kg']:7.1f} kg ± {record['payload_std_kg']:5.1f}   "
+        f"front share {record['front_share_pct']:5.2f} % ± {record['front_share_std_pct']:4.2f}"
+    )
