@@ -102,14 +102,18 @@ class Gateway:
         self.source.start()
         self.pipeline.start()
         self.store.write_event("started", {"interface": self._settings.bus.interface})
-        serving = asyncio.create_task(self._server.serve())
+        serving = asyncio.create_task(self._serve_web())
         supervising = asyncio.create_task(self._supervise(serving))
         await supervising
         self._stop_parts()
         self._server.should_exit = True
-        with contextlib.suppress(SystemExit):  # uvicorn's way to say that the port is taken; told already
-            await serving
+        await serving
         self._notifier.close()
+
+    async def _serve_web(self) -> None:
+        """uvicorn until it ends; it leaves by SystemExit where it cannot start, which must not pass a task."""
+        with contextlib.suppress(SystemExit):
+            await self._server.serve()
 
     async def _supervise(self, serving: asyncio.Task[None]) -> None:
         """Until asked to stop or a part dies: readiness, watchdog by progress, status line."""
@@ -139,7 +143,7 @@ class Gateway:
         if not self.store.is_alive():
             return "the database writer died"
         if serving.done():
-            return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: see above"
+            return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: is it taken?"
         return None
 
     def _stop_parts(self) -> None:

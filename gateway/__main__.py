@@ -1,0 +1,5 @@
+"""python -m gateway is springscale."""
+
+from gateway.cli import main
+
+main()

@@ -1,0 +1,226 @@
+"""The real service end to end: bus, pipeline, database and web together."""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from gateway.bus.candump_write import write_candump
+from gateway.bus.encode import Encoder
+from gateway.bus.signal_map import load_signal_map
+from gateway.bus.sink import replay
+from gateway.config import load_settings
+from gateway.offline.estimates import estimates_of_logs, setup_of
+from gateway.records import Frames, Motion, Signal, estimate_to_json, json_line
+from gateway.service.gateway import Gateway, GatewayFailedError
+from gateway.store import Store
+
+START_NS = 1_790_000_000_000_000_000
+WINDOW_S = 20.0
+
+
+def drive(duration_s: float, seed: int) -> Frames:
+    """A van at 50 km/h as its two sensors hear it: coloured noise, one source and its delayed echo."""
+    rng = np.random.default_rng(seed)
+    n = round(100 * duration_s)
+    road = np.convolve(rng.standard_normal(n + 40), np.hanning(12), mode="same")
+    t_ns = START_NS + np.arange(n) * 10_000_000
+    gps_ns = START_NS + np.arange(round(5 * duration_s)) * 200_000_000
+    return Encoder(load_signal_map("springscale:reference")).encode_signals(
+        {Signal.VERTICAL_ACCELERATION: t_ns, Signal.PITCH_RATE: t_ns, Signal.SPEED: gps_ns},
+        {
+            Signal.VERTICAL_ACCELERATION: 9.81 + 0.3 * road[20 : n + 20],
+            Signal.PITCH_RATE: 0.03 * (road[20 : n + 20] - road[:n]),
+            Signal.SPEED: 13.9 + 0.1 * rng.standard_normal(len(gps_ns)),
+        },
+    )
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    """A configuration of the shipped map and calibration on a bus of the test's own."""
+    shutil.copy(Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json", tmp_path / "vehicle.json")
+    path = tmp_path / "springscale.toml"
+    path.write_text(
+        f"""
+        signals = "springscale:reference"
+        calibration = "vehicle.json"
+        [vehicle]
+        id = "van-17"
+        [bus]
+        interface = "virtual"
+        channel = "{tmp_path.name}"
+        [batch]
+        window_s = {WINDOW_S}
+        provisional_every_s = 10.0
+        [web]
+        port = 0
+        [store]
+        directory = "state"
+        """
+    )
+    return path
+
+
+def run_with_log(config: Path, log: Path, speed: float | str) -> list[str]:
+    """The records in the database after the service heard ``log`` and stopped."""
+    settings = load_settings(config)
+
+    def on_started(gateway: Gateway) -> None:
+        import asyncio
+
+        loop = asyncio.get_running_loop()
+
+        def play() -> None:
+            report = replay(log, "virtual", settings.bus.channel, speed=speed)
+            deadline = time.monotonic() + 20.0
+            while gateway.source.counts().frames < report.frames and time.monotonic() < deadline:
+                time.sleep(0.02)
+            loop.call_soon_threadsafe(gateway.request_stop)
+
+        threading.Thread(target=play, daemon=True).start()
+
+    Gateway(settings, setup_of(settings), on_started=on_started).run()
+    store = Store.open(settings.store.directory)
+    try:
+        return list(store.reader().estimates().items)
+    finally:
+        store.close()
+
+
+@pytest.mark.parametrize("speed", [40.0, "max"])
+def test_a_replayed_log_gives_byte_identical_batches_to_estimate(config: Path, speed: float | str) -> None:
+    log = config.parent / "drive.log"
+    write_candump(drive(70.0, seed=5), "can0", log)
+    settings = load_settings(config)
+    expected = [
+        json_line(estimate_to_json(found))
+        for found in estimates_of_logs([log], setup_of(settings), settings.batch.for_core())
+    ]
+    assert len(expected) == 4  # three windows of 20 s and a short rest
+    assert run_with_log(config, log, speed) == expected
+
+
+def springscale(*arguments: str, **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "gateway", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **environment},
+    )
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def wait_for(url: str) -> httpx.Response:
+    deadline = time.monotonic() + 20.0
+    while True:
+        try:
+            return httpx.get(url)
+        except httpx.TransportError:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(0.05)
+
+
+def test_the_process_tells_systemd_and_stops_with_exit_code_zero(config: Path, tmp_path: Path) -> None:
+    port = free_port()
+    address = str(tmp_path / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(address)
+        listener.settimeout(20.0)
+        process = springscale("run", "--config", str(config), SPRINGSCALE_WEB__PORT=str(port), NOTIFY_SOCKET=address)
+        told = []
+        while "READY=1" not in told:
+            told += listener.recv(4096).decode().split("\n")
+        latest = wait_for(f"http://127.0.0.1:{port}/api/v1/estimates/latest").json()
+        assert latest["rejected"] == ["no_estimate_yet"]
+        assert latest["payload_kg"] is None
+        assert httpx.get(f"http://127.0.0.1:{port}/health/live").status_code == 200
+        asked = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=20)
+        while "STOPPING=1" not in told:
+            told += listener.recv(4096).decode().split("\n")
+    assert process.returncode == 0, errors
+    assert time.monotonic() - asked < 10.0
+    assert {"READY=1", "STOPPING=1", "WATCHDOG=1"} <= set(told)
+
+
+def test_a_taken_port_is_one_clear_line(config: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        process = springscale("run", "--config", str(config), SPRINGSCALE_WEB__PORT=str(port))
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "Traceback" not in errors
+    assert f"127.0.0.1:{port}" in errors.strip().splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("written", "replaced", "named"),
+    [
+        ("[vehicle]", "[vehicle]\ncolour = 1", "vehicle.colour"),
+        ('"vehicle.json"', '"gone.json"', "gone.json"),
+        ("springscale:reference", "springscale:nothing", "nothing"),
+        ("port = 0", 'port = "x"', "web.port"),
+    ],
+)
+def test_a_wrong_configuration_ends_with_code_2_and_names_the_fault(
+    config: Path, written: str, replaced: str, named: str
+) -> None:
+    config.write_text(config.read_text().replace(written, replaced))
+    for command in ("run", "check-config"):
+        arguments = ["--config", str(config)] if command == "run" else [str(config)]
+        process = springscale(command, *arguments)
+        _, errors = process.communicate(timeout=30)
+        assert process.returncode == 2, errors
+        assert named in errors
+        assert "Traceback" not in errors
+
+
+def test_a_tampered_calibration_is_refused(config: Path) -> None:
+    calibration = config.parent / "vehicle.json"
+    content = json.loads(calibration.read_text())
+    content["vehicle"]["empty_mass_kg"] += 100.0
+    calibration.write_text(json.dumps(content))
+    process = springscale("check-config", str(config))
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert "does not match its id" in errors
+
+
+def test_a_dead_pipeline_ends_the_service_with_its_reason(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = load_settings(config)
+
+    def broken(_self: object, _motion: Motion) -> None:
+        raise ArithmeticError("the flow broke")
+
+    monkeypatch.setattr("gateway.core.flow.Flow.feed", broken)
+    log = config.parent / "drive.log"
+    write_candump(drive(5.0, seed=1), "can0", log)
+
+    def on_started(_gateway: Gateway) -> None:
+        threading.Thread(
+            target=replay, args=(log, "virtual", settings.bus.channel), kwargs={"speed": "max"}, daemon=True
+        ).start()
+
+    with pytest.raises(GatewayFailedError, match="the flow broke"):
+        Gateway(settings, setup_of(settings), on_started=on_started).run()
