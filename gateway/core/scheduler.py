@@ -143,7 +143,7 @@ class Scheduler:
         self._begin_window(t_ns)
 
     def _begin_window(self, t_ns: int) -> None:
-        self._rows = []
+        self._rows = [part.part(0, 0) for part in self._rows[:1]]  # a window without a row still has its signals
         self._window_start_ns = t_ns
         self._provisional_ns = t_ns + self._ns(self._settings.provisional_every_s)
 

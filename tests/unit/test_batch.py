@@ -1,0 +1,161 @@
+"""The gates of a batch: each fault masks what it spoils, and a spoiled batch says why."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.drives import T0_NS, assert_same_batch, changed, drive, steady
+
+from gateway.core.batch import Window, build_batch
+from gateway.core.settings import BatchSettings
+from gateway.records import F64, Batch, Motion, SensorTraits, Signal, Why
+
+LENGTH_S = 100.0
+SETTINGS = BatchSettings(window_s=LENGTH_S)
+WINDOW = Window(T0_NS, T0_NS + 100_000_000_000, T0_NS)
+TRAITS = {
+    Signal.VERTICAL_ACCELERATION: SensorTraits(minimum=-20.0, maximum=39.0, resolution=0.01),
+    Signal.PITCH_RATE: SensorTraits(minimum=-4.0, maximum=4.0, resolution=0.001),
+}
+WHOLE = drive(LENGTH_S)
+A, G, V = Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED
+
+
+def batch_of(motion: Motion) -> Batch:
+    return build_batch(motion, WINDOW, SETTINGS, TRAITS)
+
+
+def silent(x: F64) -> F64:
+    return np.full_like(x, np.nan)
+
+
+def held_at(level: float) -> Callable[[F64], F64]:
+    return lambda x: np.full_like(x, level)
+
+
+def touching(level: float) -> Callable[[F64], F64]:
+    """Every tenth sample lies at ``level``, as when a sensor clips at the peaks."""
+    return lambda x: np.where(np.arange(len(x)) % 10 == 0, level, x)
+
+
+FAULTS = [  # which signal is spoiled, for how long of 100 s, how, and what the batch must then say
+    (V, 50.0, held_at(3.0), Why.TOO_SLOW),
+    (V, 50.0, held_at(41.0), Why.TOO_FAST),
+    (V, 50.0, silent, Why.SPEED_MISSING),
+    (V, 70.0, held_at(15.0), Why.SPEED_FROZEN),
+    (A, 50.0, silent, Why.ACCELERATION_MISSING),
+    (A, 50.0, held_at(9.8), Why.ACCELERATION_STUCK),
+    (A, 50.0, touching(39.0), Why.ACCELERATION_SATURATED),
+    (A, 50.0, touching(-20.0), Why.ACCELERATION_SATURATED),
+    (G, 50.0, silent, Why.PITCH_RATE_MISSING),
+    (G, 50.0, held_at(0.01), Why.PITCH_RATE_STUCK),
+    (G, 50.0, touching(4.0), Why.PITCH_RATE_SATURATED),
+]
+
+
+@pytest.mark.parametrize(("signal", "length_s", "fault", "why"), FAULTS)
+def test_a_long_fault_rejects_the_batch_and_is_the_only_one_named(
+    signal: Signal, length_s: float, fault: Callable[[F64], F64], why: Why
+) -> None:
+    batch = batch_of(changed(WHOLE, signal, 20.0, 20.0 + length_s, fault))
+    assert batch.rejected == (why,)
+    assert batch.shares[why] == pytest.approx(length_s / LENGTH_S, abs=0.01)
+
+
+@pytest.mark.parametrize(("signal", "length_s", "fault", "why"), FAULTS)
+def test_a_short_fault_is_masked_and_the_rest_counts(
+    signal: Signal, length_s: float, fault: Callable[[F64], F64], why: Why
+) -> None:
+    short_s = 62.0 if why is Why.SPEED_FROZEN else 12.0
+    lenient = replace(SETTINGS, usable_share_min=0.3)
+    batch = build_batch(changed(WHOLE, signal, 20.0, 20.0 + short_s, fault), WINDOW, lenient, TRAITS)
+    assert batch.rejected == ()
+    masked = ~batch.usable
+    assert masked[round(20.5 * 50) : round((19.5 + short_s) * 50)].all()
+    assert not masked[: round(19.0 * 50)].any()
+    assert not masked[round((21.0 + short_s) * 50) :].any()
+
+
+def test_a_sound_drive_passes_whole() -> None:
+    batch = batch_of(WHOLE)
+    assert batch.rejected == ()
+    assert batch.usable_share > 0.995
+    assert batch.gravity_mps2 == pytest.approx(9.81, abs=0.02)
+    assert np.mean(batch.vertical_acceleration_mps2[batch.usable]) == pytest.approx(0.0, abs=1e-9)
+    assert batch.mean_speed_mps == pytest.approx(15.0, abs=0.02)
+
+
+def test_both_sensors_silent_at_once_is_a_gap_and_no_sensors_fault() -> None:
+    batch = batch_of(changed(changed(WHOLE, A, 20.0, 70.0, silent), G, 20.0, 70.0, silent))
+    assert batch.rejected == (Why.GAP,)
+    assert batch.gap_share == pytest.approx(0.5, abs=0.01)
+
+
+def test_two_faults_are_both_named() -> None:
+    batch = batch_of(changed(changed(WHOLE, V, 0.0, 30.0, held_at(2.0)), A, 40.0, 60.0, silent))
+    assert set(batch.rejected) == {Why.TOO_SLOW, Why.ACCELERATION_MISSING}
+
+
+def test_sixty_percent_usable_counts_and_less_does_not() -> None:
+    assert batch_of(changed(WHOLE, V, 0.0, 39.0, held_at(3.0))).rejected == ()
+    assert batch_of(changed(WHOLE, V, 0.0, 41.0, held_at(3.0))).rejected == (Why.TOO_SLOW,)
+
+
+@pytest.mark.parametrize(("missing_s", "rejected"), [(19.0, ()), (21.0, (Why.ACCELERATION_MISSING,))])
+def test_a_fifth_of_gaps_is_the_most_that_counts(missing_s: float, rejected: tuple[Why, ...]) -> None:
+    assert batch_of(changed(WHOLE, A, 30.0, 30.0 + missing_s, silent)).rejected == rejected
+
+
+@pytest.mark.parametrize("shift", [lambda x: x - 9.81, lambda x: -x, lambda x: x / 2.0])
+def test_gravity_must_be_in_the_acceleration(shift: Callable[[F64], F64]) -> None:
+    assert batch_of(changed(WHOLE, A, 0.0, LENGTH_S, shift)).rejected == (Why.GRAVITY_MISSING,)
+
+
+def test_a_slow_sensor_cannot_fill_the_grid() -> None:
+    assert batch_of(drive(LENGTH_S, steady(15.0), rate_hz=25.0)).rejected == (Why.SENSOR_RATE_LOW,)
+
+
+def test_a_short_window_is_too_short_and_tells_what_ended_it() -> None:
+    short = replace(WINDOW, t_end_ns=T0_NS + 50_000_000_000, ended_by=Why.CLOCK_STEP)
+    assert build_batch(WHOLE, short, SETTINGS, TRAITS).rejected == (Why.TOO_SHORT, Why.CLOCK_STEP)
+    look = replace(short, ended_by=None, is_provisional=True)
+    assert build_batch(WHOLE, look, SETTINGS, TRAITS).rejected == ()
+
+
+def test_wheel_speed_stands_in_for_gnss() -> None:
+    columns = np.column_stack([WHOLE.columns, WHOLE.columns[:, 2] + 0.5])
+    both = Motion((*WHOLE.signals, Signal.WHEEL_SPEED), WHOLE.t_ns, columns)
+    batch = batch_of(changed(both, V, 30.0, 100.0, silent))
+    assert batch.rejected == ()
+    assert np.mean(batch.speed_mps[:1400]) == pytest.approx(15.0, abs=0.05)
+    assert np.mean(batch.speed_mps[1600:]) == pytest.approx(15.5, abs=0.05)
+
+
+def test_latency_moves_the_samples_back() -> None:
+    step = changed(WHOLE, V, 50.0, 100.0, lambda x: x + 5.0)
+    late = {V: SensorTraits(latency_s=2.0)}
+    speed = build_batch(step, WINDOW, SETTINGS, late).speed_mps
+    assert speed[round(47.5 * 50)] == pytest.approx(15.0, abs=0.3)
+    assert speed[round(48.5 * 50)] == pytest.approx(20.0, abs=0.3)
+
+
+@settings(max_examples=5, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_neither_order_nor_rows_outside_matter(seed: int) -> None:
+    more = drive(LENGTH_S + 30.0)
+    outside = Motion(more.signals, more.t_ns - 200_000_000_000, more.columns)
+    rows = Motion(WHOLE.signals, np.r_[WHOLE.t_ns, outside.t_ns], np.concatenate([WHOLE.columns, outside.columns]))
+    mixed = np.random.default_rng(seed).permutation(len(rows))
+    shuffled = Motion(rows.signals, rows.t_ns[mixed], rows.columns[mixed])
+    assert_same_batch(batch_of(shuffled), batch_of(WHOLE))
+
+
+def test_no_row_at_all_is_a_batch_of_nothing() -> None:
+    batch = batch_of(WHOLE.part(0, 0))
+    assert not batch.usable.any()
+    assert batch.gap_share == 1.0
+    assert Why.GAP in batch.rejected
+    assert np.isnan(batch.mean_speed_mps)

@@ -1,0 +1,113 @@
+"""The uniform time line: what lies in band comes through, what would alias does not, gaps stay gaps."""
+
+import numpy as np
+import pytest
+
+from gateway.core.timeline import onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
+from gateway.records import F64, I64
+
+T0_NS = 1_790_000_000_000_000_000
+RATE_HZ, N, GAP_S = 50.0, 1500, 0.05
+GRID_S = np.arange(N) / RATE_HZ
+INSIDE = slice(25, -25)  # half a second from either end
+
+
+def stamps(rate_hz: float, jitter_s: float = 0.0, offset_s: float = 0.0) -> tuple[F64, I64]:
+    rng = np.random.default_rng(7)
+    count = int(N / RATE_HZ * rate_hz)
+    t_s = offset_s + np.arange(count) / rate_hz + rng.uniform(-jitter_s, jitter_s, count)
+    return t_s, T0_NS + np.rint(t_s * 1e9).astype(np.int64)
+
+
+def gridded(t_ns: I64, x: F64) -> F64:
+    return onto_grid(t_ns, x, T0_NS, N, RATE_HZ, GAP_S)
+
+
+def rms(x: F64) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+@pytest.mark.parametrize("rate_hz", [52.0, 100.0, 104.0, 200.0])
+@pytest.mark.parametrize("freq_hz", [1.0, 5.0])
+def test_a_sine_sampled_with_jitter_comes_back_within_a_percent(rate_hz: float, freq_hz: float) -> None:
+    t_s, t_ns = stamps(rate_hz, jitter_s=0.1 / rate_hz, offset_s=0.2 / rate_hz)
+    back = gridded(t_ns, np.sin(2 * np.pi * freq_hz * t_s))
+    error = back[INSIDE] - np.sin(2 * np.pi * freq_hz * GRID_S[INSIDE])
+    assert np.max(np.abs(error)) < 0.01
+
+
+@pytest.mark.parametrize("freq_hz", [2.0, 8.0, 14.0])
+def test_the_band_of_the_estimators_keeps_its_amplitude(freq_hz: float) -> None:
+    t_s, t_ns = stamps(200.0, offset_s=0.0013)
+    back = gridded(t_ns, np.sin(2 * np.pi * freq_hz * t_s))
+    assert rms(back[INSIDE]) == pytest.approx(np.sqrt(0.5), rel=0.01)
+
+
+@pytest.mark.parametrize(("rate_hz", "freq_hz"), [(200.0, 47.6), (100.0, 47.6), (104.0, 47.6), (200.0, 36.0)])
+def test_engine_firing_does_not_fold_onto_the_band(rate_hz: float, freq_hz: float) -> None:
+    t_s, t_ns = stamps(rate_hz)
+    tone = np.sin(2 * np.pi * freq_hz * t_s)
+    assert rms(gridded(t_ns, tone)[INSIDE]) < 1e-3 * rms(tone)
+
+
+def test_order_and_repeated_stamps_do_not_matter() -> None:
+    t_s, t_ns = stamps(100.0, jitter_s=0.002)
+    x = np.sin(2 * np.pi * 3.0 * t_s)
+    mixed = np.random.default_rng(8).permutation(len(x))
+    again = gridded(np.r_[t_ns[mixed], t_ns[:50]], np.r_[x[mixed], x[:50]])
+    np.testing.assert_array_equal(again, gridded(t_ns, x))
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0])
+def test_a_gap_stays_unknown_and_what_lies_around_it_known(rate_hz: float) -> None:
+    t_s, t_ns = stamps(rate_hz)
+    kept = (t_s < 10.0) | (t_s > 10.3)
+    back = gridded(t_ns[kept], np.ones(int(kept.sum())))
+    assert np.isnan(back[(GRID_S > 10.0) & (GRID_S < 10.3)]).all()
+    far = (GRID_S < 9.8) | ((GRID_S > 10.5) & (GRID_S < 29.9))
+    np.testing.assert_allclose(back[far], 1.0, atol=1e-9)
+
+
+def test_one_lost_sample_in_a_hundred_hertz_is_no_gap() -> None:
+    t_s, t_ns = stamps(100.0)
+    kept = np.arange(len(t_s)) != 1000
+    assert np.isfinite(gridded(t_ns[kept], np.sin(t_s[kept]))[INSIDE]).all()
+
+
+def test_nothing_is_known_outside_the_samples() -> None:
+    t_s, t_ns = stamps(50.0)
+    kept = (t_s > 5.0) & (t_s < 20.0)
+    back = gridded(t_ns[kept], t_s[kept])
+    assert np.isnan(back[GRID_S < 4.9]).all()
+    assert np.isnan(back[GRID_S > 20.1]).all()
+    assert np.isfinite(back[(GRID_S > 5.1) & (GRID_S < 19.9)]).all()
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_too_few_samples_are_unknown_throughout(count: int) -> None:
+    assert np.isnan(gridded(T0_NS + np.arange(count), np.ones(count))).all()
+
+
+def test_speed_is_linear_between_samples_and_held_no_longer_than_allowed() -> None:
+    t_ns = T0_NS + np.array([2, 4, 10, 12], np.int64) * 1_000_000_000
+    speed = speed_onto_grid(t_ns, np.array([10.0, 12.0, 20.0, 20.0]), T0_NS, 1000, RATE_HZ, hold_s=3.0)
+    at = {s: speed[round(s * RATE_HZ)] for s in (0.0, 2.0, 3.0, 4.0, 5.0, 9.0, 11.0, 15.0, 15.1)}
+    assert at[3.0] == pytest.approx(11.0)
+    assert (at[0.0], at[2.0], at[11.0], at[15.0]) == (10.0, 10.0, 20.0, 20.0)  # held at either end
+    assert np.isnan([at[5.0], at[9.0], at[15.1]]).all()  # six seconds apart, and past the hold
+
+
+def test_no_speed_sample_is_no_speed() -> None:
+    assert np.isnan(speed_onto_grid(np.empty(0, np.int64), np.empty(0), T0_NS, 10, RATE_HZ, 3.0)).all()
+
+
+def test_rate_is_the_median_rate() -> None:
+    _, t_ns = stamps(104.0)
+    assert sample_rate_hz(np.r_[t_ns, t_ns[-1] + 10**10]) == pytest.approx(104.0, rel=1e-6)
+    assert sample_rate_hz(t_ns[:1]) == 0.0
+
+
+def test_the_first_of_equal_stamps_is_kept() -> None:
+    times, x = sort_by_time(np.array([3, 1, 3, 2]), np.array([30.0, 10.0, 31.0, 20.0]))
+    assert times.tolist() == [1, 2, 3]
+    assert x.tolist() == [10.0, 20.0, 30.0]
