@@ -1,0 +1,78 @@
+"""The whole path on recorded drives: campaign -> calibration -> error table, with the bounds the project promises.
+
+The bounds are promises to users, not fits: they may only ever be tightened.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from support.recordings import recordings
+
+from gateway.cli import springscale
+
+
+def run(*arguments: str | Path) -> str:
+    found = CliRunner().invoke(springscale, [str(argument) for argument in arguments], catch_exceptions=False)
+    assert found.exit_code == 0, found.output
+    return found.stdout
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Calibrated on the identification parts of all ten known loads."""
+    output = tmp_path_factory.mktemp("vehicle") / "vehicle.json"
+    run("calibrate", recordings() / "known_loads/campaign.toml", "--output", output)
+    return output
+
+
+def table(campaign: str, calibration: Path, *arguments: str) -> dict[str, Any]:
+    text = run("evaluate", recordings() / campaign, "--calibration", calibration, "--json", *arguments)
+    found: dict[str, Any] = json.loads(text)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("campaign", "arguments", "n_batches", "payload_pct", "front_share_pct"),
+    [
+        ("known_loads/campaign.toml", ["--estimator", "cross_spectrum"], 10, 3.0, 1.5),
+        ("speeds/campaign.toml", ["--estimator", "cross_spectrum"], 15, 5.0, 2.0),
+        ("known_loads/campaign.toml", ["--estimator", "cross_spectrum", "--window-s", "60"], 50, 6.0, 2.0),
+        ("known_loads/campaign.toml", ["--estimator", "ratio_index"], 10, 15.0, 9.0),
+    ],
+)
+def test_errors_stay_within_what_is_promised(
+    calibration: Path,
+    campaign: str,
+    arguments: list[str],
+    n_batches: int,
+    payload_pct: float,
+    front_share_pct: float,
+) -> None:
+    found = table(campaign, calibration, *arguments)
+    assert found["n_batches"] == pytest.approx(n_batches, abs=0)
+    assert found["n_rejected"] <= 0.1 * n_batches
+    assert found["payload"]["mean_abs_pct_with_misses"] <= payload_pct
+    assert found["front_share"]["mean_abs_pct_with_misses"] <= front_share_pct
+
+
+def test_three_known_loads_are_enough(tmp_path: Path) -> None:
+    output = tmp_path / "three.json"
+    run("calibrate", recordings() / "known_loads/campaign.toml", "--output", output, "--runs", "1,6,10")
+    found = table("known_loads/campaign.toml", output, "--estimator", "cross_spectrum")
+    assert found["payload"]["mean_abs_pct"] <= 6.0
+    assert found["front_share"]["mean_abs_pct"] <= 3.0
+
+
+@pytest.mark.parametrize("trip", ["A", "B"])
+def test_a_real_drive_gives_one_line_per_batch_and_says_why_not(trip: str) -> None:
+    folder = recordings() / "real_drive"
+    text = run("estimate", folder / f"candump_trip{trip}.log.gz", "--signals", folder / "signals.toml", "--json")
+    records = [json.loads(line) for line in text.splitlines()]
+    whole = [record for record in records if "too_short" not in record["rejected"]]
+    assert len(whole) >= 6
+    assert all("no_calibration" in record["rejected"] and record["payload_kg"] is None for record in records)
+    driven = [record for record in whole if record["rejected"] == ["no_calibration"]]
+    assert all(5.0 < record["mean_speed_mps"] < 40.0 and record["spectra"] for record in driven)
