@@ -1,0 +1,54 @@
+"""Front share, payload position and axle loads: statics of the sprung mass."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.core.vehicle import Vehicle, axle_loads_n, front_share_pct, payload_position_m
+
+vehicles = st.builds(
+    Vehicle,
+    name=st.just("van"),
+    empty_mass_kg=st.floats(500.0, 5000.0),
+    wheelbase_m=st.floats(2.0, 5.0),
+    empty_front_share_pct=st.floats(35.0, 65.0),
+)
+loads_kg = st.floats(10.0, 3000.0)
+
+
+def test_an_even_vehicle_obeys_equation_3() -> None:
+    van = Vehicle("van", empty_mass_kg=1240.0, wheelbase_m=2.8)
+    for load_kg, d_m in ((270.0, 0.5), (450.0, 2.8), (90.0, 1.4)):
+        expected = 100.0 * (1240.0 / 2.0 + (1.0 - d_m / 2.8) * load_kg) / (1240.0 + load_kg)
+        assert front_share_pct(van, load_kg, d_m) == pytest.approx(expected, rel=1e-12)
+    assert front_share_pct(van, 100.0, 1.4) == pytest.approx(50.0)  # midway between the axles
+
+
+@given(van=vehicles, load_kg=loads_kg, position_m=st.floats(-1.0, 6.0))
+def test_share_and_position_are_inverse(van: Vehicle, load_kg: float, position_m: float) -> None:
+    share = front_share_pct(van, load_kg, position_m)
+    assert payload_position_m(van, load_kg, share) == pytest.approx(position_m, abs=1e-6)
+
+
+@given(van=vehicles, load_kg=loads_kg)
+def test_a_load_over_an_axle_rests_on_it_alone(van: Vehicle, load_kg: float) -> None:
+    empty_front_n, empty_rear_n = axle_loads_n(van, 0.0, van.empty_front_share_pct)
+    front_n, rear_n = axle_loads_n(van, load_kg, front_share_pct(van, load_kg, 0.0))
+    assert front_n - empty_front_n == pytest.approx(9.80665 * load_kg, rel=1e-6)
+    assert rear_n == pytest.approx(empty_rear_n, rel=1e-9)
+    _, rear_n = axle_loads_n(van, load_kg, front_share_pct(van, load_kg, van.wheelbase_m))
+    assert rear_n - empty_rear_n == pytest.approx(9.80665 * load_kg, rel=1e-6)
+
+
+@given(van=vehicles, load_kg=loads_kg, share_pct=st.floats(30.0, 70.0))
+def test_axle_loads_add_up_to_the_weight(van: Vehicle, load_kg: float, share_pct: float) -> None:
+    front_n, rear_n = axle_loads_n(van, load_kg, share_pct)
+    assert front_n + rear_n == pytest.approx((van.empty_mass_kg + load_kg) * 9.80665, rel=1e-12)
+
+
+@given(van=vehicles)
+def test_without_payload_the_share_is_the_empty_one(van: Vehicle) -> None:
+    assert front_share_pct(van, 0.0, None) == van.empty_front_share_pct
+    assert front_share_pct(van, 0.0, 1.0) == van.empty_front_share_pct
+    with pytest.raises(ZeroDivisionError):
+        payload_position_m(van, 0.0, 50.0)
