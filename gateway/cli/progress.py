@@ -1,12 +1,37 @@
-"""A progress bar on standard error, for people at a terminal; silent elsewhere."""
+"""Progress on standard error, for people at a terminal; silent elsewhere."""
 
 import sys
+import time
 from contextlib import AbstractContextManager
-from typing import Any
+from types import TracebackType
+from typing import Any, Final
 
 import click
+
+SHOWN_EVERY_S: Final = 0.2
 
 
 def bar(length: int, label: str) -> AbstractContextManager[Any]:
     """click's bar over ``length`` steps; ``.update(n)`` moves it on by n, ``.pos`` tells where it stands."""
     return click.progressbar(length=length, label=label, file=sys.stderr, hidden=not sys.stderr.isatty())
+
+
+class StatusLine(AbstractContextManager["StatusLine"]):
+    """One line that tells how far work of unknown length is; removed at the end."""
+
+    def __init__(self) -> None:
+        self._is_shown = sys.stderr.isatty()
+        self._next_s = 0.0
+
+    def show(self, text: str) -> None:
+        """Write the text over the one before, a few times a second at most."""
+        if self._is_shown and time.monotonic() >= self._next_s:
+            self._next_s = time.monotonic() + SHOWN_EVERY_S
+            click.echo(f"\r\x1b[K{text}", err=True, nl=False)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Leave an empty line for what comes next."""
+        if self._is_shown:
+            click.echo("\r\x1b[K", err=True, nl=False)

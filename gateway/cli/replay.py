@@ -1,0 +1,65 @@
+"""springscale replay: a log onto a bus."""
+
+from pathlib import Path
+
+import click
+
+from gateway.bus.log_report import LogReport
+from gateway.bus.sink import ReplayProgress, Speed
+from gateway.bus.sink import replay as send_log
+from gateway.cli import bus_options
+from gateway.cli.options import FILE, as_json
+from gateway.cli.progress import StatusLine
+from gateway.errors import LogUnreadableError
+from gateway.records import json_line
+
+
+@click.command("replay")
+@click.argument("log", type=FILE)
+@bus_options.interface
+@bus_options.channel
+@click.option("--from-channel", default=None, help="send the frames of this channel of the log only [default: all]")
+@bus_options.speed
+@as_json
+def replay(log: Path, interface: str, channel: str, from_channel: str | None, speed: Speed, as_json: bool) -> None:
+    """Send every data frame of LOG to a bus, paced by its time stamps."""
+    with StatusLine() as status:
+        report = send_log(
+            log,
+            interface,
+            channel,
+            from_channel=from_channel,
+            speed=speed,
+            on_progress=lambda sent: status.show(_so_far(sent)),
+        )
+    _require_sent(report, from_channel)
+    click.echo(json_line({"sent": report.wanted, **report.to_json()}) if as_json else _sentences(report))
+
+
+def _so_far(progress: ReplayProgress) -> str:
+    return f"{progress.recorded_s:.0f} s of the log, {progress.n_sent} frames sent"
+
+
+def _require_sent(report: LogReport, from_channel: str | None) -> None:
+    """Raise LogUnreadableError where nothing was sent, saying why."""
+    if report.wanted:
+        return
+    if from_channel is not None and report.other_channel:
+        seen = ", ".join(sorted(report.channels))
+        raise LogUnreadableError(f"{report.path}: has no frame of {from_channel}; --from-channel may name {seen}")
+    report.require_frames()
+
+
+def _sentences(report: LogReport) -> str:
+    lines = [f"{report.path}: {report.wanted} frames sent"]
+    counts = {
+        "of other channels": report.other_channel,
+        "remote frames": report.remote_frames,
+        "error frames": report.error_frames,
+    }
+    lines += [f"not sent: {n} {what}" for what, n in counts.items() if n]
+    for reason, rejected in report.rejects.items():
+        first = f", first in line {rejected.first_lines[0]}" if rejected.first_lines else ""
+        lines.append(f"not read: {rejected.count} x {reason}{first}")
+    lines += [f"the log ended early: {report.ended_early}"] if report.ended_early else []
+    return "\n".join(lines)

@@ -1,0 +1,46 @@
+"""springscale reproduce: the paper's section 4 with our simulator."""
+
+from pathlib import Path
+from typing import Final
+
+import click
+
+from gateway.cli.options import FILE, as_json
+from gateway.cli.progress import bar
+from gateway.records import json_line
+from gateway.reports.reproduce import reproduce as write_report
+from gateway.reports.reproduce_evidence import N_STEPS, Scope
+
+QUICK_WINDOW_S: Final = 100.0
+QUICK_LONGEST_S: Final = 155.0  # two thirds of it, which identify, hold one batch
+
+
+@click.command("reproduce")
+@click.option("--output", type=FILE, required=True, help="directory to write; must hold no reproduction yet")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="decides roads, speeds and noise"
+)
+@click.option(
+    "--quick", is_flag=True, help="a quarter of the driving and batches of 100 s: to try it out, not to judge"
+)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that simulate")
+@as_json
+def reproduce(output: Path, seed: int, quick: bool, workers: int, as_json: bool) -> None:
+    """The paper's figures and tables, its numbers beside ours, as report.html with all it is made of."""
+    with bar(N_STEPS, "starting") as progress:
+
+        def show(what: str, done: int, of: int) -> None:
+            progress.label = what
+            progress.update(done - progress.pos)
+
+        report = write_report(output, scope_of(seed, workers, quick=quick), show)
+        progress.update(N_STEPS - progress.pos)
+    written = {"report": report, "results": output / "results.json", "accuracy": output / "accuracy.md"}
+    click.echo(json_line({name: str(path) for name, path in written.items()}) if as_json else str(report))
+
+
+def scope_of(seed: int, workers: int, *, quick: bool) -> Scope:
+    """The paper's scope, or a quick one."""
+    if quick:
+        return Scope(seed, QUICK_WINDOW_S, QUICK_LONGEST_S, workers)
+    return Scope(seed, workers=workers)

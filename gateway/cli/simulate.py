@@ -1,0 +1,92 @@
+"""springscale simulate: drives of a simulated vehicle, as logs or onto a bus."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gateway.bus.sink import ReplayProgress, Speed
+from gateway.cli import bus_options
+from gateway.cli.options import FILE, as_json
+from gateway.cli.progress import StatusLine, bar
+from gateway.offline.plans import PLANS
+from gateway.offline.simulate import SENSORS_OF_MAP, Bench, bench_of, write_campaign
+from gateway.offline.simulate import stream as send_drives
+from gateway.records import json_line
+from gateway.sim.vans import VANS
+
+_BENCH = (
+    click.argument("kind", type=click.Choice(list(PLANS))),
+    click.option("--vehicle", type=click.Choice(list(VANS)), default="paper_van", show_default=True),
+    click.option(
+        "--map",
+        "map_name",
+        type=click.Choice(list(SENSORS_OF_MAP)),
+        default="reference",
+        show_default=True,
+        help="shipped signal map that the sensors send by",
+    ),
+    click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True),
+    click.option(
+        "--longest-s",
+        type=click.FloatRange(min=0.0, min_open=True),
+        default=math.inf,
+        help="drive no load longer than this [default: as the plan has it]",
+    ),
+    click.option(
+        "--unrelated",
+        "n_unrelated",
+        type=click.IntRange(0, 400),
+        default=0,
+        show_default=True,
+        help="other identifiers that share the bus",
+    ),
+)
+
+
+def _takes_bench(command: Callable[..., None]) -> Callable[..., None]:
+    """What both commands simulate: the same argument and options."""
+    for decorate in reversed(_BENCH):
+        command = decorate(command)
+    return command
+
+
+@click.group("simulate")
+def simulate() -> None:
+    """Simulated drives, as logs or onto a bus."""
+
+
+@simulate.command("campaign")
+@_takes_bench
+@click.argument("directory", type=FILE)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that simulate")
+@as_json
+def campaign(directory: Path, workers: int, as_json: bool, **bench_options: Any) -> None:
+    """Write a campaign of this KIND to DIRECTORY: campaign.toml, signal map, one log a drive, truth.csv."""
+    bench = bench_of(**bench_options)
+    with bar(len(bench.plan().drives), "driving") as progress:
+        path = write_campaign(
+            bench, directory, workers=workers, on_drive=lambda done, of: progress.update(done - progress.pos)
+        )
+        n_drives = progress.pos
+    click.echo(json_line({"campaign": str(path), "n_drives": n_drives}) if as_json else str(path))
+
+
+@simulate.command("stream")
+@_takes_bench
+@bus_options.interface
+@bus_options.channel
+@bus_options.speed
+@as_json
+def stream(interface: str, channel: str, speed: Speed, as_json: bool, **bench_options: Any) -> None:
+    """Send the drives of this KIND to a bus, one after the other."""
+    bench: Bench = bench_of(**bench_options)
+
+    def show(sent: ReplayProgress) -> None:
+        status.show(f"{sent.recorded_s:.0f} s driven, {sent.n_sent} frames sent")
+
+    with StatusLine() as status:
+        n_sent = send_drives(bench, interface, channel, speed=speed, on_progress=show)
+    click.echo(json_line({"sent": n_sent}) if as_json else f"{n_sent} frames sent")

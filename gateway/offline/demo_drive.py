@@ -1,0 +1,50 @@
+"""The drive of the demo: a van delivers its morning, is loaded, and drives on."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from gateway.offline.plans import PAPER_SPEED_MPS
+from gateway.offline.wiring import Wiring
+from gateway.records import Frames
+from gateway.sim.drive import Drive, Leg, constant, drive_of, standstill
+from gateway.sim.obstacles import UnevenRoad
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import START_NS, LoadStep, SimulatedDrive, simulate_drive
+from gateway.sim.sensors import REFERENCE
+from gateway.sim.vans import PAPER_VAN
+from gateway.sim.vehicle import Load
+
+MAP_NAME: Final = "reference"
+LOAD: Final = Load(270.0, 1.3)
+WINDOW_S: Final = 300.0
+N_EMPTY_WINDOWS: Final = 3
+N_LOADED_WINDOWS: Final = 2
+STOP_S: Final = 75.0  # longer than the minute of standstill that ends a drive
+_JITTER_MPS: Final = 0.4  # how well a driver holds a speed
+
+
+def demo_frames(seed: int = 1, start_ns: int = START_NS) -> Iterator[Frames]:
+    """The frames of demo_drive as the map "reference" has them, in one chunk."""
+    yield Wiring(MAP_NAME).frames_of(demo_drive(seed, start_ns).recording)
+
+
+def demo_drive(seed: int = 1, start_ns: int = START_NS) -> SimulatedDrive:
+    """Three windows of five minutes empty, a stop where 270 kg come on board, two windows more; with the truth."""
+    rng = np.random.default_rng(seed)
+    empty = _near_50_kmh(N_EMPTY_WINDOWS * WINDOW_S, rng, stops=True)
+    loaded = _near_50_kmh(N_LOADED_WINDOWS * WINDOW_S, rng, stops=False)
+    whole = empty.then(standstill(STOP_S)).then(loaded)
+    steps = [LoadStep(0.0, ()), LoadStep(empty.duration_s + STOP_S / 2.0, (LOAD,))]
+    road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
+    return simulate_drive(PAPER_VAN, steps, road, whole, REFERENCE, seed, start_ns)
+
+
+def _near_50_kmh(hold_s: float, rng: np.random.Generator, *, stops: bool) -> Drive:
+    """From rest to that speed, held for hold_s: with the ramp a little more than whole windows."""
+    legs = [Leg(PAPER_SPEED_MPS, hold_s)]
+    planned = drive_of([*legs, Leg(0.0, 1.0)] if stops else legs)
+    wandering = constant(PAPER_SPEED_MPS, planned.duration_s + 1.0, rng, _JITTER_MPS).speed_mps
+    held = planned.speed_mps * wandering[: len(planned.speed_mps)] / PAPER_SPEED_MPS
+    return Drive(held, planned.lateral_mps2, planned.step_s)
