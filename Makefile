@@ -1,0 +1,54 @@
+# Every target does its own set-up: a machine with Python 3.11 (venv, pip) and make is enough.
+# PYTHON=python3.12 make test builds with another interpreter.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test check bench lock docs clean
+.DEFAULT_GOAL := demo
+
+.venv/bin/python:
+	$(PYTHON) -m venv .venv
+
+# The package itself is installed in place: the code is read from here, so only its metadata makes a new set-up.
+.venv/.package: requirements.txt pyproject.toml | .venv/bin/python
+	$(BIN)/pip install --quiet --require-hashes -r requirements.txt
+	$(BIN)/pip install --quiet --no-deps --editable .
+	touch $@
+
+.venv/.development: requirements-dev.txt .venv/.package
+	$(BIN)/pip install --quiet --require-hashes -r requirements-dev.txt
+	touch $@
+
+demo: .venv/.package
+	$(BIN)/springscale demo
+
+# A whole file stays on one worker: compiled code and servers are shared inside it.
+test: .venv/.development
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+check: .venv/.development
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python docs/make_settings.py --check
+
+bench: .venv/.development
+	for bench in benchmarks/bench_*.py; do echo "== $$bench"; $(BIN)/python $$bench || exit 1; done
+
+docs: .venv/.development
+	$(BIN)/python docs/make_settings.py
+
+# --no-emit-*: the lock names no package index, so it serves behind any mirror.
+COMPILE = CUSTOM_COMPILE_COMMAND="make lock" .venv-lock/bin/pip-compile --quiet --generate-hashes --strip-extras \
+	--allow-unsafe --no-annotate --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-emit-options
+GROUPS = import tomllib; g = tomllib.load(open('pyproject.toml', 'rb'))['dependency-groups']; print(*g['dev'], *g['browser'], sep='\n')
+
+lock:
+	$(PYTHON) -m venv .venv-lock
+	.venv-lock/bin/pip install --quiet pip-tools
+	$(COMPILE) --output-file requirements.txt pyproject.toml
+	$(PYTHON) -c "$(GROUPS)" | $(COMPILE) --constraint requirements.txt --output-file requirements-dev.txt -
+
+clean:
+	rm -rf .venv .venv-lock build
