@@ -20,9 +20,12 @@ from gateway.offline.estimates import setup_of
 from gateway.records import Frames, json_line
 from gateway.service.gateway import Gateway
 from gateway.service.log import set_up_log
+from gateway.sim.scenario import START_NS
 from gateway.store import Store
+from gateway.units import NS_PER_S
 
 CHANNEL: Final = "springscale-demo"
+HOUR_NS: Final = 3600 * NS_PER_S  # from the start of one drive to the start of the next
 QUIET_S: Final = 0.5  # no new frame for this long: the service has taken all that was sent
 
 
@@ -84,7 +87,7 @@ class _Driver:
 
     def _frames(self) -> Iterator[Frames]:
         for seed in count(1):
-            yield from demo_frames(seed)
+            yield from demo_frames(seed, START_NS + (seed - 1) * HOUR_NS)
             if not self._is_endless:
                 return
 
