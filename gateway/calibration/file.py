@@ -268,7 +268,7 @@ def load_calibration(path: Path) -> CalibrationFile:
             f"{path}: calibration file version {content.get('version')!r}, this springscale reads version {VERSION}: "
             "calibrate again with `springscale calibrate`, or use the springscale that wrote it"
         )
-    if content.get("id") != content_id(content):
+    if not _matches_its_id(content):
         raise CalibrationFileError(
             f"{path}: content does not match its id: the file was changed after it was written; "
             "restore it or calibrate again"
@@ -277,6 +277,13 @@ def load_calibration(path: Path) -> CalibrationFile:
         return CalibrationFile.model_validate({key: part for key, part in content.items() if key != "id"})
     except ValidationError as fault:
         raise CalibrationFileError(describe_faults(path, fault)) from None
+
+
+def _matches_its_id(content: dict[str, Any]) -> bool:
+    try:
+        return bool(content.get("id") == content_id(content))
+    except ValueError:  # a number that is not finite, which is never written
+        return False
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -1,0 +1,67 @@
+"""A made-up calibration file of the ratio index."""
+
+import numpy as np
+
+from gateway.calibration.file import CalibrationFile, RatioIndexPart
+from gateway.core.ratio_index import PAPER_BANDS, RatioIndexCalibration
+from gateway.core.regression import RegressionModel
+
+
+def constant_model(answer: float, std: float) -> RegressionModel:
+    """A regression that answers the same whatever the index: its spread is that of one new observation."""
+    return RegressionModel(
+        terms=("ra",),
+        lows=np.array([0.0]),
+        highs=np.array([1.0]),
+        coefficients=np.array([answer, 0.0]),
+        gram_inverse=np.zeros((2, 2)),
+        residual_std=std,
+        dof=9.0,
+    )
+
+
+def ratio_index_calibration(payload_kg: float = 200.0, front_share_pct: float = 48.0) -> RatioIndexCalibration:
+    """Answers these numbers at 15 m/s."""
+    return RatioIndexCalibration(
+        spectrum="amplitude",
+        n_segment=256,
+        acceleration_bands=PAPER_BANDS["acceleration"],
+        pitch_rate_bands=PAPER_BANDS["pitch_rate"],
+        payload=constant_model(payload_kg, 10.0),
+        front_share=constant_model(front_share_pct, 0.5),
+        speed_range_mps=(14.0, 16.0),
+        speed_std_max_mps=1.0,
+    )
+
+
+def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -> CalibrationFile:
+    """Loads of 0 to 400 kg and shares of 46 to 50 % were seen."""
+    vehicle = {
+        "name": "van",
+        "empty_mass_kg": 1240.0,
+        "wheelbase_m": 2.8,
+        "empty_front_share_pct": 50.0,
+        "sensor_position_m": 3.2,
+        "payload_range_kg": [0.0, 450.0],
+        "front_share_range_pct": [40.0, 60.0],
+        "sensor_position_std_m": 0.1,
+        "empty_front_share_std_pct": 0.5,
+        "sensor_offset_left_m": 0.0,
+        "gross_limit_kg": 2000.0,
+    }
+    absent = ("unsprung_front_kg", "unsprung_rear_kg", "kerb_front_axle_kg", "kerb_rear_axle_kg", "wheel_radius_m")
+    absent += ("front_axle_limit_kg", "rear_axle_limit_kg")
+    run = {"number": 1, "log": "a.log", "sha256": "0" * 64, "payload_kg": 0.0, "front_share_pct": 50.0, "n_batches": 2}
+    return CalibrationFile.model_validate(
+        {
+            "vehicle": vehicle | dict.fromkeys(absent),
+            "seen": {"payload_kg": [0.0, 400.0], "front_share_pct": [46.0, 50.0], "speed_mps": [14.0, 16.0]},
+            "ratio_index": RatioIndexPart.of(ratio_index_calibration(payload_kg, front_share_pct)),
+            "provenance": {
+                "software": "springscale test",
+                "command": "springscale calibrate",
+                "campaign_sha256": "1" * 64,
+                "runs": [run],
+            },
+        }
+    )

@@ -1,0 +1,119 @@
+"""The calibration file: what is written is read back, and nothing else is believed."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.calibrated import calibration_file
+
+from gateway.calibration.file import content_id, load_calibration
+from gateway.errors import CalibrationFileError
+
+Change = Callable[[dict[str, Any]], Any]
+
+
+def written(tmp_path: Path, change: Change | None = None, *, signed: bool = True) -> Path:
+    """The file, changed, with the id that fits it unless it is not to be ``signed`` anew."""
+    content = json.loads(calibration_file().to_json())
+    if change:
+        change(content)
+    if signed:
+        content["id"] = content_id(content)
+    path = tmp_path / "van.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+def fault_of(path: Path) -> str:
+    with pytest.raises(CalibrationFileError) as caught:
+        load_calibration(path)
+    assert str(path) in str(caught.value)
+    assert caught.value.exit_code == 2
+    return str(caught.value)
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    original = calibration_file()
+    path = tmp_path / "van.json"
+    path.write_text(original.to_json())
+    again = load_calibration(path)
+    assert again.to_json() == original.to_json()
+    assert again.id == original.id == json.loads(path.read_text())["id"]
+    core, core_again = original.for_core(), again.for_core()
+    assert core_again.vehicle == core.vehicle
+    assert core.ratio_index is not None
+    assert core_again.ratio_index is not None
+    for model, same in (
+        (core.ratio_index.payload, core_again.ratio_index.payload),
+        (core.ratio_index.front_share, core_again.ratio_index.front_share),
+    ):
+        assert model is not None
+        assert same is not None
+        assert same.predict(0.9, 1.2) == model.predict(0.9, 1.2)
+    assert core_again.ratio_index.acceleration_bands == core.ratio_index.acceleration_bands
+
+
+def test_the_id_does_not_depend_on_how_the_file_is_laid_out(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(dict(sorted(content.items(), reverse=True)), indent=4))
+    assert load_calibration(path).id == calibration_file().id
+
+
+def test_another_content_is_another_id() -> None:
+    assert calibration_file(payload_kg=200.0).id != calibration_file(payload_kg=200.000001).id
+
+
+def test_tampered_content_is_refused(tmp_path: Path) -> None:
+    heavier = written(tmp_path, lambda c: c["vehicle"].update(empty_mass_kg=1300.0), signed=False)
+    assert "changed after it was written" in fault_of(heavier)
+
+
+def test_a_lost_id_is_refused(tmp_path: Path) -> None:
+    assert "does not match its id" in fault_of(written(tmp_path, lambda c: c.pop("id"), signed=False))
+
+
+FAULTS: list[tuple[Change, str]] = [
+    (lambda c: c.update(version=2), "version 2"),
+    (lambda c: c.update(format="else"), "not a springscale calibration file"),
+    (lambda c: c.update(colour="red"), "colour: unknown key"),
+    (lambda c: c["vehicle"].update(doors=5), "vehicle.doors: unknown key"),
+    (lambda c: c["vehicle"].pop("wheelbase_m"), "vehicle.wheelbase_m: missing"),
+    (lambda c: c["vehicle"].update(empty_mass_kg=-1.0), "vehicle.empty_mass_kg"),
+    (lambda c: c["ratio_index"]["payload"].update(residual_std=0.0), "ratio_index.payload.residual_std"),
+    (lambda c: c["ratio_index"].update(n_segment=8), "ratio_index.n_segment"),
+]
+
+
+@pytest.mark.parametrize(("change", "said"), FAULTS, ids=[said for _, said in FAULTS])
+def test_what_is_wrong_is_named(tmp_path: Path, change: Change, said: str) -> None:
+    assert said in fault_of(written(tmp_path, change))
+
+
+def test_an_unknown_regression_term_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, lambda c: c["ratio_index"]["payload"].update(terms=["sinh_ra"]))
+    with pytest.raises(CalibrationFileError, match="sinh_ra"):
+        load_calibration(path).for_core()
+
+
+@pytest.mark.parametrize(("text", "said"), [("{", "not valid JSON"), ("[1]", "not a springscale calibration file")])
+def test_what_is_no_calibration_file_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "van.json"
+    path.write_text(text)
+    assert said in fault_of(path)
+
+
+def test_a_missing_file_and_a_folder_are_named(tmp_path: Path) -> None:
+    assert "no such calibration file" in fault_of(tmp_path / "absent.json")
+    assert "cannot be read" in fault_of(tmp_path)
+
+
+@pytest.mark.parametrize("number", ["Infinity", "NaN", "1e999"])
+def test_a_number_that_is_not_finite_is_refused(tmp_path: Path, number: str) -> None:
+    path = written(tmp_path)
+    text = path.read_text()
+    assert '"residual_std": 10.0' in text
+    path.write_text(text.replace('"residual_std": 10.0', f'"residual_std": {number}'))
+    assert "does not match its id" in fault_of(path)

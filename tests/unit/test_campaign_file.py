@@ -1,0 +1,103 @@
+"""The campaign file: paths and shares follow from it, and each fault is named with its key."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.errors import CampaignError
+
+VEHICLE = {"name": '"van"', "empty_mass_kg": "1240.0", "wheelbase_m": "2.8", "sensor_position_m": "3.2"}
+EMPTY_RUN = {"log": '"a.log"', "payload_kg": "0.0"}
+LOADED_RUN = {"log": '"a.log"', "payload_kg": "270.0", "payload_position_m": "0.5"}
+
+
+def lines(table: dict[str, str]) -> str:
+    return "\n".join(f"{key} = {text}" for key, text in table.items())
+
+
+def campaign_text(
+    head: str = 'signals = "signals.toml"', vehicle: dict[str, str] | None = None, *runs: dict[str, str]
+) -> str:
+    tables = [head, "[vehicle]", lines(VEHICLE | (vehicle or {}))]
+    for run in runs or (EMPTY_RUN, LOADED_RUN):
+        tables += ["[[runs]]", lines(run)]
+    return "\n".join(tables) + "\n"
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    (tmp_path / "a.log").touch()
+    path = tmp_path / "campaign.toml"
+    path.write_text(text)
+    return path
+
+
+def loaded(tmp_path: Path, text: str) -> Campaign:
+    return load_campaign(written(tmp_path, text))
+
+
+def fault_of(tmp_path: Path, text: str) -> str:
+    path = written(tmp_path, text)
+    with pytest.raises(CampaignError) as caught:
+        load_campaign(path)
+    assert all(line.startswith(f"{path}: ") for line in str(caught.value).splitlines())
+    return str(caught.value)
+
+
+def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
+    campaign = loaded(tmp_path, campaign_text())
+    assert campaign.signals == str(tmp_path / "signals.toml")
+    assert campaign.log_of(campaign.runs[0]) == tmp_path / "a.log"
+    assert campaign.identification_fraction == 0.667
+    assert loaded(tmp_path, campaign_text('signals = "springscale:aceinna"')).signals == "springscale:aceinna"
+
+
+def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> None:
+    given = {"log": '"a.log"', "payload_kg": "270.0", "front_share_pct": "47.5"}
+    campaign = loaded(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN, given))
+    empty, positioned, stated = (campaign.front_share_pct(run) for run in campaign.runs)
+    assert empty == 50.0
+    assert positioned == pytest.approx(100.0 * (620.0 + (1.0 - 0.5 / 2.8) * 270.0) / 1510.0)
+    assert stated == 47.5
+
+
+FAULTS = [
+    (campaign_text('signals = "s"\ncolour = 1'), "colour: unknown key"),
+    (campaign_text('signals = ""'), "signals: "),
+    (campaign_text('signals = "s"\nidentification_fraction = 1.5'), "identification_fraction: "),
+    (campaign_text(vehicle={"doors": "5"}), "vehicle.doors: unknown key"),
+    (campaign_text(vehicle={"wheelbase_m": "0.0"}), "vehicle.wheelbase_m: "),
+    (campaign_text(vehicle={"empty_mass_kg": '"heavy"'}), "vehicle.empty_mass_kg: "),
+    (campaign_text(vehicle={"empty_front_share_pct": "0.5e3"}), "vehicle.empty_front_share_pct: "),
+    (campaign_text(vehicle={"payload_range_kg": "[450.0, 0.0]"}), "payload_range_kg must rise"),
+    (campaign_text('signals = "s"', None, {"log": '"a.log"'}), "runs[1].payload_kg: missing"),
+    (campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN | {"payload_kg": "-5.0"}), "runs[2].payload_kg: "),
+    (campaign_text('signals = "s"', None, EMPTY_RUN | {"payload_kg": "90.0"}), "needs payload_position_m"),
+    (campaign_text('signals = "s"', None, LOADED_RUN | {"front_share_pct": "48.0"}), "not both"),
+    (campaign_text('signals = "s"', None, EMPTY_RUN | {"start_s": "9.0", "end_s": "5.0"}), "end_s must be after"),
+    (campaign_text('signals = "s"', None, EMPTY_RUN | {"split": '"test"'}), "runs[1].split: "),
+    (campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN | {"log": '"b.log"'}), "runs[2].log: b.log: no such"),
+    ('signals = "s"\n[vehicle]\n' + lines(VEHICLE), "runs: missing"),
+    ('signals = "s"\nruns = []\n[vehicle]\n' + lines(VEHICLE), "runs: "),
+    ("signals = \n", "line 1"),
+]
+
+
+@pytest.mark.parametrize(("text", "said"), FAULTS, ids=[said for _, said in FAULTS])
+def test_each_fault_is_named(tmp_path: Path, text: str, said: str) -> None:
+    assert said in fault_of(tmp_path, text)
+
+
+def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
+    faults = fault_of(tmp_path, campaign_text('signals = ""', {"wheelbase_m": "-1.0"}, EMPTY_RUN, {"log": '"a.log"'}))
+    assert len(faults.splitlines()) == 3
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(CampaignError, match=r"absent\.toml: no such file"):
+        load_campaign(tmp_path / "absent.toml")
+    with pytest.raises(CampaignError, match="is a folder"):
+        load_campaign(tmp_path)
+    (tmp_path / "latin.toml").write_bytes(b'signals = "\xe9"')
+    with pytest.raises(CampaignError, match="not UTF-8"):
+        load_campaign(tmp_path / "latin.toml")

@@ -1,0 +1,165 @@
+"""From batch to answer or reason, and the error table (12) against numbers worked out by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.calibrated import calibration_file
+from support.drives import T0_NS, drive, joined, later
+
+from gateway.calibration.evaluation import Judged, error_table
+from gateway.core.batch import Window, build_batch
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.estimator import estimate
+from gateway.core.flow import Flow, Identity
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle
+from gateway.records import Batch, Estimate, Why, estimate_to_json
+
+VAN = Vehicle("van", 1240.0, 2.8, payload_range_kg=(0.0, 400.0), unsprung_front_kg=60.0, unsprung_rear_kg=100.0)
+BATCH = build_batch(drive(100.0), Window(T0_NS, T0_NS + 100_000_000_000, T0_NS), BatchSettings(window_s=100.0), {})
+
+
+def judged(true_kg: float, found_kg: float | None, true_pct: float = 50.0, found_pct: float = 50.0) -> Judged:
+    blank = Estimate(0, 1, "ratio_index")
+    if found_kg is None:
+        return Judged(1, "a.log", true_kg, true_pct, replace(blank, rejected=(Why.TOO_SLOW,)))
+    answer = replace(
+        blank,
+        payload_kg=found_kg,
+        payload_interval95_kg=(found_kg - 10.0, found_kg + 10.0),
+        front_share_pct=found_pct,
+        front_share_interval95_pct=(found_pct - 1.0, found_pct + 1.0),
+    )
+    return Judged(1, "a.log", true_kg, true_pct, answer)
+
+
+def test_error_table_by_hand() -> None:
+    rows = [judged(100.0, 108.0, 48.0, 48.5), judged(300.0, 280.0, 50.0, 48.0), judged(0.0, None, 50.0)]
+    table = error_table(rows, VAN, "ratio_index")
+    assert (table["n_batches"], table["n_rejected"]) == (3, 1)
+    assert table["rejected_by_reason"] == {"too_slow": 1}
+    payload, share = table["payload"], table["front_share"]
+    # errors +8 and -20 kg of a range of 400 kg: +2 and -5 %
+    assert payload["mean_abs_pct"] == pytest.approx(3.5)
+    assert payload["bias_pct"] == pytest.approx(-1.5)
+    assert payload["std_pct"] == pytest.approx(3.5)
+    assert payload["max_abs_pct"] == pytest.approx(5.0)
+    assert payload["mean_abs_kg"] == pytest.approx(14.0)
+    assert payload["coverage95"] == pytest.approx(0.5)
+    assert payload["mean_abs_pct_with_misses"] == pytest.approx((2.0 + 5.0 + 50.0) / 3.0)  # the miss says 200 kg
+    assert payload["mean_abs_pct_of_gross"] == pytest.approx(50.0 * (8.0 / 1500.0 + 20.0 / 1700.0))
+    # errors +0.5 and -2 points of a range of 20; the miss says 50 where 50 is true
+    assert share["mean_abs_pct"] == pytest.approx(6.25)
+    assert share["mean_abs_pp"] == pytest.approx(1.25)
+    assert share["mean_abs_pct_with_misses"] == pytest.approx(12.5 / 3.0)
+    assert share["coverage95"] == pytest.approx(0.5)
+
+
+def test_pieces_at_the_end_of_a_run_are_no_batches() -> None:
+    piece = replace(judged(0.0, None), estimate=Estimate(0, 1, "x", rejected=(Why.TOO_SHORT, Why.TOO_SLOW)))
+    table = error_table([judged(100.0, 100.0), piece], VAN, "ratio_index")
+    assert (table["n_batches"], table["n_rejected"], len(table["batches"])) == (1, 0, 2)
+    assert table["payload"]["mean_abs_pct_with_misses"] == 0.0
+
+
+def test_nothing_answered_is_null_not_zero() -> None:
+    table = error_table([judged(100.0, None)], VAN, "ratio_index")["payload"]
+    assert table.pop("mean_abs_pct_with_misses") == pytest.approx(25.0)
+    assert set(table.values()) == {None}
+    assert error_table([], VAN, "ratio_index")["payload"]["mean_abs_pct_with_misses"] is None
+
+
+def answer(payload_kg: float = 200.0, front_share_pct: float = 48.0, batch: Batch = BATCH) -> Estimate:
+    return estimate(batch, calibration_file(payload_kg, front_share_pct).for_core(), "ratio_index")
+
+
+def test_a_sound_batch_is_answered_with_spread_and_origin() -> None:
+    found = answer()
+    assert found.rejected == ()
+    assert (found.payload_kg, found.payload_std_kg) == pytest.approx((200.0, 10.0))
+    assert found.payload_interval95_kg == pytest.approx((200.0 - 22.6216, 200.0 + 22.6216), abs=1e-3)  # t(9) = 2.26216
+    assert found.front_share_pct == pytest.approx(48.0)
+    assert found.ratio_index_acceleration > 0.0
+    assert found.calibration_id == calibration_file().id
+
+
+@pytest.mark.parametrize(
+    ("payload_kg", "front_share_pct", "is_outside"),
+    [  # 0..400 kg and 46..50 % seen, a quarter of the span more at either end, half widths 22.6 kg and 1.13 points
+        (200.0, 48.0, False),
+        (-100.0, 48.0, False),
+        (-122.0, 48.0, False),
+        (-123.0, 48.0, True),
+        (522.0, 48.0, False),
+        (523.0, 48.0, True),
+        (200.0, 43.9, False),
+        (200.0, 43.8, True),
+        (200.0, 52.1, False),
+        (200.0, 52.2, True),
+    ],
+)
+def test_out_of_range_is_an_interval_wholly_beyond_what_was_seen(
+    payload_kg: float, front_share_pct: float, is_outside: bool
+) -> None:
+    found = answer(payload_kg, front_share_pct)
+    assert found.rejected == ((Why.OUT_OF_RANGE,) if is_outside else ())
+    assert np.isnan(found.payload_kg) == is_outside
+    assert (estimate_to_json(found)["front_share_interval95_pct"] is None) == is_outside
+
+
+def test_a_calibration_from_one_load_sets_no_limit() -> None:
+    one = CalibratedVehicle("id", VAN, (100.0, 100.0), (48.0, 48.0))
+    assert not one.is_out_of_range((5000.0, 5001.0), (1.0, 2.0))
+
+
+def test_an_unknown_interval_is_not_outside() -> None:
+    calibrated = calibration_file().for_core()
+    assert not calibrated.is_out_of_range((np.nan, np.nan), (47.0, 49.0))
+
+
+def test_without_calibration_there_are_spectra_and_a_reason() -> None:
+    found = estimate(BATCH, None, "cross_spectrum")
+    assert found.rejected == (Why.NO_CALIBRATION,)
+    assert found.calibration_id is None
+    assert found.spectra is not None
+    shown = estimate_to_json(found)
+    assert shown["payload_kg"] is None
+    assert len(shown["spectra"]["freq_hz"]) == len(found.spectra.freq_hz)
+
+
+def test_a_rejected_batch_keeps_its_reasons() -> None:
+    spoiled = replace(BATCH, rejected=(Why.TOO_SLOW,))
+    assert answer(batch=spoiled).rejected == (Why.TOO_SLOW,)
+    assert estimate(spoiled, None, "ratio_index").rejected == (Why.TOO_SLOW, Why.NO_CALIBRATION)
+
+
+def test_the_ratio_index_gates_on_speed() -> None:
+    ramp = np.linspace(10.0, 20.0, len(BATCH.speed_mps))
+    assert answer(batch=replace(BATCH, speed_mps=ramp)).rejected == (Why.SPEED_SPREAD,)
+    for speed_mps, rejected in ((12.0, ()), (11.8, (Why.SPEED_UNCALIBRATED,)), (18.5, (Why.SPEED_UNCALIBRATED,))):
+        steady = replace(BATCH, speed_mps=np.full(len(BATCH.speed_mps), speed_mps))
+        assert answer(batch=steady).rejected == rejected
+
+
+def test_too_few_segments_between_the_masks_are_no_answer() -> None:
+    usable = BATCH.usable & (np.arange(len(BATCH.usable)) % 200 > 0)
+    assert answer(batch=replace(BATCH, usable=usable)).rejected == (Why.NOT_ENOUGH_EXCITATION,)
+
+
+def test_flow_names_the_vehicle_and_does_not_depend_on_chunks() -> None:
+    rows = joined(drive(100.0), later(drive(90.0, seed=2), 115.0))
+    calibrated = calibration_file().for_core()
+
+    def run(n_chunk: int) -> list[Estimate]:
+        flow = Flow(
+            BatchSettings(window_s=50.0), {}, calibrated, "ratio_index", Identity("van-17", "WVWZZZ1JZXW000001")
+        )
+        parts = [rows.part(i, i + n_chunk) for i in range(0, len(rows), n_chunk)]
+        return [*(found for part in parts for found in flow.feed(part)), *flow.flush()]
+
+    whole, chunked = run(len(rows)), run(777)
+    assert [found.counted for found in whole] == [True, True, True, False]
+    assert [estimate_to_json(found) for found in chunked] == [estimate_to_json(found) for found in whole]
+    assert {(found.vehicle_id, found.vin) for found in whole} == {("van-17", "WVWZZZ1JZXW000001")}
+    assert len({found.id for found in whole}) == 4

@@ -1,0 +1,124 @@
+"""springscale.toml and the environment; and the border where foreign units become SI."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from gateway.config import Settings, load_settings
+from gateway.errors import ConfigurationError, SignalMapError
+from gateway.units import si_factor
+
+LEAST = 'signals = "signals.toml"\n'
+
+
+def loaded(tmp_path: Path, text: str = LEAST) -> Settings:
+    path = tmp_path / "springscale.toml"
+    path.write_text(text)
+    return load_settings(path)
+
+
+def fault_of(tmp_path: Path, text: str) -> str:
+    with pytest.raises(ConfigurationError) as caught:
+        loaded(tmp_path, text)
+    assert caught.value.exit_code == 2
+    assert all(line.startswith(f"{tmp_path / 'springscale.toml'}: ") for line in str(caught.value).splitlines())
+    return str(caught.value)
+
+
+def test_a_signal_map_is_all_that_must_be_said(tmp_path: Path) -> None:
+    settings = loaded(tmp_path)
+    assert settings.signals == str(tmp_path / "signals.toml")
+    assert settings.calibration is None
+    assert (settings.bus.interface, settings.bus.channel) == ("socketcan", "can0")
+    assert (settings.batch.window_s, settings.batch.standstill_s, settings.batch.silence_s) == (300.0, 60.0, 10.0)
+    assert settings.batch.last_batch_share_min == 0.95
+    assert (settings.web.host, settings.web.port) == ("127.0.0.1", 8000)
+
+
+def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
+    settings = loaded(tmp_path, LEAST + 'calibration = "van.json"\n[store]\ndirectory = "records"')
+    assert settings.calibration == tmp_path / "van.json"
+    assert settings.store.directory == tmp_path / "records"
+    away = loaded(tmp_path, 'signals = "springscale:aceinna"\n[store]\ndirectory = "/srv/records"')
+    assert away.signals == "springscale:aceinna"
+    assert away.store.directory == Path("/srv/records")
+
+
+def test_the_environment_wins_and_leaves_its_neighbours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SPRINGSCALE_WEB__PORT", "8001")
+    monkeypatch.setenv("SPRINGSCALE_ESTIMATOR", "ratio_index")
+    settings = loaded(tmp_path, LEAST + '[web]\nhost = "::1"\nport = 9000')
+    assert (settings.web.host, settings.web.port) == ("::1", 8001)
+    assert settings.estimator == "ratio_index"
+
+
+def test_a_fault_in_the_environment_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SPRINGSCALE_WEB__PORT", "eighty")
+    assert "web.port: " in fault_of(tmp_path, LEAST)
+
+
+FAULTS = [
+    ("", "signals: missing"),
+    (LEAST + "colour = 1", "colour: unknown key"),
+    (LEAST + "[batch]\nwindow = 300", "batch.window: unknown key"),
+    (LEAST + "[batch]\nwindow_s = 5.0", "batch.window_s: "),
+    (LEAST + "[batch]\nstandstill_s = inf", "batch.standstill_s: "),
+    (LEAST + "[batch]\nusable_share_min = 60", "batch.usable_share_min: "),
+    (LEAST + "[batch]\nspeed_min_mps = 50.0", "batch: speed_min_mps must be below speed_max_mps"),
+    (LEAST + "[batch]\nsilence_s = 300.0", "batch: silence_s must be below window_s"),
+    (LEAST + "[web]\nport = 70000", "web.port: "),
+    (LEAST + '[vehicle]\nvin = "TOO-SHORT"', "vehicle.vin: "),
+    (LEAST + '[log]\nlevel = "loud"', "log.level: "),
+    ('estimator = "guess"\n' + LEAST, "estimator: "),
+    ("signals = ", "not valid TOML"),
+]
+
+
+@pytest.mark.parametrize(("text", "said"), FAULTS, ids=[said for _, said in FAULTS])
+def test_each_fault_is_named_with_its_key(tmp_path: Path, text: str, said: str) -> None:
+    assert said in fault_of(tmp_path, text)
+
+
+def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
+    faults = fault_of(tmp_path, "colour = 1\n[web]\nport = -1\n[batch]\nrate_hz = 0.0")
+    assert {line.split(": ")[1] for line in faults.splitlines()} == {"signals", "colour", "web.port", "batch.rate_hz"}
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"absent\.toml: no such file"):
+        load_settings(tmp_path / "absent.toml")
+
+
+def test_only_the_live_service_looks_early(tmp_path: Path) -> None:
+    batch = loaded(tmp_path).batch
+    assert batch.for_core(is_live=True).provisional_every_s == 60.0
+    assert batch.for_core().provisional_every_s == 0.0
+    assert batch.for_core(window_s=120.0).window_s == 120.0
+    assert batch.for_core().window_s == 300.0
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "factor"),
+    [
+        ("acceleration", "g", 9.80665),
+        ("acceleration", " M/S^2 ", 1.0),
+        ("acceleration", "mg", 0.00980665),
+        ("angular_rate", "deg/s", math.pi / 180.0),
+        ("angular_rate", "rad/s", 1.0),
+        ("speed", "km/h", 1000.0 / 3600.0),
+        ("speed", "mph", 1609.344 / 3600.0),
+        ("speed", "kn", 1852.0 / 3600.0),
+        ("mass", "t", 1000.0),
+        ("state", "", 1.0),
+    ],
+)
+def test_units(quantity: str, unit: str, factor: float) -> None:
+    assert si_factor(quantity, unit) == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize(("unit", "said"), [(None, "no unit"), ("", "no unit"), ("furlong/fortnight", "not known")])
+def test_an_unknown_unit_is_an_error_that_says_which_are_known(unit: str | None, said: str) -> None:
+    with pytest.raises(SignalMapError, match=said) as caught:
+        si_factor("speed", unit)
+    assert "km/h" in str(caught.value)
