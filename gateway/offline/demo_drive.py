@@ -1,4 +1,4 @@
-"""The drive of the demo: a van delivers its morning, is loaded, and drives on."""
+"""The drive of the demo: a van drives empty, is loaded, and drives on."""
 
 from collections.abc import Iterator
 from typing import Final
