@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-PROMISED = ("recorded drives", "chromium", "playwright", "shared data")
+PROMISED = ("chromium", "playwright")
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
