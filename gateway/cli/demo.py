@@ -94,7 +94,7 @@ class _Driver:
     def _wait_until_taken(self, gateway: Gateway) -> None:
         n, since = -1, time.monotonic()
         while not self._stop.wait(0.05) and time.monotonic() - since < QUIET_S:
-            if (now := gateway.source.counts().frames) != n:
+            if (now := gateway.source.counts().frames) != n or not gateway.has_caught_up:
                 n, since = now, time.monotonic()
 
 

@@ -85,6 +85,11 @@ class Gateway:
         port = self._server.servers[0].sockets[0].getsockname()[1]
         return f"http://{self._settings.web.host}:{port}"
 
+    @property
+    def has_caught_up(self) -> bool:
+        """True while every frame that came in has been worked through."""
+        return self.pipeline.n_frames == self.source.counts().frames - self.source.inbox.dropped
+
     def request_stop(self) -> None:
         """Begin to stop; from the event loop's thread (other threads: loop.call_soon_threadsafe)."""
         self._stopping.set()

@@ -57,6 +57,7 @@ class Pipeline:
         self.n_estimates = self.n_rejected = self.n_provisional = 0
         self.rejected_by_reason: Counter[str] = Counter()
         self.failure: BaseException | None = None
+        self.n_frames = 0  # frames whose estimates, if any, are handed over
         self.progress = 0  # grows with every turn of the loop: what the watchdog follows
         self._inbox = inbox
         self._store = store
@@ -72,6 +73,8 @@ class Pipeline:
         """Take what is left in the inbox, close the open window, and end."""
         self._stop.set()
         self._thread.join(timeout_s)
+        if self._thread.is_alive():
+            log_event("pipeline did not finish in time", level=logging.ERROR, n_frames_waiting=len(self._inbox))
 
     def is_alive(self) -> bool:
         """True while the thread runs."""
@@ -98,6 +101,7 @@ class Pipeline:
         if len(motion):
             self.watch.saw(motion)
             self._hand_over(self.flow.feed(motion))
+        self.n_frames += len(frames)
         return True
 
     def _hand_over(self, estimates: Any) -> None:

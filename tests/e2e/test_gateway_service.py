@@ -83,8 +83,10 @@ def run_with_log(config: Path, log: Path, speed: float | str) -> list[str]:
 
         def play() -> None:
             report = replay(log, "virtual", settings.bus.channel, speed=speed)
-            deadline = time.monotonic() + 20.0
-            while gateway.source.counts().frames < report.frames and time.monotonic() < deadline:
+            deadline = time.monotonic() + 60.0
+            while time.monotonic() < deadline and not (
+                gateway.source.counts().frames >= report.frames and gateway.has_caught_up
+            ):
                 time.sleep(0.02)
             loop.call_soon_threadsafe(gateway.request_stop)
 
