@@ -2,20 +2,18 @@
 
 import gzip
 import itertools
-import os
-from pathlib import Path
 
 import can
 import cantools
 import numpy as np
 import pytest
+from support.recordings import recordings
 
 from gateway.bus.logs import motion_of_log
 from gateway.bus.signal_map import load_signal_map
 from gateway.records import Signal
 from gateway.units import si_factor
 
-RECORDED = Path(os.environ.get("SPRINGSCALE_DATA", Path(__file__).parents[3] / "shared" / "data"))
 N_LINES = 20_000
 
 DRIVES = {
@@ -50,14 +48,13 @@ QUANTITY = {
 @pytest.fixture(params=DRIVES)
 def drive(request, tmp_path):
     """(path of the log's first lines, database, what is mapped, channel, signal map)."""
-    if not RECORDED.is_dir():
-        pytest.skip(f"the recorded drives are not at {RECORDED} (set SPRINGSCALE_DATA)")
+    recorded = recordings()
     log, dbc, mapped, channel = DRIVES[request.param]
-    with gzip.open(RECORDED / log, "rb") as packed:
+    with gzip.open(recorded / log, "rb") as packed:
         text = b"".join(itertools.islice(packed, 5_000, 5_000 + N_LINES))
     (tmp_path / "slice.log").write_bytes(text)
-    database = cantools.database.load_file(RECORDED / dbc)
-    return tmp_path / "slice.log", database, mapped, channel, load_signal_map((RECORDED / dbc).parent / "signals.toml")
+    database = cantools.database.load_file(recorded / dbc)
+    return tmp_path / "slice.log", database, mapped, channel, load_signal_map((recorded / dbc).parent / "signals.toml")
 
 
 def truth_of(path, database, mapped, channel):
