@@ -40,7 +40,7 @@ def calibrate(
             numbers=numbers,
             command=shlex.join(["springscale", *sys.argv[1:]]),
             on_run=lambda done, of: progress.update(done - progress.pos),
-        )
+        ).file
     output.write_text(found.to_json(), encoding="utf-8")
     click.echo(json_line(_summary(found, output)) if as_json else _sentences(found, output))
 

@@ -1,7 +1,7 @@
 """From a campaign file to a calibration file, and from both to the error table of (12)."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from typing import Any, Literal
 
@@ -20,6 +20,7 @@ from gateway.calibration.file import (
     VehiclePart,
 )
 from gateway.calibration.grey_box import calibrate_cross_spectrum
+from gateway.calibration.inspection import RunVerdict
 from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum import CrossSpectrumCalibration
@@ -33,6 +34,17 @@ from gateway.records import F64
 Split = Literal["identification", "validation", "all"]
 
 
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A calibration file with all that stands behind it. What no estimator gave is None."""
+
+    file: CalibrationFile
+    verdicts: tuple[RunVerdict, ...]
+    split: tuple[SplitRun, ...]
+    ratio_index: RatioIndexFit | None
+    cross_spectrum: CrossSpectrumCalibration | None
+
+
 def calibrate(
     campaign: Campaign,
     settings: BatchSettings,
@@ -41,7 +53,7 @@ def calibrate(
     numbers: Sequence[int] | None = None,
     command: str = "",
     on_run: OnRun = lambda done, of: None,
-) -> CalibrationFile:
+) -> Outcome:
     """Fits every named estimator on the identification parts of the chosen runs.
 
     An estimator that these runs cannot carry is left out with a warning; raises
@@ -55,7 +67,7 @@ def calibrate(
     ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign)
     with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
     speeds = [batch.mean_speed_mps for batch in counted]
-    return CalibrationFile(
+    file = CalibrationFile(
         vehicle=VehiclePart(**asdict(campaign.vehicle)),
         seen=SeenPart(
             payload_kg=_span([run.payload_kg for run in with_batches]),
@@ -68,6 +80,7 @@ def calibrate(
         warnings=tuple(warnings),
         provenance=_provenance(campaign, split, command),
     )
+    return Outcome(file, (), tuple(split), ratio_index, cross_spectrum)
 
 
 def _fit(

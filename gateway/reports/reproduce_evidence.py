@@ -129,7 +129,8 @@ def gather(output: Path, scope: Scope, on_step: OnStep = lambda what, done, of: 
 
 def _methods(driven: Driven, scope: Scope, path: Path) -> tuple[Method, ...]:
     """Every estimator calibrated on the identification part, and the ratio index with the bands of Table 2."""
-    held = calibrate(driven.campaign, scope.settings, estimators=tuple(ESTIMATORS), command="springscale reproduce")
+    outcome = calibrate(driven.campaign, scope.settings, estimators=tuple(ESTIMATORS), command="springscale reproduce")
+    held = outcome.file
     path.write_text(held.to_json(), encoding="utf-8")
     calibrated = held.for_core()
     others = [name for name in held.estimators if name != RATIO_INDEX]

@@ -1,0 +1,36 @@
+"""What the known-load drives say of themselves before anything is fitted to them: a verdict a run."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Severity(StrEnum):
+    """How much a finding weighs: a fault makes its run unusable, a warning wants a look, a note is to know."""
+
+    FAULT = "fault"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that the data show. ``kind`` is snake_case; docs/calibration.md lists every kind."""
+
+    kind: StrEnum
+    severity: Severity
+    text: str
+    advice: str
+
+
+@dataclass(frozen=True, slots=True)
+class RunVerdict:
+    """All that was found of one run; ``number`` counts the campaign's runs from 1, ``name`` is its log."""
+
+    number: int
+    name: str
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def is_usable(self) -> bool:
+        """False where a fault keeps the run out of the calibration."""
+        return all(finding.severity is not Severity.FAULT for finding in self.findings)
