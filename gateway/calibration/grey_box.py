@@ -1,14 +1,15 @@
 """Calibration of the cross-spectral estimator: a half-car fitted to drives of known load.
 
     calibrate_cross_spectrum(runs, vehicle) -> CrossSpectrumCalibration
+    fit_cross_spectrum(runs, vehicle) -> the same, and what the other runs taught without each run
 
 The parameters are those most probable given all runs together, under priors any road vehicle
 would meet. Leaving out one run at a time then shows how far the intervals must be widened to be
 true of loads that calibration has not seen.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -51,9 +52,24 @@ class _Known:
         return Point(theta, self.run.payload_kg, self.run.front_share_pct / 100.0)
 
 
+@dataclass(frozen=True, slots=True)
+class CrossSpectrumFit:
+    """The calibration, and by run number what all other runs teach; empty where too few to leave one out."""
+
+    calibration: CrossSpectrumCalibration
+    without: Mapping[int, CrossSpectrumCalibration]
+
+
 def calibrate_cross_spectrum(
     runs: Sequence[KnownRun], vehicle: Vehicle, progress: Callable[[int, int], None] | None = None
 ) -> CrossSpectrumCalibration:
+    """The calibration alone; see :func:`fit_cross_spectrum`."""
+    return fit_cross_spectrum(runs, vehicle, progress).calibration
+
+
+def fit_cross_spectrum(
+    runs: Sequence[KnownRun], vehicle: Vehicle, progress: Callable[[int, int], None] | None = None
+) -> CrossSpectrumFit:
     """Fit the half-car to ``runs``; one empty run is enough, then with the warning ``springs_from_priors``.
 
     ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError where no
@@ -67,20 +83,26 @@ def calibrate_cross_spectrum(
     _tell(progress, 1, n_steps)
     calibration = _calibration(known, vehicle, found)
     if not can_leave_out:
-        return replace(calibration, warnings=(*calibration.warnings, UNTESTED))
+        return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
     errors: list[tuple[float, float, float]] = []
+    without: dict[int, CrossSpectrumCalibration] = {}
     for left_out, one in enumerate(known):
         others = [k for k in known if k is not one]
         refound = _fit(others, prior, found.x)
-        errors.extend(_left_out_errors(one, _calibration(others, vehicle, refound)))
+        without[one.run.number] = _calibration(others, vehicle, refound)
+        errors.extend(_left_out_errors(one, without[one.run.number]))
         _tell(progress, 2 + left_out, n_steps)
     payload_z, share_z, misfits = (np.array(column) for column in zip(*errors, strict=True))
-    return replace(
-        calibration,
-        payload_inflation=_inflation(payload_z),
-        front_share_inflation=_inflation(share_z),
-        misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.max(misfits))),
-    )
+
+    def tested(untested: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
+        return replace(
+            untested,
+            payload_inflation=_inflation(payload_z),
+            front_share_inflation=_inflation(share_z),
+            misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.max(misfits))),
+        )
+
+    return CrossSpectrumFit(tested(calibration), {number: tested(one) for number, one in without.items()})
 
 
 def _tell(progress: Callable[[int, int], None] | None, done: int, n_steps: int) -> None:

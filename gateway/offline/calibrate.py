@@ -1,7 +1,7 @@
 """From a campaign file to a calibration file, and from both to the error table of (12)."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from typing import Any, Literal
 
@@ -19,7 +19,7 @@ from gateway.calibration.file import (
     SeenPart,
     VehiclePart,
 )
-from gateway.calibration.grey_box import calibrate_cross_spectrum
+from gateway.calibration.grey_box import CrossSpectrumFit, fit_cross_spectrum
 from gateway.calibration.inspection import RunVerdict
 from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
 from gateway.core.calibrated import CalibratedVehicle
@@ -36,13 +36,17 @@ Split = Literal["identification", "validation", "all"]
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A calibration file with all that stands behind it. What no estimator gave is None."""
+    """A calibration file with all that stands behind it. What no estimator gave is None.
+
+    cross_spectrum_without holds, by run number, what the other runs teach without that run.
+    """
 
     file: CalibrationFile
     verdicts: tuple[RunVerdict, ...]
     split: tuple[SplitRun, ...]
     ratio_index: RatioIndexFit | None
     cross_spectrum: CrossSpectrumCalibration | None
+    cross_spectrum_without: Mapping[int, CrossSpectrumCalibration] = field(default_factory=dict)
 
 
 def calibrate(
@@ -74,29 +78,36 @@ def calibrate(
             front_share_pct=_span([run.front_share_pct for run in with_batches]),
             speed_mps=_span(speeds),
         ),
-        cross_spectrum=CrossSpectrumPart.of(cross_spectrum) if cross_spectrum else None,
+        cross_spectrum=CrossSpectrumPart.of(cross_spectrum.calibration) if cross_spectrum else None,
         ratio_index=RatioIndexPart.of(ratio_index.calibration) if ratio_index else None,
         expected_errors={"ratio_index": _expected(ratio_index)} if ratio_index else {},
         warnings=tuple(warnings),
         provenance=_provenance(campaign, split, command),
     )
-    return Outcome(file, (), tuple(split), ratio_index, cross_spectrum)
+    return Outcome(
+        file,
+        (),
+        tuple(split),
+        ratio_index,
+        cross_spectrum.calibration if cross_spectrum else None,
+        cross_spectrum.without if cross_spectrum else {},
+    )
 
 
 def _fit(
     estimators: Sequence[str], runs: Sequence[KnownRun], campaign: Campaign
-) -> tuple[RatioIndexFit | None, CrossSpectrumCalibration | None, list[str]]:
+) -> tuple[RatioIndexFit | None, CrossSpectrumFit | None, list[str]]:
     """What each named estimator learned, and a warning for each that these runs cannot carry."""
     ratio_index: RatioIndexFit | None = None
-    cross_spectrum: CrossSpectrumCalibration | None = None
+    cross_spectrum: CrossSpectrumFit | None = None
     warnings: list[str] = []
     for name in estimators:
         try:
             if name == "ratio_index":
                 ratio_index = fit_ratio_index(runs, campaign.vehicle)
             else:
-                cross_spectrum = calibrate_cross_spectrum(runs, campaign.vehicle)
-                warnings.extend(cross_spectrum.warnings)
+                cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle)
+                warnings.extend(cross_spectrum.calibration.warnings)
         except CalibrationImpossibleError as fault:
             warnings.append(f"{name}: {fault}")
     if ratio_index is None and cross_spectrum is None:
