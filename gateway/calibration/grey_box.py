@@ -54,10 +54,15 @@ class _Known:
 
 @dataclass(frozen=True, slots=True)
 class CrossSpectrumFit:
-    """The calibration, and by run number what all other runs teach; empty where too few to leave one out."""
+    """The calibration, and by run number what all other runs teach; empty where too few to leave one out.
+
+    The errors (n,) are those of every batch of a run left out, weighed by the others; None where none could be.
+    """
 
     calibration: CrossSpectrumCalibration
     without: Mapping[int, CrossSpectrumCalibration]
+    payload_errors_kg: F64 | None = None
+    front_share_errors_pct: F64 | None = None
 
 
 def calibrate_cross_spectrum(
@@ -84,7 +89,7 @@ def fit_cross_spectrum(
     calibration = _calibration(known, vehicle, found)
     if not can_leave_out:
         return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
-    errors: list[tuple[float, float, float]] = []
+    errors: list[tuple[float, float, float, float, float]] = []
     without: dict[int, CrossSpectrumCalibration] = {}
     for left_out, one in enumerate(known):
         others = [k for k in known if k is not one]
@@ -92,7 +97,7 @@ def fit_cross_spectrum(
         without[one.run.number] = _calibration(others, vehicle, refound)
         errors.extend(_left_out_errors(one, without[one.run.number]))
         _tell(progress, 2 + left_out, n_steps)
-    payload_z, share_z, misfits = (np.array(column) for column in zip(*errors, strict=True))
+    payload_z, share_z, misfits, payload_kg, share_pct = (np.array(column) for column in zip(*errors, strict=True))
 
     def tested(untested: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
         return replace(
@@ -102,7 +107,8 @@ def fit_cross_spectrum(
             misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.max(misfits))),
         )
 
-    return CrossSpectrumFit(tested(calibration), {number: tested(one) for number, one in without.items()})
+    tested_without = {number: tested(one) for number, one in without.items()}
+    return CrossSpectrumFit(tested(calibration), tested_without, payload_kg, share_pct)
 
 
 def _tell(progress: Callable[[int, int], None] | None, done: int, n_steps: int) -> None:
@@ -176,8 +182,12 @@ def _calibration(known: list[_Known], vehicle: Vehicle, found: Found) -> CrossSp
     )
 
 
-def _left_out_errors(one: _Known, calibration: CrossSpectrumCalibration) -> list[tuple[float, float, float]]:
-    """(payload, share) errors in their own standard deviations and the misfit, for each batch of an unseen run."""
+def _left_out_errors(
+    one: _Known, calibration: CrossSpectrumCalibration
+) -> list[tuple[float, float, float, float, float]]:
+    """For each batch of an unseen run: (payload, share) errors in their own standard deviations, the misfit,
+    and the errors in kg and percentage points.
+    """
     errors = []
     for batch in one.run.batches:
         spectra = cross_spectra_of([batch], calibration.reading)
@@ -185,9 +195,9 @@ def _left_out_errors(one: _Known, calibration: CrossSpectrumCalibration) -> list
             continue
         located = locate(spectra, calibration)
         std = np.sqrt(np.diag(located.load_covariance))
-        payload_z = (located.point.payload_kg - one.run.payload_kg) / std[0]
-        share_z = (located.point.front_share - one.run.front_share_pct / 100.0) / std[1]
-        errors.append((payload_z, share_z, located.misfit))
+        payload_kg = located.point.payload_kg - one.run.payload_kg
+        share = located.point.front_share - one.run.front_share_pct / 100.0
+        errors.append((payload_kg / std[0], share / std[1], located.misfit, payload_kg, 100.0 * share))
     return errors
 
 

@@ -44,8 +44,7 @@ class CrossSpectrumCalibration:
     parameters (p,) and covariance (p, p) follow ``names`` (grey_model.PARAMETERS; logarithms where
     these are positive quantities). The inflations widen standard deviations; misfit_limit is the
     largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
-    root mean squares within the band. The two left-out errors are root mean squares over batches of
-    runs that were left out of the fit (percentage points for the share); NaN where none could be.
+    root mean squares within the band.
     """
 
     empty_mass_kg: float
@@ -66,8 +65,6 @@ class CrossSpectrumCalibration:
     speed_seen_mps: tuple[float, float]
     warnings: tuple[str, ...] = ()
     version: int = 1
-    left_out_payload_rms_kg: float = math.nan
-    left_out_front_share_rms_pct: float = math.nan
 
     @property
     def ground(self) -> Ground:
