@@ -32,12 +32,14 @@ check: .venv/.development
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python docs/make_settings.py --check
+	$(BIN)/python docs/make_calibration_schema.py --check
 
 bench: .venv/.development
 	for bench in benchmarks/bench_*.py; do echo "== $$bench"; $(BIN)/python $$bench || exit 1; done
 
 docs: .venv/.development
 	$(BIN)/python docs/make_settings.py
+	$(BIN)/python docs/make_calibration_schema.py
 
 # --no-emit-*: the lock names no package index, so it serves behind any mirror.
 COMPILE = CUSTOM_COMPILE_COMMAND="make lock" .venv-lock/bin/pip-compile --quiet --generate-hashes --strip-extras \

@@ -1,5 +1,6 @@
 """From a campaign file to a calibration file, and from both to the error table of (12)."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
@@ -26,10 +27,12 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum import CrossSpectrumCalibration
 from gateway.core.estimator import estimate
 from gateway.core.known_run import KnownRun
+from gateway.core.roughness import roughness_mps2
 from gateway.core.settings import BatchSettings
+from gateway.core.spectrum import spectra_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.offline.known_runs import OnRun, SplitRun, file_sha256, split_runs
-from gateway.records import F64
+from gateway.records import F64, Batch
 
 Split = Literal["identification", "validation", "all"]
 
@@ -77,10 +80,11 @@ def calibrate(
             payload_kg=_span([run.payload_kg for run in with_batches]),
             front_share_pct=_span([run.front_share_pct for run in with_batches]),
             speed_mps=_span(speeds),
+            roughness_mps2=_roughness_span(counted),
         ),
         cross_spectrum=CrossSpectrumPart.of(cross_spectrum.calibration) if cross_spectrum else None,
         ratio_index=RatioIndexPart.of(ratio_index.calibration) if ratio_index else None,
-        expected_errors={"ratio_index": _expected(ratio_index)} if ratio_index else {},
+        expected_errors=_expected_errors(ratio_index=ratio_index, cross_spectrum=cross_spectrum),
         warnings=tuple(warnings),
         provenance=_provenance(campaign, split, command),
     )
@@ -126,10 +130,21 @@ def _span(found: Sequence[float]) -> tuple[float, float]:
     return min(found), max(found)
 
 
-def _expected(fit: RatioIndexFit) -> ExpectedErrorsPart:
-    return ExpectedErrorsPart(
-        payload_rms_kg=_rms(fit.payload_errors_kg), front_share_rms_pct=_rms(fit.front_share_errors_pct)
-    )
+def _roughness_span(batches: Sequence[Batch]) -> tuple[float, float] | None:
+    """None where no batch holds an unbroken stretch for a spectrum."""
+    found = [roughness_mps2(spectra_of(batch), batch.mean_speed_mps) for batch in batches]
+    known = [one for one in found if math.isfinite(one)]
+    return _span(known) if known else None
+
+
+def _expected_errors(**fits: RatioIndexFit | CrossSpectrumFit | None) -> dict[str, ExpectedErrorsPart]:
+    return {
+        name: ExpectedErrorsPart(
+            payload_rms_kg=_rms(fit.payload_errors_kg), front_share_rms_pct=_rms(fit.front_share_errors_pct)
+        )
+        for name, fit in fits.items()
+        if fit is not None
+    }
 
 
 def _rms(errors: F64 | None) -> float | None:

@@ -55,7 +55,12 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
     return CalibrationFile.model_validate(
         {
             "vehicle": vehicle | dict.fromkeys(absent),
-            "seen": {"payload_kg": [0.0, 400.0], "front_share_pct": [46.0, 50.0], "speed_mps": [14.0, 16.0]},
+            "seen": {
+                "payload_kg": [0.0, 400.0],
+                "front_share_pct": [46.0, 50.0],
+                "speed_mps": [14.0, 16.0],
+                "roughness_mps2": None,
+            },
             "ratio_index": RatioIndexPart.of(ratio_index_calibration(payload_kg, front_share_pct)),
             "provenance": {
                 "software": "springscale test",

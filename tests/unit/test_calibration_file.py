@@ -76,7 +76,11 @@ def test_a_lost_id_is_refused(tmp_path: Path) -> None:
 
 
 FAULTS: list[tuple[Change, str]] = [
-    (lambda c: c.update(version=2), "version 2"),
+    (lambda c: c.update(version=3), "reads up to version 2: use the springscale that wrote it"),
+    (lambda c: c.update(version=0), "version 0 was never written"),
+    (lambda c: c.update(version="2"), "version '2' was never written"),
+    (lambda c: c.update(version=True), "version True was never written"),
+    (lambda c: c.update(version=1, seen=[]), "not the shape of a calibration file of version 1"),
     (lambda c: c.update(format="else"), "not a springscale calibration file"),
     (lambda c: c.update(colour="red"), "colour: unknown key"),
     (lambda c: c["vehicle"].update(doors=5), "vehicle.doors: unknown key"),

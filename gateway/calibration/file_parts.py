@@ -1,0 +1,212 @@
+"""The parts of the calibration file: what each table of the JSON holds, and the same in the core's terms."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
+
+from gateway.core.cross_spectrum import CrossSpectrumCalibration
+from gateway.core.grey_model import PARAMETERS
+from gateway.core.ratio_index import Band, RatioIndexCalibration
+from gateway.core.regression import TERMS, RegressionModel
+from gateway.errors import CalibrationFileError
+from gateway.records import F64
+
+
+def _array(numbers: Any) -> F64:
+    found = np.asarray(numbers, dtype=float)
+    if not np.all(np.isfinite(found)):
+        raise ValueError("holds a number that is not finite")
+    return found
+
+
+Array = Annotated[
+    F64,
+    BeforeValidator(_array),
+    PlainSerializer(lambda x: x.tolist(), return_type=list[Any]),
+    WithJsonSchema({"type": "array", "items": {"anyOf": [{"type": "number"}, {"type": "array"}]}}),
+]
+
+
+class Part(BaseModel):
+    """A table of the file: unchangeable, and an unknown key is an error."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        arbitrary_types_allowed=True,
+        json_schema_serialization_defaults_required=True,  # the tool writes every key
+    )
+
+
+class RegressionPart(Part):
+    """One regression (9), (10) or (11); see core.regression.RegressionModel."""
+
+    terms: tuple[str, ...]
+    lows: Array
+    highs: Array
+    coefficients: Array
+    gram_inverse: Array
+    residual_std: float = Field(gt=0.0)
+    dof: float = Field(gt=0.0)
+
+    def for_core(self) -> RegressionModel:
+        """The same in the core's terms. Raises CalibrationFileError for a term this version does not know."""
+        unknown = sorted(set(self.terms) - set(TERMS))
+        if unknown:
+            raise CalibrationFileError(f"regression terms {unknown} are not known to this version of springscale")
+        return RegressionModel(**dict(self))
+
+
+class RatioIndexPart(Part):
+    """The ratio index of this vehicle; bands are [centre Hz, width Hz], numerator first."""
+
+    spectrum: Literal["amplitude", "power"]
+    n_segment: int = Field(ge=64)
+    acceleration_bands: tuple[tuple[float, float], tuple[float, float]] | None
+    pitch_rate_bands: tuple[tuple[float, float], tuple[float, float]] | None
+    payload: RegressionPart | None
+    front_share: RegressionPart | None
+    speed_range_mps: tuple[float, float]
+    speed_std_max_mps: float = Field(gt=0.0)
+
+    @classmethod
+    def of(cls, calibration: RatioIndexCalibration) -> "RatioIndexPart":
+        """The core's calibration as the file holds it."""
+        return cls(
+            spectrum=calibration.spectrum,
+            n_segment=calibration.n_segment,
+            acceleration_bands=_from_bands(calibration.acceleration_bands),
+            pitch_rate_bands=_from_bands(calibration.pitch_rate_bands),
+            payload=_regression_part(calibration.payload),
+            front_share=_regression_part(calibration.front_share),
+            speed_range_mps=calibration.speed_range_mps,
+            speed_std_max_mps=calibration.speed_std_max_mps,
+        )
+
+    def for_core(self) -> RatioIndexCalibration:
+        """The same in the core's terms."""
+        return RatioIndexCalibration(
+            spectrum=self.spectrum,
+            n_segment=self.n_segment,
+            acceleration_bands=_to_bands(self.acceleration_bands),
+            pitch_rate_bands=_to_bands(self.pitch_rate_bands),
+            payload=self.payload.for_core() if self.payload else None,
+            front_share=self.front_share.for_core() if self.front_share else None,
+            speed_range_mps=self.speed_range_mps,
+            speed_std_max_mps=self.speed_std_max_mps,
+        )
+
+
+def _from_bands(bands: tuple[Band, Band] | None) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    if bands is None:
+        return None
+    return (bands[0].centre_hz, bands[0].width_hz), (bands[1].centre_hz, bands[1].width_hz)
+
+
+def _to_bands(bands: tuple[tuple[float, float], tuple[float, float]] | None) -> tuple[Band, Band] | None:
+    return None if bands is None else (Band(*bands[0]), Band(*bands[1]))
+
+
+def _regression_part(model: RegressionModel | None) -> RegressionPart | None:
+    if model is None:
+        return None
+    return RegressionPart(**{name: getattr(model, name) for name in RegressionPart.model_fields})
+
+
+class CrossSpectrumPart(Part):
+    """The half-car of this vehicle; see core.cross_spectrum.CrossSpectrumCalibration."""
+
+    empty_mass_kg: float = Field(gt=0.0)
+    empty_front_share_pct: float
+    wheelbase_m: float = Field(gt=0.0)
+    band_hz: tuple[float, float]
+    n_segment: int = Field(ge=64)
+    names: tuple[str, ...]
+    parameters: Array
+    covariance: Array
+    payload_inflation: float = Field(gt=0.0)
+    front_share_inflation: float = Field(gt=0.0)
+    misfit_limit: float = Field(gt=0.0)
+    acceleration_rms_mps2: float = Field(gt=0.0)
+    pitch_rate_rms_radps: float = Field(gt=0.0)
+    payload_seen_kg: tuple[float, float]
+    front_share_seen_pct: tuple[float, float]
+    speed_seen_mps: tuple[float, float]
+    warnings: tuple[str, ...] = ()
+    version: int = 1
+
+    @classmethod
+    def of(cls, calibration: CrossSpectrumCalibration) -> "CrossSpectrumPart":
+        """The core's calibration as the file holds it."""
+        return cls(**{name: getattr(calibration, name) for name in cls.model_fields})
+
+    def for_core(self) -> CrossSpectrumCalibration:
+        """The same in the core's terms. Raises CalibrationFileError where the model has other parameters today."""
+        if self.names != tuple(PARAMETERS):
+            raise CalibrationFileError(
+                "the cross_spectrum part was fitted with another vehicle model than this springscale has: "
+                "calibrate again"
+            )
+        return CrossSpectrumCalibration(**dict(self))
+
+
+class VehiclePart(Part):
+    """The vehicle as the campaign stated it."""
+
+    name: str
+    empty_mass_kg: float = Field(gt=0.0)
+    wheelbase_m: float = Field(gt=0.0)
+    empty_front_share_pct: float
+    sensor_position_m: float
+    payload_range_kg: tuple[float, float]
+    front_share_range_pct: tuple[float, float]
+    sensor_position_std_m: float
+    empty_front_share_std_pct: float
+    sensor_offset_left_m: float
+    unsprung_front_kg: float | None
+    unsprung_rear_kg: float | None
+    kerb_front_axle_kg: float | None
+    kerb_rear_axle_kg: float | None
+    wheel_radius_m: float | None
+    front_axle_limit_kg: float | None
+    rear_axle_limit_kg: float | None
+    gross_limit_kg: float | None
+
+
+class SeenPart(Part):
+    """What the identification runs covered: the ranges of validity."""
+
+    payload_kg: tuple[float, float]
+    front_share_pct: tuple[float, float]
+    speed_mps: tuple[float, float]
+    roughness_mps2: tuple[float, float] | None = Field(
+        description="of the roads: vertical acceleration, root mean square from 1 to 15 Hz, brought to 80 km/h"
+    )
+
+
+class RunPart(Part):
+    """One known-load drive: where its numbers come from."""
+
+    number: int
+    log: str
+    sha256: str
+    payload_kg: float
+    front_share_pct: float
+    n_batches: int
+
+
+class ProvenancePart(Part):
+    """Enough to repeat the calibration."""
+
+    software: str
+    command: str
+    campaign_sha256: str
+    runs: tuple[RunPart, ...]
+
+
+class ExpectedErrorsPart(Part):
+    """Errors on runs left out of the fit, over the identification part (root mean square)."""
+
+    payload_rms_kg: float | None
+    front_share_rms_pct: float | None
