@@ -93,6 +93,19 @@ class WebSection(Section):
     host: str = Field("127.0.0.1", description="address to listen on")
     port: int = Field(8000, ge=0, le=65535, description="port to listen on; 0 takes a free one")
     stale_after_s: Seconds = Field(900.0, description="an estimate older than this is marked stale")
+    tls_certificate: Path | None = Field(None, description="PEM file of the certificate chain; makes it HTTPS")
+    tls_key: Path | None = Field(None, description="PEM file of the certificate's private key")
+    tls_client_ca: Path | None = Field(
+        None, description="PEM file of the authority whose certificates clients must show (mutual TLS)"
+    )
+
+    @model_validator(mode="after")
+    def _whole_tls(self) -> "WebSection":
+        if (self.tls_certificate is None) != (self.tls_key is None):
+            raise ValueError("tls_certificate and tls_key belong together: give both or neither")
+        if self.tls_client_ca is not None and self.tls_certificate is None:
+            raise ValueError("tls_client_ca needs tls_certificate and tls_key")
+        return self
 
 
 class StoreSection(Section):
@@ -158,6 +171,8 @@ def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:
     changed: dict[str, Any] = {
         "store": settings.store.model_copy(update={"directory": folder / settings.store.directory})
     }
+    tls = {key: getattr(settings.web, key) for key in ("tls_certificate", "tls_key", "tls_client_ca")}
+    changed["web"] = settings.web.model_copy(update={key: folder / path for key, path in tls.items() if path})
     if settings.calibration is not None:
         changed["calibration"] = folder / settings.calibration
     if not settings.signals.startswith("springscale:"):

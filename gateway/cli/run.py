@@ -1,6 +1,7 @@
 """springscale run: the service."""
 
 import os
+from functools import partial
 from pathlib import Path
 
 import click
@@ -16,6 +17,7 @@ from gateway.service.log import set_up_log
 @click.option("--config", "config_path", type=FILE, required=True, help="springscale.toml")
 def run(config_path: Path) -> None:
     """Read the bus, estimate, store and serve until SIGTERM."""
-    settings = load_settings(config_path)
+    load = partial(load_settings, config_path)
+    settings = load()
     set_up_log(settings.log.level, under_journald="JOURNAL_STREAM" in os.environ)
-    Gateway(settings, setup_of(settings)).run()
+    Gateway(settings, setup_of(settings), load=load).run()

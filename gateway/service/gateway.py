@@ -17,6 +17,7 @@ from gateway.offline.estimates import Setup
 from gateway.service.log import log_event
 from gateway.service.notify import Notifier
 from gateway.service.pipeline import Pipeline
+from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
 from gateway.store import Retention, Store
 from gateway.web import Board, TokenFile, create_app, refuse_open_address, server_config
@@ -44,7 +45,15 @@ class _Server(uvicorn.Server):
 class Gateway:
     """One vehicle's service. :meth:`run` returns when it was asked to stop, and raises when a part died."""
 
-    def __init__(self, settings: Settings, setup: Setup, *, on_started: OnStarted = lambda gateway: None) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        setup: Setup,
+        *,
+        load: LoadSettings | None = None,
+        on_started: OnStarted = lambda gateway: None,
+    ) -> None:
+        """``load`` reads the settings anew for a reload; without it a reload finds them unchanged."""
         self._settings = settings
         self._on_started = on_started
         token_file = TokenFile(settings.store.directory / "tokens.json")
@@ -74,7 +83,9 @@ class Gateway:
         self.status = StatusReport(settings, setup, self.source, self.pipeline, self.store, self.board)
         calibrated = setup.calibration.for_core() if setup.calibration else None
         app = create_app(self.board, self.store.reader(), self.status, calibrated=calibrated, tokens=tokens)
-        self._server = _Server(server_config(app, settings.web.host, settings.web.port))
+        web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
+        self._server = _Server(web)
+        self._reload = Reloader(settings, load or (lambda: settings), web)
         self._notifier = Notifier()
         self._stopping = asyncio.Event()
         self._failure: str | None = None
@@ -83,7 +94,8 @@ class Gateway:
     def url(self) -> str:
         """Where the dashboard is, once started."""
         port = self._server.servers[0].sockets[0].getsockname()[1]
-        return f"http://{self._settings.web.host}:{port}"
+        scheme = "https" if self._server.config.is_ssl else "http"
+        return f"{scheme}://{self._settings.web.host}:{port}"
 
     @property
     def has_caught_up(self) -> bool:
@@ -104,6 +116,7 @@ class Gateway:
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.request_stop)
+        loop.add_signal_handler(signal.SIGHUP, self._reload_told)
         self.source.start()
         self.pipeline.start()
         self.store.write_event("started", {"interface": self._settings.bus.interface})
@@ -114,6 +127,14 @@ class Gateway:
         self._server.should_exit = True
         await serving
         self._notifier.close()
+
+    def _reload_told(self) -> None:
+        """Reload, and tell systemd when it begins and ends; before the start is over all is fresh anyway."""
+        if not self._server.started:
+            return
+        self._notifier.send_reloading()
+        self._reload()
+        self._notifier.send(READY="1")
 
     async def _serve_web(self) -> None:
         """uvicorn until it ends; it leaves by SystemExit where it cannot start, which must not pass a task."""

@@ -47,6 +47,11 @@ def set_up_log(level: str, *, under_journald: bool) -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(PlainFormatter() if sys.stderr.isatty() else JsonFormatter(with_priority=under_journald))
     logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
+    set_log_level(level)
+
+
+def set_log_level(level: str) -> None:
+    """The least level of our own events that is written: debug, info, warning or error."""
     LOGGER.setLevel(level.upper())
 
 

@@ -3,7 +3,7 @@
 from gateway.web.app import create_app
 from gateway.web.board import Board
 from gateway.web.reader import Reader
-from gateway.web.serving import Tls, refuse_open_address, server_config
+from gateway.web.serving import Tls, refuse_open_address, renew_certificate, server_config
 from gateway.web.settings import WebSettings
 from gateway.web.status import (
     BatchCounts,
@@ -33,5 +33,6 @@ __all__ = [
     "WebSettings",
     "create_app",
     "refuse_open_address",
+    "renew_certificate",
     "server_config",
 ]

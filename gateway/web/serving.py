@@ -51,6 +51,17 @@ def server_config(app: FastAPI, host: str, port: int, tls: Tls | None = None) ->
     )
 
 
+def renew_certificate(config: uvicorn.Config, tls: Tls) -> None:
+    """Give connections from now on the certificate and key that the files hold now; open ones keep theirs.
+
+    Raises ConfigurationError, and changes nothing, for files that cannot be used. Trusted client authorities stay
+    as they are: a context can only learn more of them, never forget one.
+    """
+    _tls_settings(tls)  # tried elsewhere first: a key that does not fit would leave the context half changed
+    if config.ssl is not None:
+        config.ssl.load_cert_chain(tls.certificate, tls.key)
+
+
 def _tls_settings(tls: Tls) -> dict[str, Any]:
     """Checked here, so that a wrong file is a clear line at the start and not a traceback."""
     try:

@@ -1,0 +1,72 @@
+"""What SIGHUP changes in a running service: the log's level and the web's certificate. The rest wants a restart.
+
+A calibration or a signal map in the middle of a batch would make numbers that no offline run could repeat, so they
+begin with a restart, which takes about two seconds and loses the open window only. Access tokens need neither: the
+service follows their file.
+"""
+
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final
+
+import uvicorn
+
+from gateway.config import Settings
+from gateway.errors import SpringscaleError
+from gateway.service.log import log_event, set_log_level
+from gateway.web import Tls, renew_certificate
+
+LIVE: Final = frozenset({"log.level", "web.tls_certificate", "web.tls_key"})
+
+LoadSettings = Callable[[], Settings]
+
+
+class Reloader:
+    """Reads the settings anew and applies what can change live; what it cannot use changes nothing."""
+
+    def __init__(self, running: Settings, load: LoadSettings, web: uvicorn.Config) -> None:
+        self._running = running
+        self._load = load
+        self._web = web
+
+    def __call__(self) -> bool:
+        """True where the settings as they are now were good; the log tells what changed and what waits."""
+        try:
+            wanted = self._load()
+            tls = tls_of(wanted)
+            if tls is not None and self._web.is_ssl:
+                renew_certificate(self._web, tls)
+        except SpringscaleError as fault:
+            log_event("reload refused, everything stays as it was", level=logging.ERROR, fault=str(fault))
+            return False
+        waiting = [key for key in changed_keys(self._running, wanted) if not self._is_live(key, tls)]
+        level = logging.WARNING if waiting else logging.INFO
+        log_event("reloaded", level=level, log_level=wanted.log.level, waits_for_restart=waiting)
+        set_log_level(wanted.log.level)  # last: "warning" would hide that it was done
+        return True
+
+    def _is_live(self, key: str, tls: Tls | None) -> bool:
+        """Turning TLS on or off changes the listening socket: for that a certificate's path is not live."""
+        return key in LIVE and (not key.startswith("web.tls") or self._web.is_ssl == (tls is not None))
+
+
+def tls_of(settings: Settings) -> Tls | None:
+    """The certificate files these settings name; None for plain HTTP."""
+    web = settings.web
+    if web.tls_certificate is None or web.tls_key is None:
+        return None
+    return Tls(web.tls_certificate, web.tls_key, web.tls_client_ca)
+
+
+def changed_keys(old: Settings, new: Settings) -> list[str]:
+    """Keys such as bus.channel that stand differently in the two, in alphabetical order."""
+    before, after = dict(_leaves(old.model_dump())), dict(_leaves(new.model_dump()))
+    return sorted(key for key in before.keys() | after.keys() if before.get(key) != after.get(key))
+
+
+def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, setting in table.items():
+        if isinstance(setting, Mapping):
+            yield from _leaves(setting, f"{prefix}{key}.")
+        else:
+            yield prefix + key, setting

@@ -1,0 +1,164 @@
+"""A reload applies what can change live, names what waits for a restart, and survives every mistake."""
+
+import logging
+import socket
+import ssl
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import trustme
+from support.web import Gateway, Server, serving
+
+from gateway.config import Settings, load_settings
+from gateway.errors import ConfigurationError
+from gateway.service.log import LOGGER, set_log_level
+from gateway.service.notify import Notifier
+from gateway.service.reload import Reloader, changed_keys, tls_of
+from gateway.web import server_config
+
+PLAIN = 'signals = "springscale:reference"\n'
+TLS = PLAIN + '[web]\ntls_certificate = "web.pem"\ntls_key = "web.key"\n'
+
+
+@pytest.fixture(autouse=True)
+def _log_level() -> Iterator[None]:
+    level = LOGGER.level
+    yield
+    LOGGER.setLevel(level)
+
+
+def settings_of(folder: Path, text: str) -> Settings:
+    (folder / "springscale.toml").write_text(text)
+    return load_settings(folder / "springscale.toml")
+
+
+def issue(folder: Path) -> trustme.CA:
+    """A new certificate of a new authority in the files that TLS names."""
+    authority = trustme.CA()
+    made = authority.issue_cert("127.0.0.1")
+    made.private_key_pem.write_to_path(folder / "web.key")
+    made.cert_chain_pems[0].write_to_path(folder / "web.pem")
+    return authority
+
+
+def trusts(authority: trustme.CA, server: Server) -> bool:
+    """Whether a client that knows only this authority accepts the server now."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    authority.configure_trust(context)
+    address = server.socket.getsockname()
+    try:
+        with (
+            socket.create_connection(address, timeout=10.0) as plain,
+            context.wrap_socket(plain, server_hostname="127.0.0.1"),
+        ):
+            return True
+    except ssl.SSLCertVerificationError:
+        return False
+
+
+@pytest.fixture
+def secure(tmp_path: Path) -> Iterator[tuple[trustme.CA, Server, Reloader]]:
+    """A server with a certificate, and the reloader of its settings."""
+    authority = issue(tmp_path)
+    settings = settings_of(tmp_path, TLS)
+    with Gateway(tmp_path) as gateway:
+        config = server_config(gateway.app, "127.0.0.1", 0, tls_of(settings))
+        with serving(gateway.app, config) as server:
+            yield authority, server, Reloader(settings, lambda: load_settings(tmp_path / "springscale.toml"), config)
+
+
+def test_a_renewed_certificate_is_shown_from_the_next_connection_on(
+    secure: tuple[trustme.CA, Server, Reloader], tmp_path: Path
+) -> None:
+    old, server, reload = secure
+    assert trusts(old, server)
+    new = issue(tmp_path)
+    assert not trusts(new, server)
+    assert reload()
+    assert trusts(new, server)
+    assert not trusts(old, server)
+
+
+@pytest.mark.parametrize("broken", ["web.key", "web.pem", "springscale.toml"])
+def test_a_file_that_cannot_be_used_changes_nothing(
+    broken: str, secure: tuple[trustme.CA, Server, Reloader], tmp_path: Path
+) -> None:
+    old, server, reload = secure
+    issue(tmp_path)
+    (tmp_path / broken).write_text("[nonsense")
+    assert not reload()
+    assert trusts(old, server)
+
+
+def test_a_key_that_does_not_fit_changes_nothing(secure: tuple[trustme.CA, Server, Reloader], tmp_path: Path) -> None:
+    old, server, reload = secure
+    certificate = (tmp_path / "web.pem").read_bytes()
+    issue(tmp_path)
+    (tmp_path / "web.pem").write_bytes(certificate)
+    assert not reload()
+    assert trusts(old, server)
+
+
+def reloaded(folder: Path, before: str, after: str, caplog: pytest.LogCaptureFixture) -> list[str]:
+    """What a reload says waits for a restart."""
+    if "tls" in before + after:
+        issue(folder)
+    settings = settings_of(folder, before)
+    with Gateway(folder) as gateway:
+        config = server_config(gateway.app, "127.0.0.1", 0, tls_of(settings))
+        set_log_level("info")
+        assert Reloader(settings, lambda: settings_of(folder, after), config)()
+    waiting: list[str] = caplog.records[-1].fields["waits_for_restart"]  # type: ignore[attr-defined]
+    return waiting
+
+
+def test_the_log_level_changes_at_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    assert reloaded(tmp_path, PLAIN, PLAIN + '[log]\nlevel = "warning"\n', caplog) == []
+    assert LOGGER.level == logging.WARNING
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "waiting"),
+    [
+        (PLAIN, PLAIN + '[bus]\nchannel = "can1"\n', ["bus.channel"]),
+        (PLAIN, 'calibration = "other.json"\n' + PLAIN, ["calibration"]),
+        (PLAIN, TLS, ["web.tls_certificate", "web.tls_key"]),
+        (TLS, PLAIN, ["web.tls_certificate", "web.tls_key"]),
+        (PLAIN, PLAIN, []),
+    ],
+)
+def test_what_cannot_change_live_is_named(
+    before: str, after: str, waiting: list[str], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert reloaded(tmp_path, before, after, caplog) == waiting
+
+
+def test_changed_keys_name_table_and_key(tmp_path: Path) -> None:
+    one = settings_of(tmp_path, PLAIN)
+    other = settings_of(tmp_path, PLAIN + '[vehicle]\nid = "van-17"\n[bus]\noptions = { bitrate = 5 }\n')
+    assert changed_keys(one, other) == ["bus.options.bitrate", "vehicle.id"]
+
+
+@pytest.mark.parametrize("half", ['tls_certificate = "a"', 'tls_key = "a"', 'tls_client_ca = "a"'])
+def test_half_of_a_tls_configuration_is_refused(half: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match="web: tls_"):
+        settings_of(tmp_path, PLAIN + f"[web]\n{half}\n")
+
+
+def test_tls_files_are_found_beside_the_configuration(tmp_path: Path) -> None:
+    tls = tls_of(settings_of(tmp_path, TLS))
+    assert tls is not None
+    assert (tls.certificate, tls.key, tls.client_ca) == (tmp_path / "web.pem", tmp_path / "web.key", None)
+
+
+def test_systemd_is_told_when_a_reload_begins(tmp_path: Path) -> None:
+    address = str(tmp_path / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(address)
+        notifier = Notifier({"NOTIFY_SOCKET": address})
+        notifier.send_reloading()
+        told = dict(line.split("=") for line in listener.recv(4096).decode().split("\n"))
+        notifier.close()
+    assert told["RELOADING"] == "1"
+    assert int(told["MONOTONIC_USEC"]) > 0
