@@ -11,8 +11,11 @@ FIRST_VERSION: Final = 1
 
 
 def _to_version_2(content: Content) -> None:
-    """Version 2 says over which roads it was calibrated."""
+    """Version 2 says over which roads it was calibrated, and the expected errors of every estimator."""
     content["seen"]["roughness_mps2"] = None
+    for estimator in ("cross_spectrum", "ratio_index"):
+        if content[estimator] is not None:
+            content["expected_errors"].setdefault(estimator, {"payload_rms_kg": None, "front_share_rms_pct": None})
 
 
 # Entry v turns version v into v + 1. Entries are never edited, only added.

@@ -1,0 +1,77 @@
+"""Files of older versions are read: what they said stays, what they did not say is unknown, their id is kept."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.calibrated import calibration_file
+
+from gateway.calibration.file import VERSION, content_id, load_calibration
+from gateway.calibration.file_migration import FIRST_VERSION, MIGRATIONS, migrated
+
+SHIPPED = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
+
+
+def first_version() -> dict[str, Any]:
+    """Today's made-up file as version 1 would have had it."""
+    content: dict[str, Any] = json.loads(calibration_file().to_json())
+    del content["migrated_from"], content["seen"]["roughness_mps2"]
+    content["version"] = 1
+    content["id"] = content_id(content)
+    return content
+
+
+def test_there_is_a_step_from_every_version_to_the_next() -> None:
+    assert set(MIGRATIONS) == set(range(FIRST_VERSION, VERSION))
+
+
+def test_an_old_file_keeps_its_id_and_all_it_said(tmp_path: Path) -> None:
+    old = first_version()
+    path = tmp_path / "van.json"
+    path.write_text(json.dumps(old))
+    today = load_calibration(path)
+    assert today.version == VERSION
+    assert today.id == today.migrated_from == today.for_core().id == old["id"]
+    assert today.seen.roughness_mps2 is None
+    said = json.loads(today.to_json())
+    assert said["expected_errors"] == {"ratio_index": {"payload_rms_kg": None, "front_share_rms_pct": None}}
+    for part in ("vehicle", "ratio_index", "cross_spectrum", "warnings", "provenance"):
+        assert said[part] == old[part]
+    assert said["seen"].items() >= old["seen"].items()
+
+
+def test_a_migrated_file_written_anew_is_read_as_the_same_calibration(tmp_path: Path) -> None:
+    path = tmp_path / "van.json"
+    path.write_text(json.dumps(first_version()))
+    today = load_calibration(path)
+    path.write_text(today.to_json())
+    again = load_calibration(path)
+    assert again.to_json() == today.to_json()
+    assert again.id == first_version()["id"]
+    assert json.loads(path.read_text())["id"] == again.content_id != again.id
+
+
+def test_a_damaged_old_file_is_refused_before_it_is_migrated(tmp_path: Path) -> None:
+    old = first_version()
+    old["vehicle"]["empty_mass_kg"] += 1.0
+    path = tmp_path / "van.json"
+    path.write_text(json.dumps(old))
+    with pytest.raises(Exception, match="does not match its id"):
+        load_calibration(path)
+
+
+def test_migration_leaves_what_it_was_given_alone() -> None:
+    old = first_version()
+    before = json.dumps(old)
+    assert migrated(old, VERSION) is not old
+    assert json.dumps(old) == before
+    assert migrated(old, 1) is old
+
+
+def test_the_shipped_calibration_is_of_the_first_version_and_still_loads() -> None:
+    content = json.loads(SHIPPED.read_text())
+    assert content["version"] == 1
+    shipped = load_calibration(SHIPPED)
+    assert shipped.id == content["id"]
+    assert shipped.for_core().cross_spectrum is not None
