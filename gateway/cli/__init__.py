@@ -25,6 +25,7 @@ _COMMANDS = {
     "reproduce": ("gateway.cli.reproduce", "reproduce", "The paper's section 4 with our simulator, as a report."),
     "run": ("gateway.cli.run", "run", "The service."),
     "simulate": ("gateway.cli.simulate", "simulate", "Simulated drives, as logs or onto a bus."),
+    "study": ("gateway.cli.study", "study", "What a calibration is worth, found out by experiment."),
     "token": ("gateway.cli.token", "token_commands", "Who may ask the gateway from elsewhere."),
 }
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gateway.core.cross_spectra import CrossSpectra
+from gateway.core.cross_spectra import CrossSpectra, Reading
 from gateway.core.cross_spectrum import CrossSpectrumCalibration
-from gateway.core.grey_model import INDEX, expected_spectra, spectral_model
+from gateway.core.grey_model import INDEX, Ground, expected_spectra, spectral_model
 from gateway.core.likelihood import Point, Whittle
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import F64
@@ -54,30 +54,31 @@ def cramer_rao(
     priors = dict(unknown or {})
     free = [INDEX[name] for name in priors]
     point = Point(calibration.parameters, payload_kg, front_share_pct / 100.0)
-    whittle = Whittle(_expected(_steady_spectra(calibration, drive), point, calibration), calibration.ground)
+    spectra = expected_of(steady_spectra(calibration.reading, drive), point, calibration.ground)
+    whittle = Whittle(spectra, calibration.ground)
     information = whittle.curvature(point, free, is_load_free=True).information
     information += np.diag(np.r_[np.array(list(priors.values())) ** -2.0, 0.0, 0.0])
     payload_var, share_var = np.diag(np.linalg.inv(information))[-2:]
     return Bound(float(np.sqrt(payload_var)), 100.0 * float(np.sqrt(share_var)))
 
 
-def _expected(spectra: CrossSpectra, point: Point, calibration: CrossSpectrumCalibration) -> CrossSpectra:
-    """The spectra such a drive would show on average."""
+def expected_of(spectra: CrossSpectra, point: Point, ground: Ground) -> CrossSpectra:
+    """The spectra such a drive would show on average: ``spectra`` with what the model says at ``point``."""
     model = spectral_model(
-        point.theta, np.array(point.payload_kg), np.array(point.front_share), calibration.ground, spectra.freq_hz
+        point.theta, np.array(point.payload_kg), np.array(point.front_share), ground, spectra.freq_hz
     )
     acceleration, pitch_rate, cross = expected_spectra(model, spectra)
     return replace(spectra, acceleration=acceleration, pitch_rate=pitch_rate, cross=cross)
 
 
-def _steady_spectra(calibration: CrossSpectrumCalibration, drive: Drive) -> CrossSpectra:
+def steady_spectra(reading: Reading, drive: Drive) -> CrossSpectra:
     """As many half-overlapping segments as the drive holds, all at one speed; spectra still to be filled in."""
-    n_segment, (low_hz, high_hz) = calibration.n_segment, calibration.band_hz
+    n_segment, (low_hz, high_hz) = reading.n_segment, reading.band_hz
     every_hz = frequencies_hz(n_segment, RATE_HZ)
     step_hz = every_hz[1]
     freq_hz = every_hz[(every_hz >= low_hz - step_hz) & (every_hz <= high_hz + step_hz)]
     n = max(1.0, np.floor(2.0 * drive.duration_s * RATE_HZ / n_segment) - 1.0)
-    delay_s = calibration.wheelbase_m / drive.speed_mps
+    delay_s = reading.wheelbase_m / drive.speed_mps
     ones: F64 = np.ones((1, len(freq_hz) - 2))
     return CrossSpectra(
         freq_hz=freq_hz,

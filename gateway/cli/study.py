@@ -1,0 +1,61 @@
+"""springscale study: what a calibration is worth, found out by experiment. Each takes minutes."""
+
+from pathlib import Path
+
+import click
+
+from gateway.calibration.campaign import load_campaign
+from gateway.cli.options import FILE, as_json, batch_settings, window
+from gateway.cli.progress import bar
+from gateway.cli.study_text import learning_curve_table
+from gateway.config import ESTIMATOR_NAMES
+from gateway.offline.learning_curve import MOST_SUBSETS, SEED
+from gateway.offline.learning_curve import learning_curve as study_learning_curve
+from gateway.records import json_line
+
+_estimators = click.option(
+    "--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]"
+)
+_seed = click.option("--seed", type=click.IntRange(min=0), default=SEED, show_default=True)
+
+
+@click.group("study")
+def study() -> None:
+    """How good is a calibration? Found out by experiment; each study takes minutes."""
+
+
+@study.command("learning-curve")
+@click.argument("campaign", type=FILE)
+@_estimators
+@click.option(
+    "--subsets",
+    "most_subsets",
+    type=click.IntRange(min=1),
+    default=MOST_SUBSETS,
+    show_default=True,
+    help="choices of runs to try for each number of runs",
+)
+@_seed
+@window
+@as_json
+def learning_curve(
+    campaign: Path, estimators: tuple[str, ...], most_subsets: int, seed: int, window_s: float | None, as_json: bool
+) -> None:
+    """How accurate would CAMPAIGN be with 2, 3, 4, 6, 10 of its runs? Found by leaving runs out."""
+    loaded = load_campaign(campaign)
+    with bar(len(loaded.runs), "reading drives") as progress:
+
+        def on_trial(done: int, of: int) -> None:
+            progress.label, progress.length = "calibrating and judging", of
+            progress.update(done - progress.pos)
+
+        curve = study_learning_curve(
+            loaded,
+            batch_settings(window_s),
+            estimators=estimators or ESTIMATOR_NAMES,
+            most_subsets=most_subsets,
+            seed=seed,
+            on_run=lambda done, of: progress.update(done - progress.pos),
+            on_trial=on_trial,
+        )
+    click.echo(json_line(curve.to_json()) if as_json else learning_curve_table(curve))
