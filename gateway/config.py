@@ -116,6 +116,35 @@ class StoreSection(Section):
     max_size_mb: float = Field(512.0, ge=4.0, description="the oldest records are removed beyond this size")
 
 
+class UplinkSection(Section):
+    """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that nobody can ask."""
+
+    host: str | None = Field(None, min_length=1, description="the broker; without it nothing is forwarded")
+    port: int | None = Field(None, ge=1, le=65535, description="its port [default: 8883 with TLS, 1883 without]")
+    tls: bool = Field(True, description="encrypted, the broker's certificate checked")
+    ca: Path | None = Field(
+        None, description="PEM file of the authority that signed the broker's certificate [default: the system's]"
+    )
+    certificate: Path | None = Field(None, description="PEM file of our certificate, for a broker that asks for one")
+    key: Path | None = Field(None, description="PEM file of its key")
+    username: str | None = Field(None, description="name under which the broker knows us")
+    password_file: Path | None = Field(None, description="file that holds nothing but the password")
+    topic: str = Field("springscale/{vehicle_id}", min_length=1, description="branch below which this vehicle reports")
+    client_id: str | None = Field(None, min_length=1, description="[default: springscale- and the vehicle's id]")
+    keep_alive_s: int = Field(60, ge=5, le=3600, description="the link is probed after this long without traffic")
+    back_off_max_s: Seconds = Field(300.0, description="longest pause between two tries to connect")
+
+    @model_validator(mode="after")
+    def _keeps_its_secrets(self) -> "UplinkSection":
+        if (self.certificate is None) != (self.key is None):
+            raise ValueError("certificate and key belong together: give both or neither")
+        if self.password_file is not None and self.username is None:
+            raise ValueError("password_file needs username")
+        if self.password_file is not None and not self.tls and self.host not in {"127.0.0.1", "::1", "localhost"}:
+            raise ValueError("a password would cross the network in the clear: set tls = true")
+        return self
+
+
 class LogSection(Section):
     """What the service writes to its log."""
 
@@ -141,6 +170,7 @@ class Settings(BaseSettings):
     batch: BatchSection = BatchSection()
     web: WebSection = WebSection()
     store: StoreSection = StoreSection()
+    uplink: UplinkSection = UplinkSection()
     log: LogSection = LogSection()
 
     @classmethod
@@ -173,6 +203,8 @@ def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:
     }
     tls = {key: getattr(settings.web, key) for key in ("tls_certificate", "tls_key", "tls_client_ca")}
     changed["web"] = settings.web.model_copy(update={key: folder / path for key, path in tls.items() if path})
+    files = settings.uplink.model_dump(include={"ca", "certificate", "key", "password_file"}, exclude_none=True)
+    changed["uplink"] = settings.uplink.model_copy(update={name: folder / path for name, path in files.items()})
     if settings.calibration is not None:
         changed["calibration"] = folder / settings.calibration
     if not settings.signals.startswith("springscale:"):

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from gateway.store.rows import EstimateRow, Row
+from gateway.store.rows import DeliveryRow, EstimateRow, Row
 
 SEQ_STRIDE: Final = 1 << 20  # each opening of a database begins a new stride
 
@@ -39,12 +39,26 @@ class Held:
         """Go on in a database that was found later, behind what it already holds."""
         with self._changed:
             self._epoch, self._next_seq = epoch, _after(last_seq)
-            self._waiting = deque(self._renumbered(row) for row in self._waiting)
+            kept = (row for row in self._waiting if not isinstance(row, DeliveryRow))  # in numbers that are void now
+            self._waiting = deque(self._renumbered(row) for row in kept)
 
     def add(self, row: Row) -> None:
         """Accept an event or a calibration."""
         with self._changed:
             self._append(row)
+
+    def add_delivery(self, name: str, cursor: str) -> bool:
+        """Accept how far an uplink has delivered, in place of what waits of it; False for another epoch's cursor."""
+        with self._changed:
+            epoch, _, digits = cursor.partition("-")
+            if epoch != self._epoch:
+                return False
+            newest = DeliveryRow(name, int(digits))
+            self._waiting = deque(
+                row for row in self._waiting if not (isinstance(row, DeliveryRow) and row.name == newest.name)
+            )
+            self._append(newest)
+            return True
 
     def add_estimate(self, make_row: Callable[[int], EstimateRow]) -> str:
         """Accept an estimate made with the number it gets here; its cursor."""

@@ -57,6 +57,15 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
+class Delivery:
+    """How far an uplink has delivered. ``n_pruned`` estimates were removed by retention before it could."""
+
+    cursor: str | None
+    n_pruned: int
+    n_waiting: int
+
+
+@dataclass(frozen=True, slots=True)
 class _Window:
     """Which rows are asked for."""
 
@@ -155,6 +164,17 @@ class StoreReader:
         """A calibration's JSON by its hash."""
         rows = self._ask("SELECT text FROM calibrations WHERE id = ?", (calibration_id,))
         return rows[0][0] if rows else None
+
+    def delivery(self, uplink: str) -> Delivery:
+        """How far ``uplink`` has delivered, as it is on disk; the cursor is None before its first delivery."""
+        with self._connection() as connection:
+            if connection is None:
+                return Delivery(None, 0, 0)
+            epoch = connection.execute("SELECT id FROM epochs").fetchone()
+            found = connection.execute("SELECT seq, n_pruned FROM uplinks WHERE name = ?", (uplink,)).fetchone()
+            seq, n_pruned = found or (-1, 0)
+            n_waiting = connection.execute("SELECT count(*) FROM estimates WHERE seq > ?", (seq,)).fetchone()[0]
+        return Delivery(f"{epoch[0]}-{seq}" if found and epoch else None, n_pruned, n_waiting)
 
     def _ask(self, sql: str, parameters: tuple[Any, ...]) -> list[tuple[Any, ...]]:
         with self._connection() as connection:

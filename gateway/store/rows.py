@@ -48,7 +48,19 @@ class CalibrationRow:
     text: str
 
 
-Row = EstimateRow | EventRow | CalibrationRow
+@dataclass(frozen=True, slots=True)
+class DeliveryRow:
+    """How far an uplink has delivered: every estimate up to number ``seq``."""
+
+    INSERT: ClassVar[str] = (
+        "INSERT INTO uplinks (name, seq) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET seq = excluded.seq"
+    )
+
+    name: str
+    seq: int
+
+
+Row = EstimateRow | EventRow | CalibrationRow | DeliveryRow
 
 
 def bound(row: Row) -> tuple[Any, ...]:

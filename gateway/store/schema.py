@@ -38,6 +38,18 @@ MIGRATIONS: Final[tuple[str, ...]] = (
         text TEXT NOT NULL
     );
     """,
+    # how far each uplink has delivered, and what retention took from it before it could
+    """
+    CREATE TABLE uplinks (
+        name TEXT PRIMARY KEY,
+        seq INTEGER NOT NULL,
+        n_pruned INTEGER NOT NULL DEFAULT 0
+    );
+    CREATE TRIGGER pruned_before_delivery AFTER DELETE ON estimates
+    BEGIN
+        UPDATE uplinks SET n_pruned = n_pruned + 1 WHERE seq < OLD.seq;
+    END;
+    """,
 )
 
 

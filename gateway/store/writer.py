@@ -117,6 +117,13 @@ class Store:
         """Keep the calibration that estimates will name."""
         self._held.add(CalibrationRow(calibration_id, self._clock_ns(), text))
 
+    def write_delivery(self, uplink: str, cursor: str) -> bool:
+        """Remember that ``uplink`` has delivered everything up to ``cursor``.
+
+        False, and nothing is remembered, for a cursor of a database that is gone.
+        """
+        return self._held.add_delivery(uplink, cursor)
+
     def flush(self, timeout_s: float) -> bool:
         """Wait until all that was accepted is on disk; False where the time did not suffice."""
         return self._held.wait_until_empty(timeout_s)

@@ -1,0 +1,155 @@
+"""One MQTT 5 connection, driven by whoever owns it: paho-mqtt without its own thread or queue of retries."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import paho.mqtt.client as mqtt
+from paho.mqtt.enums import CallbackAPIVersion
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
+
+from gateway.uplink.outbox import Letter
+from gateway.uplink.settings import UplinkSettings
+
+CONNECT_TIMEOUT_S: Final = 10.0
+WILL_DELAY_S: Final = 30  # a cut that is mended within this is not announced as an absence
+_TURN_S: Final = 0.1
+
+
+class LinkError(Exception):
+    """The connection could not be made, or it broke."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The broker's word on one message. ``is_hopeless``: it will never take this one, however often it comes."""
+
+    mid: int
+    is_accepted: bool
+    is_hopeless: bool
+    reason: str
+
+
+_HOPELESS: Final = {"Packet too large", "Payload format invalid"}  # MQTT 5, table 2-6: 0x95, 0x99
+
+
+class MqttLink:
+    """Connects when made; the birth is announced, the will is left with the broker.
+
+    Raises LinkError where the broker cannot be reached or does not want us, ConfigurationError where
+    a TLS or password file cannot be used. Not thread-safe: one owner.
+    """
+
+    def __init__(self, settings: UplinkSettings, birth: Mapping[str, Any]) -> None:
+        self._settings = settings
+        self._answers: list[Answer] = []
+        self._connack: ReasonCode | None = None
+        self._loss: str | None = None
+        self._client = self._make_client()
+        self._connect()
+        self._announce(birth)
+
+    def send(self, letter: Letter) -> int:
+        """Hand a letter to the broker -> the number its answer will carry."""
+        said = {"ContentType": "application/json", "PayloadFormatIndicator": 1, "UserProperty": [("id", letter.id)]}
+        return self._publish("estimates", letter.text, properties=_properties(PacketTypes.PUBLISH, said))
+
+    def turn(self, timeout_s: float) -> list[Answer]:
+        """Read and write what the socket allows -> answers that came; returns at the first that moves."""
+        code = self._client.loop(timeout_s)
+        if code != mqtt.MQTT_ERR_SUCCESS or self._loss is not None:
+            raise LinkError(self._loss or mqtt.error_string(code))
+        answers, self._answers = self._answers, []
+        return answers
+
+    def close(self) -> None:
+        """Say goodbye, so that the will is not carried out."""
+        try:
+            farewell = self._announce({"state": "offline", "reason": "stopped"})
+            for _ in range(5):
+                if any(answer.mid == farewell for answer in self.turn(_TURN_S)):
+                    break
+            self._client.disconnect()
+            self._client.loop(_TURN_S)
+        except LinkError:  # it was broken already
+            pass
+
+    def abandon(self) -> None:
+        """Drop a broken connection; the broker carries out the will."""
+        sock = self._client.socket()
+        if sock is not None:
+            sock.close()
+
+    def _make_client(self) -> mqtt.Client:
+        settings = self._settings
+        client = mqtt.Client(CallbackAPIVersion.VERSION2, settings.client_id, protocol=mqtt.MQTTv5)
+        client.connect_timeout = CONNECT_TIMEOUT_S
+        if settings.username is not None:
+            client.username_pw_set(settings.username, settings.password())
+        if (context := settings.tls_context()) is not None:
+            client.tls_set_context(context)
+        will = _properties(PacketTypes.WILLMESSAGE, {"WillDelayInterval": WILL_DELAY_S})
+        lost = json.dumps({"state": "offline", "reason": "lost"})
+        client.will_set(f"{settings.topic}/status", lost, qos=1, retain=True, properties=will)
+        client.on_connect = self._on_connect
+        client.on_disconnect = self._on_disconnect
+        client.on_publish = self._on_publish
+        return client
+
+    def _connect(self) -> None:
+        # the will waits no longer than the session lives
+        session = _properties(PacketTypes.CONNECT, {"SessionExpiryInterval": WILL_DELAY_S})
+        try:
+            self._client.connect(
+                self._settings.host,
+                self._settings.port,
+                keepalive=self._settings.keep_alive_s,
+                clean_start=True,
+                properties=session,
+            )
+        except (OSError, ValueError) as fault:  # ssl.SSLError and socket.gaierror are OSErrors
+            raise LinkError(f"no connection to {self._settings.broker}: {fault}") from None
+        try:
+            for _ in range(round(CONNECT_TIMEOUT_S / _TURN_S)):
+                self.turn(_TURN_S)
+                if self._connack is not None:
+                    break
+        except LinkError:
+            if self._connack is None:
+                raise
+        if self._connack is None or self._connack.is_failure:
+            self.abandon()
+            reason = "it did not answer" if self._connack is None else str(self._connack)
+            raise LinkError(f"{self._settings.broker} refused the connection: {reason}")
+
+    def _announce(self, presence: Mapping[str, Any]) -> int:
+        return self._publish("status", json.dumps(presence), retain=True)
+
+    def _publish(self, leaf: str, text: str, *, retain: bool = False, properties: Properties | None = None) -> int:
+        sent = self._client.publish(
+            f"{self._settings.topic}/{leaf}", text.encode(), qos=1, retain=retain, properties=properties
+        )
+        if sent.rc != mqtt.MQTT_ERR_SUCCESS:
+            raise LinkError(self._loss or mqtt.error_string(sent.rc))
+        return sent.mid
+
+    def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, code: ReasonCode, _told: Any) -> None:
+        self._connack = code
+
+    def _on_disconnect(self, _client: Any, _userdata: Any, _flags: Any, code: ReasonCode, _told: Any) -> None:
+        self._loss = f"the connection to {self._settings.broker} was lost: {code}"
+
+    def _on_publish(self, _client: Any, _userdata: Any, mid: int, code: ReasonCode, _told: Any) -> None:
+        reason = str(code)
+        self._answers.append(Answer(mid, not code.is_failure, reason in _HOPELESS, reason))
+
+
+def _properties(packet: int, fields: Mapping[str, Any]) -> Properties:
+    """MQTT 5 properties of one kind of packet, under their names in the standard without spaces."""
+    properties = Properties(packet)  # type: ignore[no-untyped-call]  # paho leaves its types out here
+    for name, setting in fields.items():
+        setattr(properties, name, setting)
+    return properties

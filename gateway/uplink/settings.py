@@ -1,0 +1,85 @@
+"""Where the broker is, and who we are to it."""
+
+import ssl
+from dataclasses import dataclass
+from pathlib import Path
+
+from gateway.config import UplinkSection, VehicleSection
+from gateway.errors import ConfigurationError
+
+
+@dataclass(frozen=True, slots=True)
+class UplinkSettings:
+    """A broker and how to reach it.
+
+    ``topic`` is the branch of this vehicle: estimates go to ``topic/estimates``, presence is retained
+    at ``topic/status``. ``ca`` is the authority the broker's certificate must come from, absent for
+    the system's; certificate and key are ours where the broker asks for them.
+    """
+
+    host: str
+    port: int
+    topic: str
+    client_id: str
+    tls: bool = True
+    ca: Path | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+    username: str | None = None
+    password_file: Path | None = None
+    keep_alive_s: int = 60
+    back_off_max_s: float = 300.0
+
+    @property
+    def broker(self) -> str:
+        """host:port, for people."""
+        return f"{self.host}:{self.port}"
+
+    def tls_context(self) -> ssl.SSLContext | None:
+        """Checks the broker's certificate and name. Raises ConfigurationError for files that cannot be used."""
+        if not self.tls:
+            return None
+        try:
+            context = ssl.create_default_context(cafile=self.ca)
+            if self.certificate is not None:
+                context.load_cert_chain(self.certificate, self.key)
+        except OSError as fault:  # ssl.SSLError is one
+            names = ", ".join(str(path) for path in (self.ca, self.certificate, self.key) if path is not None)
+            raise ConfigurationError(f"[uplink] TLS files {names} cannot be used: {fault}") from None
+        return context
+
+    def password(self) -> str | None:
+        """Read anew at every connection, so that it can be changed while the service runs.
+
+        Raises ConfigurationError where the file cannot be read.
+        """
+        if self.password_file is None:
+            return None
+        try:
+            return self.password_file.read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as fault:
+            raise ConfigurationError(f"[uplink] password_file {self.password_file} cannot be read: {fault}") from None
+
+
+def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSettings | None:
+    """What [uplink] says of this vehicle; None without a host. Raises ConfigurationError for a topic MQTT forbids."""
+    if section.host is None:
+        return None
+    topic = section.topic.replace("{vehicle_id}", vehicle.id)
+    if any(character in topic for character in "+#\0") or topic.startswith("$"):
+        raise ConfigurationError(
+            f"[uplink] topic {topic!r}: MQTT allows no +, # or NUL in a topic, nor a $ before it: "
+            "set [uplink] topic without {vehicle_id}, or another [vehicle] id"
+        )
+    settings = UplinkSettings(
+        host=section.host,
+        port=section.port if section.port is not None else (8883 if section.tls else 1883),
+        topic=topic,
+        client_id=section.client_id or f"springscale-{vehicle.id}",
+        **section.model_dump(include={"tls", "ca", "certificate", "key", "username", "password_file"}),
+        keep_alive_s=section.keep_alive_s,
+        back_off_max_s=section.back_off_max_s,
+    )
+    settings.tls_context()  # a wrong file is told at the start
+    settings.password()
+    return settings

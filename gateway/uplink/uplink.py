@@ -1,0 +1,169 @@
+"""The uplink thread: takes letters from the outbox to the broker, and starts over when the link breaks."""
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final, Protocol
+
+from gateway.errors import ConfigurationError, StoreError
+from gateway.uplink.back_off import BackOff
+from gateway.uplink.link import Answer, LinkError, MqttLink
+from gateway.uplink.outbox import Letter, Outbox
+from gateway.uplink.settings import UplinkSettings
+
+_log = logging.getLogger(__name__)
+
+POLL_S: Final = 0.5  # how long a new estimate may lie before it is seen
+LOOK_S: Final = 5.0  # how often the backlog is counted
+ANSWER_TIMEOUT_S: Final = 30.0  # a broker that takes longer is as good as gone
+PAGE: Final = 100
+FIRST_PAUSE_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class UplinkReport:
+    """How the uplink is. ``n_waiting`` and ``n_pruned`` are the store's figures of a few seconds ago.
+
+    Delivered: acknowledged by the broker since the start. Refused: given up because the broker will
+    never take them. Pruned: removed by retention before they could be delivered.
+    """
+
+    broker: str
+    is_connected: bool = False
+    n_delivered: int = 0
+    n_refused: int = 0
+    n_waiting: int = 0
+    n_pruned: int = 0
+    n_connections: int = 0
+    last_fault: str | None = None
+
+
+class Link(Protocol):
+    """A connection to a broker."""
+
+    def send(self, letter: Letter) -> int: ...
+    def turn(self, timeout_s: float) -> list[Answer]: ...
+    def close(self) -> None: ...
+    def abandon(self) -> None: ...
+
+
+class Uplink:
+    """Runs until :meth:`stop`. At least once, in order: a later letter is never delivered before an earlier one.
+
+    After a break the one letter under way may arrive a second time; it carries its id. After a kill
+    those may whose delivery was not on disk yet. What fails is told in :meth:`report` and tried again.
+    """
+
+    def __init__(
+        self,
+        settings: UplinkSettings,
+        outbox: Outbox,
+        birth: Mapping[str, Any],
+        connect: Callable[[UplinkSettings, Mapping[str, Any]], Link] = MqttLink,
+        back_off: BackOff | None = None,
+    ) -> None:
+        self._settings = settings
+        self._outbox = outbox
+        self._birth = {"state": "online", **birth}
+        self._connect = connect
+        self._back_off = back_off or BackOff(FIRST_PAUSE_S, settings.back_off_max_s)
+        self._report = UplinkReport(settings.broker)
+        self._stop = threading.Event()
+        self._looked_s = -LOOK_S
+        self._thread = threading.Thread(target=self._run, name="uplink", daemon=True)
+
+    def start(self) -> None:
+        """Begin to connect and to deliver."""
+        self._thread.start()
+
+    def stop(self, timeout_s: float = 1.0) -> None:
+        """Say goodbye to the broker and end; what is not delivered goes out after the next start."""
+        self._stop.set()
+        self._thread.join(timeout_s)
+
+    def is_alive(self) -> bool:
+        """True while the thread runs."""
+        return self._thread.is_alive()
+
+    def report(self) -> UplinkReport:
+        """How it is; safe from any thread."""
+        return self._report
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._one_connection()
+            except (LinkError, ConfigurationError, StoreError, TimeoutError, OSError) as fault:
+                self._note(str(fault))
+                self._outbox.rewind()
+                self._stop.wait(self._back_off.next_s())
+
+    def _one_connection(self) -> None:
+        """Deliver until asked to stop, or until LinkError."""
+        link = self._connect(self._settings, self._birth)
+        self._report = replace(
+            self._report, is_connected=True, n_connections=self._report.n_connections + 1, last_fault=None
+        )
+        _log.info("uplink connected to %s", self._settings.broker)
+        try:
+            self._deliver(link)
+            link.close()
+        except BaseException:
+            link.abandon()
+            raise
+        finally:
+            self._report = replace(self._report, is_connected=False)
+
+    def _deliver(self, link: Link) -> None:
+        """One letter at a time: the next leaves when the broker has answered for the last, so order cannot break."""
+        waiting: deque[Letter] = deque()
+        while not self._stop.is_set():
+            if not waiting:
+                waiting.extend(self._outbox.next_letters(PAGE))
+                self._look()
+            if waiting:
+                self._deliver_one(link, waiting.popleft())
+            else:
+                link.turn(POLL_S)
+
+    def _deliver_one(self, link: Link, letter: Letter) -> None:
+        """Until the broker has answered for it. Raises LinkError where it did not, or may take it another time."""
+        answer = self._answer_for(link, link.send(letter))
+        if answer is None:
+            return
+        report = self._report
+        if answer.is_accepted:
+            self._report = replace(report, n_delivered=report.n_delivered + 1)
+        elif answer.is_hopeless:
+            _log.error("uplink: %s will never take estimate %s: %s", report.broker, letter.id, answer.reason)
+            self._report = replace(report, n_refused=report.n_refused + 1)
+        else:
+            raise LinkError(f"{report.broker} does not take estimates: {answer.reason}")
+        self._outbox.delivered(letter)
+        self._back_off.reset()
+
+    def _answer_for(self, link: Link, mid: int) -> Answer | None:
+        """None where the service stopped meanwhile."""
+        end_s = time.monotonic() + ANSWER_TIMEOUT_S
+        while not self._stop.is_set():
+            for answer in link.turn(POLL_S):
+                if answer.mid == mid:
+                    return answer
+            if time.monotonic() > end_s:
+                raise LinkError(f"{self._report.broker} did not acknowledge for {ANSWER_TIMEOUT_S:g} s")
+        return None
+
+    def _look(self) -> None:
+        if time.monotonic() - self._looked_s < LOOK_S:
+            return
+        self._looked_s = time.monotonic()
+        found = self._outbox.look()
+        self._report = replace(self._report, n_waiting=found.n_waiting, n_pruned=found.n_pruned)
+
+    def _note(self, fault: str) -> None:
+        if fault != self._report.last_fault:
+            _log.warning("uplink: %s; estimates wait in the store", fault)
+        self._report = replace(self._report, last_fault=fault)

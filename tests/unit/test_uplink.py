@@ -1,0 +1,255 @@
+"""The uplink's own logic against a link that does what the test says."""
+
+import random
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.estimates import make_record
+
+from gateway.config import UplinkSection, VehicleSection
+from gateway.errors import ConfigurationError
+from gateway.store import Retention, Store
+from gateway.uplink import Outbox, Uplink, UplinkSettings, uplink_settings
+from gateway.uplink.back_off import BackOff
+from gateway.uplink.link import Answer, LinkError
+from gateway.uplink.outbox import Letter
+
+SETTINGS = UplinkSettings("broker.example", 8883, "springscale/van-17", "springscale-van-17")
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    opened = Store.open(tmp_path)
+    yield opened
+    opened.close()
+
+
+class FakeBroker:
+    """Takes what it is sent; ``answer`` says what to reply to the n-th message, or breaks the link."""
+
+    def __init__(self, answer: Callable[[int, Letter], Answer | None]) -> None:
+        self.taken: list[Letter] = []
+        self.n_connections = 0
+        self._answer = answer
+        self._answers: list[Answer] = []
+        self._n_sent = 0
+
+    def __call__(self, _settings: UplinkSettings, _birth: Any) -> "FakeBroker":
+        self.n_connections += 1
+        self._answers = []
+        return self
+
+    def send(self, letter: Letter) -> int:
+        self._n_sent += 1
+        answer = self._answer(self._n_sent, letter)
+        if answer is not None:
+            if answer.is_accepted:
+                self.taken.append(letter)
+            self._answers.append(answer)
+        return self._n_sent
+
+    def turn(self, timeout_s: float) -> list[Answer]:
+        if not self._answers:
+            time.sleep(0.001)
+        answers, self._answers = self._answers, []
+        return answers
+
+    def close(self) -> None: ...
+    def abandon(self) -> None: ...
+
+
+def accepted(n: int, _letter: Letter) -> Answer:
+    return Answer(n, True, False, "Success")
+
+
+def fill(store: Store, n: int) -> list[str]:
+    records = [make_record(i) for i in range(n)]
+    for record in records:
+        store.write_estimate(record)
+    assert store.flush(10.0)
+    return [record["id"] for record in records]
+
+
+def deliver(store: Store, broker: FakeBroker, is_done: Callable[[Uplink], bool]) -> Uplink:
+    """Runs an uplink until ``is_done`` (10 s at most) and stops it."""
+    uplink = Uplink(SETTINGS, Outbox(store.reader(), store, "fleet"), {}, broker, BackOff(0.001, 0.002))
+    uplink.start()
+    end_s = time.monotonic() + 10.0
+    while not is_done(uplink) and time.monotonic() < end_s:
+        time.sleep(0.002)
+    uplink.stop()
+    assert not uplink.is_alive()
+    assert store.flush(10.0)
+    return uplink
+
+
+def test_everything_stored_is_delivered_once_and_in_order(store: Store) -> None:
+    ids = fill(store, 250)
+    broker = FakeBroker(accepted)
+    deliver(store, broker, lambda uplink: uplink.report().n_delivered == 250)
+    assert [letter.id for letter in broker.taken] == ids
+    assert store.reader().delivery("fleet").n_waiting == 0
+
+
+def test_a_later_start_goes_on_where_the_last_one_ended(store: Store) -> None:
+    fill(store, 5)
+    deliver(store, FakeBroker(accepted), lambda uplink: uplink.report().n_delivered == 5)
+    new = make_record(99)
+    store.write_estimate(new)
+    broker = FakeBroker(accepted)
+    deliver(store, broker, lambda uplink: uplink.report().n_delivered == 1)
+    assert [letter.id for letter in broker.taken] == [new["id"]]
+
+
+def test_after_a_break_only_the_letter_under_way_comes_again(store: Store) -> None:
+    ids = fill(store, 40)
+    breaks = {7, 8, 23}
+
+    def answer(n: int, letter: Letter) -> Answer | None:
+        if n in breaks:
+            broker.taken.append(letter)  # it arrived, its answer did not
+            raise LinkError("cut")
+        return accepted(n, letter)
+
+    broker = FakeBroker(answer)
+    deliver(store, broker, lambda uplink: uplink.report().n_delivered >= 40)
+    came = [letter.id for letter in broker.taken]
+    assert list(dict.fromkeys(came)) == ids
+    assert len(came) - len(ids) == len(breaks)
+    assert broker.n_connections == 1 + len(breaks)
+
+
+def test_what_the_broker_may_take_later_is_tried_again(store: Store) -> None:
+    ids = fill(store, 3)
+    answers = iter(["Quota exceeded", "Not authorized"])
+
+    def answer(n: int, letter: Letter) -> Answer:
+        reason = next(answers, None)
+        return accepted(n, letter) if reason is None else Answer(n, False, False, reason)
+
+    broker = FakeBroker(answer)
+    uplink = deliver(store, broker, lambda uplink: uplink.report().n_delivered == 3)
+    assert [letter.id for letter in broker.taken] == ids
+    assert uplink.report().n_refused == 0
+
+
+def test_what_the_broker_will_never_take_is_counted_and_holds_nothing_up(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    ids = fill(store, 6)
+
+    def answer(n: int, letter: Letter) -> Answer:
+        if letter.id == ids[2]:
+            return Answer(n, False, True, "Packet too large")
+        return accepted(n, letter)
+
+    broker = FakeBroker(answer)
+    uplink = deliver(store, broker, lambda uplink: uplink.report().n_delivered == 5)
+    assert [letter.id for letter in broker.taken] == [*ids[:2], *ids[3:]]
+    assert uplink.report().n_refused == 1
+    assert ids[2] in caplog.text
+
+
+def test_nothing_leaves_before_the_letter_ahead_is_answered(store: Store) -> None:
+    fill(store, 3)
+    sent: list[Letter] = []
+
+    def silent(_n: int, letter: Letter) -> None:
+        sent.append(letter)
+
+    uplink = deliver(store, FakeBroker(silent), lambda uplink: bool(sent))
+    assert len(sent) == 1
+    assert uplink.report().n_delivered == 0
+    assert store.reader().delivery("fleet").n_waiting == 3
+
+
+def test_spectra_stay_at_home(store: Store) -> None:
+    store.write_estimate(make_record(1, with_spectra=True))
+    broker = FakeBroker(accepted)
+    deliver(store, broker, lambda uplink: uplink.report().n_delivered == 1)
+    assert "spectra" not in broker.taken[0].text
+
+
+def test_what_retention_removes_undelivered_is_counted(tmp_path: Path) -> None:
+    now_ns = [10**18]
+    store = Store.open(tmp_path, Retention(max_age_s=60.0), clock_ns=lambda: now_ns[0])
+    fill(store, 2)
+    broker = FakeBroker(accepted)
+    deliver(store, broker, lambda uplink: uplink.report().n_delivered == 2)
+    for n in range(10, 13):
+        store.write_estimate(make_record(n))
+    assert store.flush(10.0)
+    now_ns[0] += 120 * 10**9
+    store.write_estimate(make_record(20))  # a write looks at age
+    assert store.flush(10.0)
+    store.close()
+    assert store.reader().delivery("fleet").n_pruned == 3  # the two delivered ones were removed as well
+    assert store.reader().delivery("fleet").n_waiting == 1
+
+
+def test_a_database_that_was_replaced_is_delivered_from_its_first_row(tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "a")
+    fill(store, 3)
+    outbox = Outbox(store.reader(), store, "fleet")
+    for letter in outbox.next_letters(10):
+        outbox.delivered(letter)
+    assert store.flush(10.0)
+    store.close()
+    other = Store.open(tmp_path / "b")
+    ids = fill(other, 2)
+    outbox._history, outbox._memory = other.reader(), other
+    assert [letter.id for letter in outbox.next_letters(10)] == ids
+    other.close()
+
+
+def test_a_cursor_of_another_database_is_not_remembered(store: Store) -> None:
+    fill(store, 1)
+    assert not store.write_delivery("fleet", "00000000-5")
+    assert store.flush(10.0)
+    assert store.reader().delivery("fleet").cursor is None
+
+
+def test_the_back_off_grows_to_its_ceiling_and_begins_anew() -> None:
+    back_off = BackOff(1.0, 8.0, random.Random(1))
+    pauses = [back_off.next_s() for _ in range(2000)]
+    assert max(pauses[5:]) > 7.5
+    assert all(0.0 <= pause <= ceiling for pause, ceiling in zip(pauses, [1, 2, 4, *[8] * 1997], strict=True))
+    assert sum(pauses[5:]) / len(pauses[5:]) == pytest.approx(4.0, rel=0.05)
+    back_off.reset()
+    assert back_off.next_s() <= 1.0
+
+
+def test_settings_name_the_vehicle(tmp_path: Path) -> None:
+    settings = uplink_settings(UplinkSection(host="fleet.example"), VehicleSection(id="van-17"))
+    assert settings is not None
+    assert (settings.port, settings.topic, settings.client_id) == (8883, "springscale/van-17", "springscale-van-17")
+    assert uplink_settings(UplinkSection(), VehicleSection()) is None
+
+
+@pytest.mark.parametrize(
+    ("section", "said"),
+    [
+        ({"host": "b", "topic": "fleet/+"}, "MQTT allows no"),
+        ({"host": "b", "ca": "absent.pem"}, "cannot be used"),
+        ({"host": "b", "username": "van", "password_file": "absent"}, "cannot be read"),
+    ],
+)
+def test_a_setting_that_cannot_work_is_told_at_the_start(section: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigurationError, match=said):
+        uplink_settings(UplinkSection(**section), VehicleSection())
+
+
+@pytest.mark.parametrize(
+    ("section", "said"),
+    [
+        ({"host": "b", "key": "k.pem"}, "belong together"),
+        ({"host": "b", "password_file": "p"}, "needs username"),
+        ({"host": "b", "username": "u", "password_file": "p", "tls": False}, "in the clear"),
+    ],
+)
+def test_settings_that_contradict_each_other_are_refused(section: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        UplinkSection(**section)
