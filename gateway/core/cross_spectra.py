@@ -63,6 +63,16 @@ class CrossSpectra:
         coherence: F64 = cross / auto
         return coherence
 
+    @property
+    def delay_mean_s(self) -> float:
+        """Mean time from axle to axle over all segments."""
+        return float(np.average(self.delay_s, weights=self.n_segments))
+
+    @property
+    def delay_std_s(self) -> float:
+        """How much that time varied."""
+        return float(np.sqrt(np.average((self.delay_s - self.delay_mean_s) ** 2, weights=self.n_segments)))
+
     def with_pitch_reversed(self) -> "CrossSpectra":
         """As if the pitch rate had the other sign."""
         return replace(self, cross=-self.cross)

@@ -204,6 +204,8 @@ def _judged(
         "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
         "damper_rear_ratio": _ratio(located, calibration, "damper_rear_nspm"),
         "delay_scale": float(located.point.theta[INDEX["delay_scale"]]),
+        "delay_s": spectra.delay_mean_s,
+        "delay_std_s": spectra.delay_std_s,
     }
     why = _disbelieved(located, payload_std_kg, calibration)
     if why is not None:

@@ -1,0 +1,94 @@
+"""The fitted half-car's spectra beside those a batch showed, for people to compare.
+
+    modelled_spectra(estimate.spectra, calibration, Fitted(...)) -> Spectra
+
+Nothing is estimated here: payload, front share and drift are the answer of the cross-spectral
+estimator. Only the road's level, on which that answer does not depend, is taken from the spectra
+themselves, as a straight line in logarithms of level and frequency (ISO 8608).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gateway.core.cross_spectra import CrossSpectra
+from gateway.core.cross_spectrum import CrossSpectrumCalibration
+from gateway.core.grey_model import INDEX, expected_spectra, spectral_model
+from gateway.records import F64, Bool, Spectra
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """What the estimator found for one batch.
+
+    Damper ratios are to the calibrated ones. delay_s is the mean time from axle to axle over the
+    batch, delay_std_s how much it varied.
+    """
+
+    payload_kg: float
+    front_share_pct: float
+    delay_s: float
+    delay_std_s: float = 0.0
+    damper_front_ratio: float = 1.0
+    damper_rear_ratio: float = 1.0
+    delay_scale: float | None = None
+
+
+def modelled_spectra(seen: Spectra, calibration: CrossSpectrumCalibration, fitted: Fitted) -> Spectra:
+    """Spectra (k,) of the fitted vehicle at those k of the m seen frequencies that calibration has used."""
+    is_used = (seen.freq_hz >= calibration.band_hz[0]) & (seen.freq_hz <= calibration.band_hz[1])
+    measured = _as_one_group(seen, is_used, fitted)
+    model = spectral_model(
+        _parameters(calibration, fitted),
+        np.array(fitted.payload_kg),
+        np.array(fitted.front_share_pct / 100.0),
+        calibration.ground,
+        measured.freq_hz,
+    )
+    auto_a, auto_g, cross = (each[0] for each in expected_spectra(model, measured))
+    level = _road_level(measured, auto_a, auto_g)
+    return Spectra(
+        freq_hz=seen.freq_hz[is_used],
+        vertical_acceleration=np.sqrt(level * auto_a),
+        pitch_rate=np.sqrt(level * auto_g),
+        coherence=np.abs(cross) ** 2 / (auto_a * auto_g),
+        phase_rad=np.angle(cross),
+    )
+
+
+def _parameters(calibration: CrossSpectrumCalibration, fitted: Fitted) -> F64:
+    theta = calibration.parameters.copy()
+    theta[INDEX["damper_front_nspm"]] += np.log(fitted.damper_front_ratio)
+    theta[INDEX["damper_rear_nspm"]] += np.log(fitted.damper_rear_ratio)
+    if fitted.delay_scale is not None:
+        theta[INDEX["delay_scale"]] = fitted.delay_scale
+    return theta
+
+
+def _as_one_group(seen: Spectra, is_used: Bool, fitted: Fitted) -> CrossSpectra:
+    """The spectra as if all segments had been one group, with delays normally distributed about their mean."""
+    step_hz = float(seen.freq_hz[1] - seen.freq_hz[0])
+    freq_hz = seen.freq_hz[is_used]
+    guarded_hz = np.r_[freq_hz[0] - step_hz, freq_hz, freq_hz[-1] + step_hz]
+    turn = 2.0 * np.pi * guarded_hz
+    a, g = seen.vertical_acceleration[is_used], seen.pitch_rate[is_used]
+    cross = a * g * np.sqrt(seen.coherence[is_used]) * np.exp(1j * seen.phase_rad[is_used])
+    return CrossSpectra(
+        freq_hz=guarded_hz,
+        acceleration=a[None] ** 2,
+        pitch_rate=g[None] ** 2,
+        cross=cross[None],
+        delay_phase=np.exp(-1j * turn * fitted.delay_s - 0.5 * (turn * fitted.delay_std_s) ** 2)[None],
+        delay_s=np.array([[fitted.delay_s]]),
+        n_segments=np.array([[1.0]]),
+        acceleration_rms_mps2=float("nan"),
+        pitch_rate_rms_radps=float("nan"),
+    )
+
+
+def _road_level(measured: CrossSpectra, auto_a: F64, auto_g: F64) -> F64:
+    """Level (k,) of the road: the line in logarithms that leaves both sensors' logarithms nearest to the model's."""
+    log_level = 0.5 * (np.log(measured.acceleration[0] / auto_a) + np.log(measured.pitch_rate[0] / auto_g))
+    log_f = np.log(measured.freq_hz[1:-1])
+    level: F64 = np.exp(np.polyval(np.polyfit(log_f, log_level, 1), log_f))
+    return level
