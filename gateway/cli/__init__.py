@@ -13,6 +13,11 @@ from gateway.errors import SpringscaleError
 
 _COMMANDS = {
     "calibrate": ("gateway.cli.calibrate", "calibrate", "Known-load drives to a calibration file."),
+    "calibration": (
+        "gateway.cli.calibration",
+        "calibration_commands",
+        "Look at calibration files, compare and check them; re-zero a running service.",
+    ),
     "check-config": (
         "gateway.cli.check_config",
         "check_config",

@@ -1,0 +1,92 @@
+"""springscale calibration: look at calibration files, compare and check them; re-zero a running service."""
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gateway.calibration.campaign import load_campaign
+from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.file_comparison import Difference, differences
+from gateway.cli.calibration_text import calibration_text
+from gateway.cli.options import FILE, as_json
+from gateway.offline.calibration_check import Check, Verdict, check_against_campaign
+from gateway.records import json_line
+
+
+@click.group("calibration")
+def calibration_commands() -> None:
+    """Look at calibration files, compare and check them; re-zero a running service (tare)."""
+
+
+@calibration_commands.command("show")
+@click.argument("file", type=FILE)
+@as_json
+def show(file: Path, as_json: bool) -> None:
+    """What FILE says: vehicle, ranges, parameters with their standard deviations, expected errors, provenance."""
+    held = load_calibration(file)
+    click.echo(json_line({"id": held.id, **held.model_dump(mode="json")}) if as_json else calibration_text(held))
+
+
+@calibration_commands.command("diff")
+@click.argument("one", type=FILE)
+@click.argument("other", type=FILE)
+@as_json
+def diff(one: Path, other: Path, as_json: bool) -> None:
+    """In what two files differ; fitted figures in combined standard deviations, the most different first."""
+    ours, theirs = load_calibration(one), load_calibration(other)
+    found = differences(ours, theirs)
+    if as_json:
+        listed = [asdict(each) | {"n_std": _finite(each.n_std)} for each in found]
+        click.echo(json_line({"ids": [ours.id, theirs.id], "is_identical": not found, "differences": listed}))
+    elif not found:
+        click.echo(f"identical: {ours.id}" if ours.id == theirs.id else "identical but for the ids")
+    else:
+        click.echo("\n".join(map(_difference, found)))
+
+
+@calibration_commands.command("verify")
+@click.argument("file", type=FILE)
+@click.option("--logs", "campaign", type=FILE, default=None, help="campaign file: check the logs it was made from")
+@as_json
+def verify(file: Path, campaign: Path | None, as_json: bool) -> None:
+    """Check FILE: content against its id, shape, known model; with --logs also the logs it was made from.
+
+    Exit codes: 0 good, 1 a log or load is not the one it was made from, 2 the file itself cannot be used.
+    """
+    held = load_calibration(file)
+    held.for_core()  # raises where this springscale does not know the model
+    checks = [*_own_checks(held), *(check_against_campaign(held, load_campaign(campaign)) if campaign else ())]
+    is_good = all(check.verdict is not Verdict.FAULT for check in checks)
+    if as_json:
+        click.echo(json_line({"id": held.id, "is_good": is_good, "checks": [asdict(check) for check in checks]}))
+    else:
+        click.echo("\n".join(f"{check.verdict:5}  {check.what}: {check.text}" for check in checks))
+    sys.exit(0 if is_good else 1)
+
+
+def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:
+    """What reading the file has already proved."""
+    version = f"version {held.version}" if held.migrated_from is None else "an older version, migrated"
+    return (
+        Check("content", Verdict.GOOD, f"matches its id {held.id}"),
+        Check("shape", Verdict.GOOD, version),
+        Check("model", Verdict.GOOD, f"known to this springscale: {', '.join(held.estimators) or 'no estimator'}"),
+    )
+
+
+def _difference(found: Difference) -> str:
+    apart = "" if found.n_std is None else f"   ({found.n_std:.2g} standard deviations)"
+    return f"{found.where}: {_shown(found.one)} -> {_shown(found.other)}{apart}"
+
+
+def _shown(fact: Any) -> str:
+    if isinstance(fact, list):
+        return f"[{', '.join(map(_shown, fact))}]"
+    return f"{fact:.6g}" if isinstance(fact, float) else "absent" if fact is None else str(fact)
+
+
+def _finite(n_std: float | None) -> float | None:
+    return None if n_std is None or n_std == float("inf") else n_std

@@ -1,0 +1,69 @@
+"""A calibration file for people to read."""
+
+from collections.abc import Iterator
+
+from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart
+from gateway.calibration.file_figures import Figure, figures_of
+
+
+def calibration_text(held: CalibrationFile) -> str:
+    """The whole file but its arrays, in lines."""
+    sections = {
+        "vehicle (as the campaign stated it)": _vehicle(held),
+        "calibrated for": _ranges(held),
+        "expected errors (runs left out of the fit)": _expected(held),
+        **{f"{part}: {len(figures)} parameters": map(_figure, figures) for part, figures in figures_of(held).items()},
+        "warnings": iter(held.warnings or ("none",)),
+        "made by": _provenance(held),
+    }
+    lines = [held.id, f"version {held.version}{', migrated from an older one' if held.migrated_from else ''}"]
+    lines.append(f"estimators: {', '.join(held.estimators) or 'none'}")
+    for title, rows in sections.items():
+        lines += ["", title, *(f"  {row}" for row in rows)]
+    return "\n".join(lines)
+
+
+def _vehicle(held: CalibrationFile) -> Iterator[str]:
+    for name, stated in held.vehicle.model_dump(mode="json").items():
+        if stated is not None:
+            yield f"{name:28}{_plain(stated)}"
+
+
+def _plain(stated: object) -> str:
+    if isinstance(stated, list):
+        return " to ".join(map(_plain, stated))
+    return f"{stated:g}" if isinstance(stated, float) else str(stated)
+
+
+def _ranges(held: CalibrationFile) -> Iterator[str]:
+    for name, span in held.seen.model_dump(mode="json").items():
+        yield f"{name:28}{'unknown' if span is None else f'{span[0]:.4g} to {span[1]:.4g}'}"
+
+
+def _expected(held: CalibrationFile) -> Iterator[str]:
+    for estimator in held.estimators:
+        errors = held.expected_errors.get(estimator)
+        yield f"{estimator:28}{'unknown' if errors is None else _errors(errors)}"
+
+
+def _errors(errors: ExpectedErrorsPart) -> str:
+    payload, share = errors.payload_rms_kg, errors.front_share_rms_pct
+    parts = ["payload unknown" if payload is None else f"payload {payload:.1f} kg rms"]
+    parts.append("front share unknown" if share is None else f"front share {share:.2f} percentage points rms")
+    return ", ".join(parts)
+
+
+def _figure(figure: Figure) -> str:
+    return f"{figure.name:28}{figure.centre:>12.5g} ± {figure.std:.2g}"
+
+
+def _provenance(held: CalibrationFile) -> Iterator[str]:
+    made = held.provenance
+    yield made.software
+    yield made.command
+    yield f"campaign sha256 {made.campaign_sha256}"
+    for run in made.runs:
+        yield (
+            f"run {run.number:<3} {run.payload_kg:7.1f} kg {run.front_share_pct:6.2f} %  {run.n_batches:3} batches  "
+            f"{run.log}  sha256 {run.sha256[:12]}..."
+        )
