@@ -1,0 +1,207 @@
+"""The uplink against a real broker: cuts, restarts, kill -9, TLS, refusals, presence."""
+
+import json
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import trustme
+from support.broker import CuttableLink, Listener, needs_mosquitto, running_broker
+from support.estimates import make_record
+
+from gateway.store import Store
+from gateway.uplink import Outbox, Uplink, UplinkSettings
+from gateway.uplink.back_off import BackOff
+
+pytestmark = needs_mosquitto
+
+N_ESTIMATES = 10_000
+N_CUTS, N_RESTARTS, N_KILLS = 10, 3, 7
+
+DELIVERER = """
+import pathlib, sys, time
+from gateway.store import Store
+from gateway.uplink import Outbox, Uplink, UplinkSettings
+from gateway.uplink.back_off import BackOff
+
+store = Store.open(pathlib.Path(sys.argv[1]))
+settings = UplinkSettings("127.0.0.1", int(sys.argv[2]), "springscale/van-17", "springscale-van-17", tls=False)
+Uplink(settings, Outbox(store.reader(), store, "fleet"), {}, back_off=BackOff(0.01, 0.1)).start()
+print("started", flush=True)
+time.sleep(600)
+"""
+
+
+def settings_of(port: int, **changed: object) -> UplinkSettings:
+    kept = {"host": "127.0.0.1", "port": port, "topic": "springscale/van-17", "client_id": "van-17", "tls": False}
+    return UplinkSettings(**{**kept, **changed})
+
+
+def wait_until(holds: Callable[[], bool], timeout_s: float = 10.0) -> bool:
+    end_s = time.monotonic() + timeout_s
+    while not holds() and time.monotonic() < end_s:
+        time.sleep(0.01)
+    return holds()
+
+
+def started(store: Store, settings: UplinkSettings) -> Uplink:
+    uplink = Uplink(
+        settings, Outbox(store.reader(), store, "fleet"), {"vehicle_id": "van-17"}, back_off=BackOff(0.01, 0.1)
+    )
+    uplink.start()
+    return uplink
+
+
+def test_ten_thousand_estimates_arrive_in_order_through_twenty_cuts_restarts_and_kills(tmp_path: Path) -> None:
+    dice = random.Random(17)
+    state = tmp_path / "state"
+    ids = _stored_beforehand(state)
+    blows = dice.sample(["cut"] * N_CUTS + ["restart"] * N_RESTARTS + ["kill"] * N_KILLS, N_CUTS + N_RESTARTS + N_KILLS)
+    moments = sorted(dice.sample(range(N_ESTIMATES // 50, N_ESTIMATES - N_ESTIMATES // 50), len(blows)))
+    with running_broker(tmp_path) as broker, CuttableLink(broker.port) as link:
+        listener = Listener(broker.port, "springscale/+/estimates")
+        deliverer = _deliverer(state, link.port)
+        for moment, blow in zip(moments, blows, strict=True):
+            listener.wait_for(moment, 60.0)
+            assert len(listener.heard) >= moment, f"stuck before the next {blow}"
+            if blow == "cut":
+                link.cut()
+            elif blow == "restart":
+                broker.stop()
+                broker.start()
+            else:
+                deliverer.send_signal(signal.SIGKILL)
+                deliverer.wait()
+                deliverer = _deliverer(state, link.port)
+        wait_until(lambda: json.loads(listener.heard[-1].payload)["id"] == ids[-1], 60.0)
+        deliverer.kill()
+        deliverer.wait()
+        listener.close()
+    came = [json.loads(message.payload)["id"] for message in listener.heard]
+    assert list(dict.fromkeys(came)) == ids  # all of them, each first seen in its turn
+    n_twice = len(came) - len(ids)
+    assert n_twice <= N_CUTS + N_RESTARTS + 100 * N_KILLS  # after a kill, those whose delivery was not on disk yet
+
+
+def _stored_beforehand(state: Path) -> list[str]:
+    store = Store.open(state)
+    ids = []
+    for n in range(N_ESTIMATES):
+        record = make_record(n)
+        ids.append(record["id"])
+        store.write_estimate(record)
+        if n % 1000 == 999:  # what waits in memory is bounded
+            assert store.flush(30.0)
+    store.close()
+    return ids
+
+
+def _deliverer(state: Path, port: int) -> "subprocess.Popen[str]":
+    tests = Path(__file__).parents[1]
+    process = subprocess.Popen(
+        [sys.executable, "-c", DELIVERER, str(state), str(port)], stdout=subprocess.PIPE, text=True, cwd=tests
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "started\n"
+    process.stdout.close()
+    return process
+
+
+def test_a_message_says_what_it_is(tmp_path: Path) -> None:
+    with running_broker(tmp_path) as broker:
+        listener = Listener(broker.port, "springscale/van-17/#")
+        store = Store.open(tmp_path / "state")
+        record = make_record(1)
+        store.write_estimate(record)
+        uplink = started(store, settings_of(broker.port))
+        listener.wait_for(2, 10.0)
+        uplink.stop()
+        listener.wait_for(3, 10.0)
+        listener.close()
+        store.close()
+    birth, estimate, farewell = listener.heard
+    assert json.loads(birth.payload) == {"state": "online", "vehicle_id": "van-17"}
+    assert estimate.topic == "springscale/van-17/estimates"
+    assert estimate.properties.ContentType == "application/json"
+    assert estimate.properties.UserProperty == [("id", record["id"])]
+    assert json.loads(estimate.payload)["payload_kg"] == 101.0
+    assert json.loads(farewell.payload) == {"state": "offline", "reason": "stopped"}
+
+
+# paho leaves the socket of a handshake that failed to the garbage collector
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_over_tls_with_certificates_on_both_sides(tmp_path: Path) -> None:
+    authority = trustme.CA()
+    authority.cert_pem.write_to_path(tmp_path / "ca.pem")
+    for name, issued in (("broker", authority.issue_cert("127.0.0.1")), ("van", authority.issue_cert("van-17"))):
+        issued.private_key_pem.write_to_path(tmp_path / f"{name}.key")
+        issued.cert_chain_pems[0].write_to_path(tmp_path / f"{name}.pem")
+    extra = (
+        f"allow_anonymous true\ncafile {tmp_path}/ca.pem\ncertfile {tmp_path}/broker.pem\n"
+        f"keyfile {tmp_path}/broker.key\nrequire_certificate true"
+    )
+    ours = {"certificate": tmp_path / "van.pem", "key": tmp_path / "van.key"}
+    stranger = trustme.CA()
+    stranger.cert_pem.write_to_path(tmp_path / "stranger.pem")
+    store = Store.open(tmp_path / "state")
+    store.write_estimate(make_record(1))
+    with running_broker(tmp_path, extra) as broker:
+        wary = started(store, settings_of(broker.port, tls=True, ca=tmp_path / "stranger.pem", **ours))
+        assert wait_until(lambda: "certificate verify failed" in (wary.report().last_fault or ""))
+        wary.stop()
+        uplink = started(store, settings_of(broker.port, tls=True, ca=tmp_path / "ca.pem", **ours))
+        assert wait_until(lambda: uplink.report().n_delivered == 1), uplink.report()
+        uplink.stop()
+    store.close()
+    assert wary.report().n_delivered == 0
+
+
+def test_a_wrong_password_is_told_and_a_mended_one_is_taken_without_a_restart(tmp_path: Path) -> None:
+    passwords = tmp_path / "passwords"
+    subprocess.run(["mosquitto_passwd", "-b", "-c", str(passwords), "van", "right"], check=True, capture_output=True)
+    secret = tmp_path / "password"
+    secret.write_text("wrong\n")
+    store = Store.open(tmp_path / "state")
+    store.write_estimate(make_record(1))
+    with running_broker(tmp_path, f"allow_anonymous false\npassword_file {passwords}") as broker:
+        uplink = started(store, settings_of(broker.port, username="van", password_file=secret))
+        assert wait_until(lambda: "Not authorized" in (uplink.report().last_fault or "")), uplink.report()
+        assert "wrong" not in (uplink.report().last_fault or "")
+        secret.write_text("right\n")
+        assert wait_until(lambda: uplink.report().n_delivered == 1), uplink.report()
+        uplink.stop()
+    store.close()
+
+
+def test_a_topic_the_broker_forbids_loses_nothing(tmp_path: Path) -> None:
+    allowed = tmp_path / "acl"
+    allowed.write_text("topic read #\ntopic write springscale/van-17/status\n")
+    store = Store.open(tmp_path / "state")
+    store.write_estimate(make_record(1))
+    with running_broker(tmp_path, f"allow_anonymous true\nacl_file {allowed}") as broker:
+        uplink = started(store, settings_of(broker.port))
+        assert wait_until(lambda: "Not authorized" in (uplink.report().last_fault or "")), uplink.report()
+        uplink.stop()
+    assert uplink.report().n_delivered == 0
+    assert store.reader().delivery("fleet").n_waiting == 1
+    store.close()
+
+
+def test_a_killed_vehicle_is_announced_by_its_will(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.uplink.link.WILL_DELAY_S", 1)
+    with running_broker(tmp_path) as broker, CuttableLink(broker.port) as link:
+        listener = Listener(broker.port, "springscale/van-17/status")
+        store = Store.open(tmp_path / "state")
+        uplink = started(store, settings_of(link.port))
+        listener.wait_for(1, 10.0)
+        link.cut_for_good()
+        listener.wait_for(2, 10.0)
+        uplink.stop()
+        listener.close()
+        store.close()
+    assert json.loads(listener.heard[-1].payload) == {"state": "offline", "reason": "lost"}

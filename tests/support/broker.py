@@ -1,0 +1,155 @@
+"""A real mosquitto on a loopback port, a listener at it, and a link to it that can be cut."""
+
+import contextlib
+import shutil
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+
+import paho.mqtt.client as mqtt
+import pytest
+from paho.mqtt.enums import CallbackAPIVersion
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
+
+MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin:/usr/bin:/usr/local/bin")
+needs_mosquitto = pytest.mark.skipif(MOSQUITTO is None, reason="mosquitto is not installed")
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Broker:
+    """mosquitto with memory across restarts. ``extra`` lines go into its configuration."""
+
+    def __init__(self, directory: Path, extra: str = "allow_anonymous true") -> None:
+        self.port = free_port()
+        self._configuration = directory / "mosquitto.conf"
+        self._configuration.write_text(
+            f"listener {self.port} 127.0.0.1\npersistence true\npersistence_location {directory}/\n"
+            f"max_queued_messages 0\nuser root\n{extra}\n"
+        )
+        self._process: subprocess.Popen[bytes] | None = None
+        self.start()
+
+    def start(self) -> None:
+        assert MOSQUITTO is not None
+        self._process = subprocess.Popen(
+            [MOSQUITTO, "-c", str(self._configuration)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        end_s = time.monotonic() + 10.0
+        while time.monotonic() < end_s:
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1.0):
+                return
+            time.sleep(0.02)
+        raise AssertionError("mosquitto did not start")
+
+    def stop(self) -> None:
+        """As systemd would: it saves what its sessions still have to get."""
+        if self._process is not None:
+            self._process.terminate()
+            self._process.wait(10.0)
+            self._process = None
+
+
+class Listener:
+    """What a fleet's back-end hears: a session of its own that the broker keeps while it is away."""
+
+    def __init__(self, port: int, topic: str) -> None:
+        self.heard: list[mqtt.MQTTMessage] = []
+        self._client = mqtt.Client(CallbackAPIVersion.VERSION2, "back-end", protocol=mqtt.MQTTv5)
+        self._client.reconnect_delay_set(0.05, 0.2)
+        self._client.on_message = lambda _client, _userdata, message: self.heard.append(message)
+        subscribed = threading.Event()
+        self._client.on_subscribe = lambda *_: subscribed.set()
+        self._client.on_connect = lambda client, *_: client.subscribe(topic, qos=1)
+        session = Properties(PacketTypes.CONNECT)
+        session.SessionExpiryInterval = 3600
+        self._client.connect("127.0.0.1", port, clean_start=False, properties=session)
+        self._client.loop_start()
+        assert subscribed.wait(10.0)
+
+    def wait_for(self, n: int, timeout_s: float) -> None:
+        """Until ``n`` messages came or the time is out."""
+        end_s = time.monotonic() + timeout_s
+        while len(self.heard) < n and time.monotonic() < end_s:
+            time.sleep(0.01)
+
+    def close(self) -> None:
+        self._client.disconnect()
+        self._client.loop_stop()
+
+
+class CuttableLink:
+    """A TCP relay to the broker: what goes through it can be cut off at any byte."""
+
+    def __init__(self, broker_port: int) -> None:
+        self._broker_port = broker_port
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = int(self._listening.getsockname()[1])
+        self._pairs: list[tuple[socket.socket, socket.socket]] = []
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def __enter__(self) -> "CuttableLink":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.cut_for_good()
+        self._listening.close()
+
+    def cut_for_good(self) -> None:
+        """Drop every connection and take no other."""
+        with contextlib.suppress(OSError):  # close alone leaves a thread in accept to take one more
+            self._listening.shutdown(socket.SHUT_RDWR)
+        self.cut()
+
+    def cut(self) -> None:
+        """Drop every connection, mid-message if need be."""
+        pairs, self._pairs = self._pairs, []
+        for pair in pairs:
+            for end in pair:
+                with contextlib.suppress(OSError):
+                    end.shutdown(socket.SHUT_RDWR)
+                end.close()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                near, _ = self._listening.accept()
+            except OSError:
+                return
+            try:
+                far = socket.create_connection(("127.0.0.1", self._broker_port), 1.0)
+            except OSError:  # the broker is away
+                near.close()
+                continue
+            self._pairs.append((near, far))
+            for source, sink in ((near, far), (far, near)):
+                threading.Thread(target=_pump, args=(source, sink), daemon=True).start()
+
+
+def _pump(source: socket.socket, sink: socket.socket) -> None:
+    with contextlib.suppress(OSError):
+        while chunk := source.recv(4096):
+            sink.sendall(chunk)
+    for end in (source, sink):
+        with contextlib.suppress(OSError):
+            end.shutdown(socket.SHUT_RDWR)
+
+
+@contextlib.contextmanager
+def running_broker(directory: Path, extra: str = "allow_anonymous true") -> Iterator[Broker]:
+    broker = Broker(directory, extra)
+    try:
+        yield broker
+    finally:
+        broker.stop()
