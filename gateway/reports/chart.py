@@ -1,0 +1,143 @@
+"""A chart as plain numbers: what it shows, not how. Drawn twice, live by plotly and still by matplotlib."""
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from gateway.records import F64
+
+Dash = Literal["solid", "dash", "dot"]
+Marker = Literal["circle", "square", "diamond", "x"]
+
+# each at least 3:1 against the light and the dark ground of the page (WCAG 2.2, 1.4.11)
+COLOURS: Final = ("#2a7fc1", "#d9503f", "#2c9960", "#9467bd", "#b57f1c", "#1f96a5", "#d0609e", "#7d8785")
+GREY: Final = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """``places`` names the positions 0, 1, 2 ... of an axis of kinds instead of numbers."""
+
+    title: str
+    is_log: bool = False
+    limits: tuple[float, float] | None = None
+    places: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """A curve through x, y (n,)."""
+
+    x: F64
+    y: F64
+    label: str = ""
+    colour: int = 0
+    dash: Dash = "solid"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """Marks at x, y (n,); low and high (n,) are the ends of an interval about y; notes say what each is."""
+
+    x: F64
+    y: F64
+    label: str = ""
+    colour: int = 0
+    marker: Marker = "circle"
+    low: F64 | None = None
+    high: F64 | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ribbon:
+    """The area between low and high (n,) over x (n,)."""
+
+    x: F64
+    low: F64
+    high: F64
+    label: str = ""
+    colour: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """A map: z (n, m) over x (m,) and y (n,), NaN where nothing is; ``title`` names z and its unit."""
+
+    x: F64
+    y: F64
+    z: F64
+    title: str
+    is_about_zero: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A straight line across the panel at x (vertical) or y."""
+
+    at: float
+    is_vertical: bool = False
+    label: str = ""
+    colour: int = GREY
+    dash: Dash = "solid"
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """The stretch low to high of x, shaded over the panel's height."""
+
+    low: float
+    high: float
+    label: str = ""
+    colour: int = GREY
+
+
+Mark = Line | Points | Ribbon | Cells | Rule | Span
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One pair of axes and what is drawn in it, the first lowest."""
+
+    x: Axis
+    y: Axis
+    marks: tuple[Mark, ...]
+    title: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """Panels side by side, ``n_columns`` in a row. ``name`` is a file's; ``alt`` says in words what is to be seen."""
+
+    name: str
+    caption: str
+    alt: str
+    panels: tuple[Panel, ...]
+    n_columns: int = 2
+    row_height_px: int = 340
+
+    @property
+    def n_rows(self) -> int:
+        """Rows of panels."""
+        return -(-len(self.panels) // self.n_columns)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Numbers as text, the first ``n_heads`` cells of a row naming it. A row may be as wide as ``columns`` only."""
+
+    caption: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    n_heads: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A chapter of the report: paragraphs, then charts and tables; what is lengthy is ``folded`` away at first."""
+
+    anchor: str
+    heading: str
+    paragraphs: tuple[str, ...] = ()
+    charts: tuple[Chart, ...] = ()
+    tables: tuple[Table, ...] = ()
+    folded: tuple[tuple[str, tuple[Chart | Table, ...]], ...] = ()

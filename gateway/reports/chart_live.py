@@ -1,0 +1,156 @@
+"""Charts for plotly: the JSON that plotly.js draws in the page, and the script itself."""
+
+import math
+from functools import singledispatch
+from typing import Any, Final
+
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+from plotly.subplots import make_subplots
+
+from gateway.reports.chart import COLOURS, Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+
+_LEGEND_PX: Final = 90
+_GAP_PX: Final = 95
+_OPACITY: Final = 0.18
+
+
+def plotly_script() -> str:
+    """plotly.min.js as the installed package ships it."""
+    script: str = get_plotlyjs()
+    return script
+
+
+def plotly_json(chart: Chart) -> str:
+    """{"data": [...], "layout": {...}}: validated by plotly, without a theme (the page sets its colours)."""
+    text: str = live(chart).to_json()
+    return text
+
+
+def live(chart: Chart) -> go.Figure:
+    """The chart as a plotly figure."""
+    height_px = chart.n_rows * chart.row_height_px
+    figure = make_subplots(
+        rows=chart.n_rows,
+        cols=chart.n_columns,
+        subplot_titles=[panel.title for panel in chart.panels],
+        horizontal_spacing=0.24 / chart.n_columns if chart.n_columns > 1 else 0.0,
+        vertical_spacing=_GAP_PX / height_px if chart.n_rows > 1 else 0.0,
+    )
+    seen: set[str] = set()
+    for number, panel in enumerate(chart.panels):
+        _add_panel(figure, chart, panel, number, seen)
+    figure.update_annotations(font_size=13)
+    figure.update_layout(
+        template="none",
+        height=height_px + _LEGEND_PX,
+        margin={"l": 60, "r": 15, "t": 35, "b": 60},
+        legend={"orientation": "h", "yanchor": "top", "y": -_GAP_PX / height_px * 0.8, "x": 0.0},
+        hovermode="closest",
+    )
+    return figure
+
+
+def _add_panel(figure: go.Figure, chart: Chart, panel: Panel, number: int, seen: set[str]) -> None:
+    place = {"row": number // chart.n_columns + 1, "col": number % chart.n_columns + 1}
+    for mark in panel.marks:
+        named = _named(mark, seen)
+        if isinstance(mark, Rule | Span):
+            _add_shape(figure, mark, named, place)
+        else:
+            figure.add_traces([{**trace, **named} for trace in _traces(mark)], rows=place["row"], cols=place["col"])
+            _place_colour_bar(figure, mark, number)
+    figure.update_xaxes(**_axis(panel.x), **place)
+    figure.update_yaxes(**_axis(panel.y), **place)
+
+
+def _named(mark: Mark, seen: set[str]) -> dict[str, Any]:
+    """A label stands in the legend once and switches what bears it in every panel."""
+    if isinstance(mark, Cells):
+        return {}
+    label = mark.label
+    is_new = bool(label) and label not in seen
+    seen.add(label)
+    return {"name": label, "showlegend": is_new, **({"legendgroup": label} if label else {})}
+
+
+def _axis(axis: Axis) -> dict[str, Any]:
+    limits = None if axis.limits is None else [_position(axis, end) for end in axis.limits]
+    places = {"tickmode": "array", "tickvals": list(range(len(axis.places))), "ticktext": list(axis.places)}
+    return {
+        "title_text": axis.title,
+        "type": "log" if axis.is_log else "linear",
+        "range": limits,
+        "automargin": True,
+        "zeroline": False,
+        **(places if axis.places else {}),
+    }
+
+
+def _position(axis: Axis, at: float) -> float:
+    return math.log10(at) if axis.is_log else at
+
+
+def _add_shape(figure: go.Figure, mark: Rule | Span, named: dict[str, Any], place: dict[str, int]) -> None:
+    colour = COLOURS[mark.colour]
+    if isinstance(mark, Span):
+        filled = {"fillcolor": colour, "opacity": 0.3, "line_width": 0, "layer": "below"}
+        figure.add_vrect(x0=mark.low, x1=mark.high, **filled, **named, **place)
+    else:
+        drawn = {"line_color": colour, "line_dash": mark.dash, "line_width": 1.2}
+        add = figure.add_vline if mark.is_vertical else figure.add_hline
+        add(mark.at, **drawn, **named, **place)
+
+
+def _place_colour_bar(figure: go.Figure, mark: Mark, number: int) -> None:
+    """Beside its own panel, not all at the figure's right edge."""
+    if not isinstance(mark, Cells):
+        return
+    suffix = "" if number == 0 else str(number + 1)
+    x, y = figure.layout[f"xaxis{suffix}"].domain, figure.layout[f"yaxis{suffix}"].domain
+    middle, height = (y[0] + y[1]) / 2.0, y[1] - y[0]
+    figure.data[-1].colorbar = {
+        "title": {"text": mark.title, "side": "right"},
+        "x": x[1], "y": middle, "len": height, "thickness": 12, "xpad": 4,
+    }  # fmt: skip
+
+
+@singledispatch
+def _traces(mark: object) -> list[dict[str, Any]]:
+    raise TypeError(f"no drawing for {type(mark).__name__}")
+
+
+@_traces.register
+def _(mark: Line) -> list[dict[str, Any]]:
+    style = {"color": COLOURS[mark.colour], "dash": mark.dash, "width": 1.6}
+    return [{"type": "scatter", "mode": "lines", "x": mark.x, "y": mark.y, "line": style}]
+
+
+@_traces.register
+def _(mark: Points) -> list[dict[str, Any]]:
+    trace: dict[str, Any] = {
+        "type": "scatter",
+        "mode": "markers",
+        "x": mark.x,
+        "y": mark.y,
+        "marker": {"color": COLOURS[mark.colour], "symbol": mark.marker, "size": 8},
+        "text": list(mark.notes) or None,
+    }
+    if mark.low is not None and mark.high is not None:
+        reach = {"array": mark.high - mark.y, "arrayminus": mark.y - mark.low}
+        trace["error_y"] = {"type": "data", "symmetric": False, "thickness": 1.0, "width": 2, **reach}
+    return [trace]
+
+
+@_traces.register
+def _(mark: Ribbon) -> list[dict[str, Any]]:
+    """Once along the upper end and back along the lower."""
+    style = {"fill": "toself", "fillcolor": COLOURS[mark.colour], "opacity": _OPACITY, "line": {"width": 0}}
+    around_x, around_y = [*mark.x, *mark.x[::-1]], [*mark.high, *mark.low[::-1]]
+    return [{"type": "scatter", "mode": "lines", "x": around_x, "y": around_y, "hoverinfo": "skip", **style}]
+
+
+@_traces.register
+def _(mark: Cells) -> list[dict[str, Any]]:
+    middle = {"colorscale": "RdBu", "reversescale": True, "zmid": 0.0} if mark.is_about_zero else {}
+    return [{"type": "heatmap", "x": mark.x, "y": mark.y, "z": mark.z, "colorscale": "Viridis", **middle}]

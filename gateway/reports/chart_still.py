@@ -1,0 +1,118 @@
+"""Charts drawn by matplotlib: SVG and PNG for print, for a page without scripts and for slides."""
+
+from functools import singledispatch
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from gateway.reports.chart import COLOURS, Axis, Cells, Chart, Line, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.figures import panels, save
+
+_INCHES_PER_PX: Final = 1.0 / 105.0
+_DASHES: Final = {"solid": "-", "dash": "--", "dot": ":"}
+_MARKERS: Final = {"circle": "o", "square": "s", "diamond": "D", "x": "x"}
+_LEGEND_COLUMNS: Final = 5
+
+
+def save_still(chart: Chart, directory: Path) -> None:
+    """Write NAME.svg and NAME.png; the same bytes for the same chart."""
+    save(draw(chart), directory, chart.name)
+
+
+def draw(chart: Chart) -> Figure:
+    """The chart with one legend for all its panels below them."""
+    figure, axes_of = panels(chart.n_rows, chart.n_columns, chart.row_height_px * _INCHES_PER_PX)
+    for panel, axes in zip(chart.panels, axes_of, strict=False):
+        _draw_panel(axes, panel)
+    for axes in axes_of[len(chart.panels) :]:
+        axes.set_axis_off()
+    shown = {
+        label: handle
+        for axes in axes_of
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }  # fmt: skip
+    if shown:
+        n_columns = min(len(shown), _LEGEND_COLUMNS)
+        figure.legend(list(shown.values()), list(shown), loc="outside lower center", ncols=n_columns, fontsize=7)
+    return figure
+
+
+def _draw_panel(axes: Axes, panel: Panel) -> None:
+    for order, mark in enumerate(panel.marks):
+        _draw_mark(mark, axes, order + 2)
+    axes.set_title(panel.title, fontsize=9)
+    _set_x(axes, panel.x)
+    _set_y(axes, panel.y)
+
+
+def _set_x(axes: Axes, axis: Axis) -> None:
+    axes.set_xlabel(axis.title)
+    if axis.is_log:
+        axes.set_xscale("log")
+    if axis.limits:
+        axes.set_xlim(*axis.limits)
+    if axis.places:
+        axes.set_xticks(range(len(axis.places)), axis.places, rotation=30, ha="right", fontsize=7)
+
+
+def _set_y(axes: Axes, axis: Axis) -> None:
+    axes.set_ylabel(axis.title)
+    if axis.is_log:
+        axes.set_yscale("log")
+    if axis.limits:
+        axes.set_ylim(*axis.limits)
+    if axis.places:
+        axes.set_yticks(range(len(axis.places)), axis.places, fontsize=7)
+
+
+def _shown(label: str) -> str:
+    return label or "_"  # matplotlib leaves names that begin so out of the legend
+
+
+@singledispatch
+def _draw_mark(mark: object, axes: Axes, order: int) -> None:
+    raise TypeError(f"no drawing for {type(mark).__name__}")
+
+
+@_draw_mark.register
+def _(mark: Line, axes: Axes, order: int) -> None:
+    axes.plot(mark.x, mark.y, color=COLOURS[mark.colour], linestyle=_DASHES[mark.dash], linewidth=1.2,
+              label=_shown(mark.label), zorder=order)  # fmt: skip
+
+
+@_draw_mark.register
+def _(mark: Points, axes: Axes, order: int) -> None:
+    colour = COLOURS[mark.colour]
+    if mark.low is not None and mark.high is not None:
+        axes.vlines(mark.x, mark.low, mark.high, color=colour, linewidth=0.8, alpha=0.6, zorder=order)
+    axes.plot(mark.x, mark.y, _MARKERS[mark.marker], color=colour, markersize=4, label=_shown(mark.label), zorder=order)
+
+
+@_draw_mark.register
+def _(mark: Ribbon, axes: Axes, order: int) -> None:
+    axes.fill_between(mark.x, mark.low, mark.high, color=COLOURS[mark.colour], alpha=0.18, linewidth=0.0,
+                      label=_shown(mark.label), zorder=order)  # fmt: skip
+
+
+@_draw_mark.register
+def _(mark: Cells, axes: Axes, order: int) -> None:
+    reach = float(np.nanmax(np.abs(mark.z))) if np.isfinite(mark.z).any() else 1.0
+    low = -reach if mark.is_about_zero else None
+    drawn = axes.pcolormesh(mark.x, mark.y, mark.z, cmap="RdBu_r" if mark.is_about_zero else "viridis", vmin=low,
+                            vmax=reach if mark.is_about_zero else None, rasterized=True)  # fmt: skip
+    axes.figure.colorbar(drawn, ax=axes, label=mark.title)
+
+
+@_draw_mark.register
+def _(mark: Rule, axes: Axes, order: int) -> None:
+    across = axes.axvline if mark.is_vertical else axes.axhline
+    across(mark.at, color=COLOURS[mark.colour], linestyle=_DASHES[mark.dash], linewidth=1.0, label=_shown(mark.label),
+           zorder=order)  # fmt: skip
+
+
+@_draw_mark.register
+def _(mark: Span, axes: Axes, order: int) -> None:
+    axes.axvspan(mark.low, mark.high, color=COLOURS[mark.colour], alpha=0.3, linewidth=0.0, label=_shown(mark.label))
