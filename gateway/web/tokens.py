@@ -145,11 +145,17 @@ class TokenFile:
         return status.st_ino, status.st_mtime_ns, status.st_size
 
     def _write(self, tokens: tuple[Token, ...]) -> None:
-        """Replace the file in one step, readable by its owner alone."""
+        """Replace the file in one step, readable by its owner alone.
+
+        The owner is the directory's: an administrator makes tokens as root, the service reads them as itself.
+        """
         self._path.parent.mkdir(parents=True, exist_ok=True)
         fresh = self._path.with_name(f".{self._path.name}.{os.getpid()}")
         descriptor = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
         with os.fdopen(descriptor, "w") as file:
+            if os.geteuid() == 0:
+                owner = self._path.parent.stat()
+                os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
             file.write(json.dumps(_Content(tokens=tokens).model_dump(mode="json"), indent=1) + "\n")
             file.flush()
             os.fsync(file.fileno())
