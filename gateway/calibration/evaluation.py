@@ -25,12 +25,37 @@ def error_table(judged: Sequence[Judged], vehicle: Vehicle, estimator: str) -> d
     """(12) over all complete batches: mean |e|, bias, std, max and 95 % coverage, in percent of the ranges.
 
     Pieces shorter than a window at the end of a run are no batches and are left out. In
-    ``mean_abs_pct_with_misses`` a rejected batch scores as if it had answered mid-range.
+    ``mean_abs_pct_with_misses`` a rejected batch scores as if it had answered mid-range. ``runs`` holds
+    the same figures of each run by itself, ``batches`` every estimate beside the truth.
     """
+    by_run: dict[int, list[Judged]] = {}
+    for one in judged:
+        by_run.setdefault(one.run, []).append(one)
+    return {
+        "estimator": estimator,
+        **_figures(judged, vehicle),
+        "runs": [_run_row(of_run, vehicle) for of_run in by_run.values()],
+        "batches": [_batch_row(one) for one in judged],
+    }
+
+
+def _run_row(of_run: Sequence[Judged], vehicle: Vehicle) -> dict[str, Any]:
+    return {**_truth(of_run[0]), **_figures(of_run, vehicle)}
+
+
+def _truth(one: Judged) -> dict[str, Any]:
+    return {
+        "run": one.run,
+        "log": one.name,
+        "true_payload_kg": one.payload_kg,
+        "true_front_share_pct": one.front_share_pct,
+    }
+
+
+def _figures(judged: Sequence[Judged], vehicle: Vehicle) -> dict[str, Any]:
     whole = [one for one in judged if Why.TOO_SHORT not in one.estimate.rejected]
     counted = [one for one in whole if one.estimate.counted]
     return {
-        "estimator": estimator,
         "n_batches": len(whole),
         "n_rejected": len(whole) - len(counted),
         "rejected_by_reason": _reasons(whole),
@@ -48,7 +73,6 @@ def error_table(judged: Sequence[Judged], vehicle: Vehicle, estimator: str) -> d
             "pp",
             vehicle,
         ),
-        "batches": [_batch_row(one) for one in judged],
     }
 
 
@@ -79,6 +103,9 @@ def _errors(
         "std_pct": float(np.std(error * percent)) if error.size else None,
         "max_abs_pct": float(np.max(np.abs(error) * percent)) if error.size else None,
         f"mean_abs_{unit}": _mean(np.abs(error)),
+        f"bias_{unit}": _mean(error),
+        f"std_{unit}": float(np.std(error)) if error.size else None,
+        f"max_abs_{unit}": float(np.max(np.abs(error))) if error.size else None,
         "coverage95": _mean(covered.astype(float)),
     }
     if unit == "kg":
@@ -95,10 +122,4 @@ def _mean(x: F64) -> float | None:
 def _batch_row(one: Judged) -> dict[str, Any]:
     shown = estimate_to_json(one.estimate)
     shown.pop("spectra", None)
-    return {
-        "run": one.run,
-        "log": one.name,
-        "true_payload_kg": one.payload_kg,
-        "true_front_share_pct": one.front_share_pct,
-        **shown,
-    }
+    return {**_truth(one), **shown}

@@ -49,8 +49,24 @@ def _table(table: dict[str, Any]) -> str:
         f"{'':14}{'mean |e|':>10}{'+ misses':>10}{'bias':>9}{'std':>9}{'max':>9}{'mean |e|':>12}{'covered':>9}",
         _row("payload", table["payload"], "kg"),
         _row("front share", table["front_share"], "pp"),
+        "",
+        f"{'run':>4}  {'true':>18}{'batches':>9}{'rejected':>10}"
+        f"{'payload, mean |e|':>19}{'bias':>10}{'share, mean |e|':>17}{'bias':>10}",
+        *(_run_row(run) for run in table["runs"]),
     ]
     return "\n".join(lines)
+
+
+def _run_row(run: dict[str, Any]) -> str:
+    payload, share = run["payload"], run["front_share"]
+    truth = f"{run['true_payload_kg']:g} kg at {run['true_front_share_pct']:.1f} %"
+    errors = (
+        _shown(payload["mean_abs_kg"], " kg", 19),
+        _shown(payload["bias_kg"], " kg", 10),
+        _shown(share["mean_abs_pp"], " pp", 17),
+        _shown(share["bias_pp"], " pp", 10),
+    )
+    return f"{run['run']:>4}  {truth:>18}{run['n_batches']:>9}{run['n_rejected']:>10}{''.join(errors)}"
 
 
 def _row(name: str, errors: dict[str, Any], unit: str) -> str:

@@ -40,14 +40,14 @@ class Row:
 
 
 def tables_of(evidence: Evidence) -> list[dict[str, Any]]:
-    """The error table (12) of every drive by every method, without its batches."""
+    """The error table (12) of every drive by every method, without its runs and batches."""
     tables = []
     for kind, split in TITLES:
         methods = evidence.simulated if kind.startswith("test") else evidence.experimental
         for method in methods:
             errors = evidence.table(kind, split, method)
-            errors.pop("batches")
-            tables.append({"drive": kind, "split": split, "method": method.label, **errors})
+            summary = {name: part for name, part in errors.items() if name not in ("runs", "batches")}
+            tables.append({"drive": kind, "split": split, "method": method.label, **summary})
     return tables
 
 

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.drives import T0_NS, drive, joined, later
 
@@ -61,6 +63,28 @@ def test_pieces_at_the_end_of_a_run_are_no_batches() -> None:
     table = error_table([judged(100.0, 100.0), piece], VAN, "ratio_index")
     assert (table["n_batches"], table["n_rejected"], len(table["batches"])) == (1, 0, 2)
     assert table["payload"]["mean_abs_pct_with_misses"] == 0.0
+
+
+def test_every_run_has_figures_of_its_own() -> None:
+    first = [judged(100.0, 108.0), judged(100.0, 96.0)]
+    second = [replace(one, run=2, name="b.log") for one in (judged(300.0, 280.0), judged(300.0, None))]
+    runs = error_table([*first, *second], VAN, "ratio_index")["runs"]
+    assert [(run["run"], run["log"], run["true_payload_kg"]) for run in runs] == [(1, "a.log", 100), (2, "b.log", 300)]
+    assert [(run["n_batches"], run["n_rejected"]) for run in runs] == [(2, 0), (2, 1)]
+    assert [run["payload"]["bias_kg"] for run in runs] == pytest.approx([2.0, -20.0])
+    assert [run["payload"]["max_abs_kg"] for run in runs] == pytest.approx([8.0, 20.0])
+    assert runs[1]["rejected_by_reason"] == {"too_slow": 1}
+
+
+@given(errors_kg=st.lists(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=4), min_size=1, max_size=4))
+def test_the_table_is_its_runs_weighed_by_their_batches(errors_kg: list[list[float]]) -> None:
+    rows = [replace(judged(200.0, 200.0 + e), run=n) for n, run in enumerate(errors_kg, 1) for e in run]
+    table = error_table(rows, VAN, "ratio_index")
+    weights = [run["n_batches"] for run in table["runs"]]
+    for name in ("bias_kg", "mean_abs_kg", "coverage95"):
+        of_runs = np.average([run["payload"][name] for run in table["runs"]], weights=weights)
+        assert table["payload"][name] == pytest.approx(of_runs, abs=1e-9)
+    assert table["payload"]["max_abs_kg"] == max(run["payload"]["max_abs_kg"] for run in table["runs"])
 
 
 def test_nothing_answered_is_null_not_zero() -> None:
