@@ -1,0 +1,94 @@
+"""Which loads a vehicle may carry: those that could be driven next, and those it will be asked to weigh."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.core.calibrated import RANGE_MARGIN
+from gateway.core.vehicle import Vehicle, front_share_pct
+from gateway.core.weights import weights_of
+
+DRIVEN_PARTS: Final = (0.25, 0.5, 0.75, 1.0)  # of the largest payload
+DRIVEN_PLACES: Final = (0.15, 0.35, 0.55, 0.75, 1.0)  # of the wheelbase, behind the front axle
+WEIGHED_PARTS: Final = tuple(np.linspace(0.05, 1.0, 6).tolist())
+WEIGHED_PLACES: Final = tuple(np.linspace(0.1, 1.0, 7).tolist())
+PAYLOAD_STEP_KG: Final = 10.0
+POSITION_STEP_M: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedLoad:
+    """A payload with its centre position_m behind the front axle; nothing aboard has no position."""
+
+    payload_kg: float
+    position_m: float | None
+    front_share_pct: float
+
+
+def empty(vehicle: Vehicle) -> PlacedLoad:
+    """Nothing aboard."""
+    return PlacedLoad(0.0, None, vehicle.empty_front_share_pct)
+
+
+def drivable_loads(vehicle: Vehicle) -> tuple[PlacedLoad, ...]:
+    """The empty vehicle, then loads a fitter could prepare, in round numbers, within the vehicle's limits."""
+    most_kg = vehicle.payload_range_kg[1]
+    return _within_limits(
+        vehicle,
+        (
+            (max(_rounded(part * most_kg, PAYLOAD_STEP_KG), PAYLOAD_STEP_KG), _rounded(place, POSITION_STEP_M))
+            for part in DRIVEN_PARTS
+            for place in np.multiply(DRIVEN_PLACES, vehicle.wheelbase_m).tolist()
+        ),
+    )
+
+
+def weighed_loads(vehicle: Vehicle) -> tuple[PlacedLoad, ...]:
+    """A grid over what the vehicle will carry: payload_range_kg over the wheelbase, within its limits."""
+    most_kg = vehicle.payload_range_kg[1]
+    return _within_limits(
+        vehicle,
+        ((part * most_kg, place * vehicle.wheelbase_m) for part in WEIGHED_PARTS for place in WEIGHED_PLACES),
+    )
+
+
+def share_within_reach(targets: Sequence[PlacedLoad], driven: Sequence[PlacedLoad]) -> float | None:
+    """Share (0..1) of ``targets`` that lie in the loads and shares of ``driven``, plus the margin of ``out_of_range``.
+
+    A calibration answers ``out_of_range`` beyond it. None where ``driven`` spans nothing: then no limit is known.
+    """
+    payloads_kg = [load.payload_kg for load in driven]
+    shares_pct = [load.front_share_pct for load in driven]
+    if not min(payloads_kg) < max(payloads_kg) or not min(shares_pct) < max(shares_pct):
+        return None
+    inside = [
+        _is_near(target.payload_kg, payloads_kg) and _is_near(target.front_share_pct, shares_pct) for target in targets
+    ]
+    return float(np.mean(inside))
+
+
+def _is_near(x: float, seen: Sequence[float]) -> bool:
+    margin = RANGE_MARGIN * (max(seen) - min(seen))
+    return min(seen) - margin <= x <= max(seen) + margin
+
+
+def _within_limits(vehicle: Vehicle, loads: Iterable[tuple[float, float]]) -> tuple[PlacedLoad, ...]:
+    placed = (PlacedLoad(kg, m, front_share_pct(vehicle, kg, m)) for kg, m in dict.fromkeys(loads))
+    return (empty(vehicle), *(load for load in placed if _is_allowed(vehicle, load)))
+
+
+def _is_allowed(vehicle: Vehicle, load: PlacedLoad) -> bool:
+    """Limits are of the whole vehicle; one whose weight is not known is not checked."""
+    weights = weights_of(vehicle, load.payload_kg, 0.0, load.front_share_pct, 0.0)
+    checked = (
+        (weights.gross, vehicle.gross_limit_kg),
+        (weights.front_axle, vehicle.front_axle_limit_kg),
+        (weights.rear_axle, vehicle.rear_axle_limit_kg),
+    )
+    return not any(weight.is_known and limit is not None and weight.kg > limit for weight, limit in checked)
+
+
+def _rounded(x: float, step: float) -> float:
+    return round(round(x / step) * step, 6)
