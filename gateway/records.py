@@ -7,7 +7,7 @@ integer nanoseconds since 1970-01-01 UTC.
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -211,6 +211,7 @@ class Estimate:
     spectra: Spectra | None = None
     diagnostics: Mapping[str, float] = field(default_factory=dict)
     epoch: Mapping[str, float] = field(default_factory=dict)
+    tare: Mapping[str, float | str] = field(default_factory=dict)  # the zero taken off, and what was raw (core.tare)
     vehicle_id: str | None = None
     vin: str | None = None
 
@@ -221,8 +222,9 @@ class Estimate:
 
     @property
     def id(self) -> str:
-        """The same batch, vehicle, estimator and calibration have the same id, whenever it is computed."""
-        parts = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator, self.calibration_id)
+        """The same batch, vehicle, estimator, calibration and tare have the same id, whenever it is computed."""
+        parts: tuple[object, ...] = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator)
+        parts += (self.calibration_id, *((self.tare["tare_id"],) if self.tare else ()))
         digest = hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()
         return f"{self.t_end_ns}-{digest[:12]}"
 
@@ -269,19 +271,31 @@ def estimate_to_json(estimate: Estimate) -> dict[str, Any]:
         "diagnostics": {name: _number(x, 6) for name, x in e.diagnostics.items()},
     }
     record.update({f"epoch_{name}": _number(x, 9) for name, x in e.epoch.items()})
+    record.update({name: x if isinstance(x, str) else _number(x, 9) for name, x in e.tare.items()})
     if e.vin is not None:
         record["vin"] = e.vin
     if e.is_provisional:
         record["provisional"] = True
     if e.spectra is not None:
-        record["spectra"] = {
-            "freq_hz": _numbers(e.spectra.freq_hz, 6),
-            "vertical_acceleration_mps2_rthz": _numbers(e.spectra.vertical_acceleration, 5),
-            "pitch_rate_radps_rthz": _numbers(e.spectra.pitch_rate, 5),
-            "coherence": _numbers(e.spectra.coherence, 5),
-            "phase_rad": _numbers(e.spectra.phase_rad, 5),
-        }
+        record["spectra"] = spectra_to_json(e.spectra)
     return record
+
+
+def spectra_to_json(spectra: Spectra) -> dict[str, list[float | None]]:
+    """The JSON object of spectra: names with units, unknown is None."""
+    return {
+        "freq_hz": _numbers(spectra.freq_hz, 6),
+        "vertical_acceleration_mps2_rthz": _numbers(spectra.vertical_acceleration, 5),
+        "pitch_rate_radps_rthz": _numbers(spectra.pitch_rate, 5),
+        "coherence": _numbers(spectra.coherence, 5),
+        "phase_rad": _numbers(spectra.phase_rad, 5),
+    }
+
+
+def spectra_from_json(told: Mapping[str, Sequence[float | None]]) -> Spectra:
+    """The inverse of :func:`spectra_to_json`, as exact as that rounds."""
+    names = spectra_to_json(Spectra(*[np.empty(0)] * 5))
+    return Spectra(*(np.array([math.nan if x is None else x for x in told[name]]) for name in names))
 
 
 def json_line(record: Mapping[str, Any]) -> str:

@@ -30,6 +30,12 @@ class CalibratedVehicle:
         )
 
 
-def _is_outside(interval: tuple[float, float], seen: tuple[float, float]) -> bool:
+def believed(seen: tuple[float, float]) -> tuple[float, float] | None:
+    """The range seen plus its margin; None where one load was seen, which sets no limit."""
     margin = RANGE_MARGIN * (seen[1] - seen[0])
-    return margin > 0.0 and (interval[1] < seen[0] - margin or interval[0] > seen[1] + margin)
+    return (seen[0] - margin, seen[1] + margin) if margin > 0.0 else None
+
+
+def _is_outside(interval: tuple[float, float], seen: tuple[float, float]) -> bool:
+    limits = believed(seen)
+    return limits is not None and (interval[1] < limits[0] or interval[0] > limits[1])

@@ -7,6 +7,7 @@ from typing import Final
 
 from gateway.core.vehicle import Vehicle
 
+Z95: Final = 1.959964
 RELEASE_SHARE: Final = 0.03  # of the limit: how far a load must fall below it before a warning ends
 
 
@@ -55,6 +56,36 @@ def weights_of(
             (1.0 - share) * sprung_kg + rear_kg, math.hypot((1.0 - share) * payload_std_kg, from_share_kg)
         ),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where the payload's centre of gravity is, behind the front axle, and its standard deviation."""
+
+    position_m: float
+    std_m: float
+
+
+def place_of(
+    vehicle: Vehicle, payload_kg: float, payload_std_kg: float, front_share_pct: float, front_share_std_pct: float
+) -> Place | None:
+    """Where the payload lies; None where there may be none, and so no place to tell.
+
+    With s the share, s0 the empty share, M the empty mass and l the wheelbase, moments about the front axle give
+
+        d = l (1 - F / L),    F = s (M + L) - s0 M,    the part of L that rests on the front axle,
+
+    the inverse of equation (3) of Bottelli et al. The deviation is of first order in L and s.
+    """
+    if not payload_kg > Z95 * payload_std_kg:
+        return None
+    share, empty_share = front_share_pct / 100.0, vehicle.empty_front_share_pct / 100.0
+    total_kg = vehicle.empty_mass_kg + payload_kg
+    front_share_of_load = (share * total_kg - empty_share * vehicle.empty_mass_kg) / payload_kg
+    by_payload = (share - front_share_of_load) / payload_kg * payload_std_kg
+    by_share = total_kg / payload_kg * front_share_std_pct / 100.0
+    position = 1.0 - front_share_of_load  # in wheelbases
+    return Place(vehicle.wheelbase_m * position, vehicle.wheelbase_m * math.hypot(by_payload, by_share))
 
 
 def unsprung_kg(vehicle: Vehicle) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from gateway.web.metrics import metrics_registry
 from gateway.web.reader import Reader
 from gateway.web.rfms import rfms_router
 from gateway.web.settings import WebSettings
+from gateway.web.spectra import spectra_router
 from gateway.web.status import Status
 from gateway.web.tokens import TokenFile
 from gateway.web.vehicle import vehicle_router
@@ -68,7 +69,8 @@ def create_app(
     problems.install(app)
     scales = Scales(calibrated)
     app.include_router(api_router(board, reader, status, chosen))
-    app.include_router(vehicle_router(board, status, calibrated))
+    app.include_router(vehicle_router(status, calibrated))
+    app.include_router(spectra_router(board, calibrated))
     app.include_router(export_router(reader))
     app.include_router(weights_router(board, scales))
     app.include_router(vss_router(board, scales))

@@ -124,11 +124,9 @@ class Board:
         with self._lock:
             return tuple(self._recent)
 
-    def latest_spectra(self) -> dict[str, Any]:
-        """Which batch was heard last, answered or not, and its spectra (None where it has none)."""
-        heard = self._heard
-        names = ("id", "t_start", "t_end", "rejected")
-        return {**{name: heard[name] for name in names}, "spectra": heard.get("spectra")}
+    def heard(self) -> Record:
+        """The last full batch, answered or not; all null before the first."""
+        return self._heard
 
     def _age_s(self, shown: _Shown) -> float | None:
         return None if shown.received_s is None else max(0.0, self._clock() - shown.received_s)

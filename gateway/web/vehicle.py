@@ -1,16 +1,11 @@
-"""/api/v1/vehicle and /api/v1/spectra/latest: what is known of the vehicle, and what its springs say."""
+"""/api/v1/vehicle: what is known of the vehicle, its calibration and its signals."""
 
 from collections.abc import Callable
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
-from starlette.responses import Response
 
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.ratio_index import Band as RatioBand
-from gateway.records import json_line
-from gateway.web.board import Board
-from gateway.web.schemas import Spectra
+from gateway.core.calibrated import CalibratedVehicle, believed
 from gateway.web.status import SignalHealth, Status
 
 
@@ -21,6 +16,10 @@ class VehicleFigures(BaseModel):
     empty_mass_kg: float
     wheelbase_m: float
     empty_front_share_pct: float
+    sensor_position_m: float = Field(description="behind the front axle", examples=[3.2])
+    sensor_offset_left_m: float
+    payload_range_kg: tuple[float, float] = Field(description="only normalises errors; gates nothing")
+    front_share_range_pct: tuple[float, float]
     unsprung_front_kg: float | None
     unsprung_rear_kg: float | None
     kerb_front_axle_kg: float | None
@@ -34,8 +33,14 @@ class CalibrationFigures(BaseModel):
     """The calibration in use and the loads it saw: the ranges in which answers are trusted."""
 
     id: str
-    payload_seen_kg: tuple[float, float]
-    front_share_seen_pct: tuple[float, float]
+    estimators: tuple[str, ...] = Field(description="those it can serve", examples=[["cross_spectrum", "ratio_index"]])
+    payload_seen_kg: tuple[float, float] = Field(examples=[[0.0, 420.0]])
+    front_share_seen_pct: tuple[float, float] = Field(examples=[[41.0, 58.0]])
+    payload_believed_kg: tuple[float, float] | None = Field(
+        description="an interval wholly outside is rejected as out_of_range; null: one load seen, no limit"
+    )
+    front_share_believed_pct: tuple[float, float] | None
+    speed_seen_mps: tuple[float, float] | None = Field(description="batch means", examples=[[13.5, 14.1]])
 
 
 class VehicleDescription(BaseModel):
@@ -49,29 +54,9 @@ class VehicleDescription(BaseModel):
     signals: tuple[SignalHealth, ...]
 
 
-class BandHz(BaseModel):
-    """A band of a ratio index."""
-
-    centre_hz: float
-    width_hz: float
-
-
-class LatestSpectra(BaseModel):
-    """Spectra of the last batch, answered or not; nulls before the first."""
-
-    id: str | None
-    t_start: str | None
-    t_end: str | None
-    rejected: list[str]
-    spectra: Spectra | None
-    acceleration_bands: list[BandHz] | None = Field(description="ratio index: numerator and denominator")
-    pitch_rate_bands: list[BandHz] | None = Field(description="ratio index: numerator and denominator")
-
-
-def vehicle_router(board: Board, status: Callable[[], Status], calibrated: CalibratedVehicle | None) -> APIRouter:
+def vehicle_router(status: Callable[[], Status], calibrated: CalibratedVehicle | None) -> APIRouter:
     """The routes about the vehicle itself; ``calibrated`` is what the service estimates with."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
-    bands = _bands(calibrated)
 
     @router.get("/vehicle")
     async def vehicle() -> VehicleDescription:
@@ -86,33 +71,27 @@ def vehicle_router(board: Board, status: Callable[[], Status], calibrated: Calib
             signals=now.signals,
         )
 
-    @router.get("/spectra/latest", response_model=LatestSpectra)
-    async def latest_spectra() -> Response:
-        """Auto- and cross-spectra of the last batch, with the bands the ratio index reads."""
-        return Response(json_line({**board.latest_spectra(), **bands}), media_type="application/json")
-
     return router
 
 
 def _calibration(calibrated: CalibratedVehicle) -> CalibrationFigures:
+    by_estimator = {"cross_spectrum": calibrated.cross_spectrum, "ratio_index": calibrated.ratio_index}
     return CalibrationFigures(
         id=calibrated.id,
+        estimators=tuple(name for name, part in by_estimator.items() if part is not None),
         payload_seen_kg=calibrated.payload_seen_kg,
         front_share_seen_pct=calibrated.front_share_seen_pct,
+        payload_believed_kg=believed(calibrated.payload_seen_kg),
+        front_share_believed_pct=believed(calibrated.front_share_seen_pct),
+        speed_seen_mps=_speed_seen_mps(calibrated),
     )
+
+
+def _speed_seen_mps(calibrated: CalibratedVehicle) -> tuple[float, float] | None:
+    if calibrated.cross_spectrum is not None:
+        return calibrated.cross_spectrum.speed_seen_mps
+    return None if calibrated.ratio_index is None else calibrated.ratio_index.speed_range_mps
 
 
 def _figures(calibrated: CalibratedVehicle) -> VehicleFigures:
     return VehicleFigures(**{name: getattr(calibrated.vehicle, name) for name in VehicleFigures.model_fields})
-
-
-def _bands(calibrated: CalibratedVehicle | None) -> dict[str, list[dict[str, float]] | None]:
-    index = None if calibrated is None else calibrated.ratio_index
-    return {
-        "acceleration_bands": None if index is None else _pair(index.acceleration_bands),
-        "pitch_rate_bands": None if index is None else _pair(index.pitch_rate_bands),
-    }
-
-
-def _pair(bands: tuple[RatioBand, RatioBand] | None) -> list[dict[str, float]] | None:
-    return None if bands is None else [{"centre_hz": b.centre_hz, "width_hz": b.width_hz} for b in bands]

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import Weights, is_over_limit, weights_of
+from gateway.core.weights import Place, Weights, is_over_limit, place_of, weights_of
 from gateway.web.board import Board
 
 
@@ -23,6 +23,13 @@ class WeightFigure(BaseModel):
     is_over_limit: bool = Field(examples=[False])
 
 
+class LoadPlace(BaseModel):
+    """The payload's centre of gravity, behind the front axle."""
+
+    position_m: float = Field(examples=[1.3])
+    std_m: float = Field(examples=[0.08])
+
+
 class LatestWeights(BaseModel):
     """Static weights, unsprung masses included, of the estimate that ``/estimates/latest`` shows."""
 
@@ -33,6 +40,7 @@ class LatestWeights(BaseModel):
     gross: WeightFigure
     front_axle: WeightFigure
     rear_axle: WeightFigure
+    load: LoadPlace | None = Field(description="null: unknown, or no payload that is surely there")
 
 
 class Scales:
@@ -52,6 +60,13 @@ class Scales:
             record["front_share_pct"],
             _number(record["front_share_std_pct"]),
         )
+
+    def place(self, record: Mapping[str, Any]) -> Place | None:
+        """Where the payload of one record lies; None where that cannot be told."""
+        names = ("payload_kg", "payload_std_kg", "front_share_pct", "front_share_std_pct")
+        if self.vehicle is None or any(record[name] is None for name in names):
+            return None
+        return place_of(self.vehicle, *(record[name] for name in names))
 
     def limits_kg(self) -> dict[str, float | None]:
         """The limits that were stated for this vehicle."""
@@ -79,7 +94,7 @@ def weigh_latest(board: Board, scales: Scales) -> LatestWeights:
     """Weights of the estimate shown now; the warnings look back over the last estimates."""
     shown = json.loads(board.latest()[1])
     history = [weights for record in board.recent_estimates() if (weights := scales.weigh(record)) is not None]
-    now = scales.weigh(shown)
+    now, place = scales.weigh(shown), scales.place(shown)
     limits = scales.limits_kg()
     return LatestWeights(
         id=shown["id"],
@@ -89,6 +104,7 @@ def weigh_latest(board: Board, scales: Scales) -> LatestWeights:
         gross=_figure(now, history, "gross", limits["gross"]),
         front_axle=_figure(now, history, "front_axle", limits["front_axle"]),
         rear_axle=_figure(now, history, "rear_axle", limits["rear_axle"]),
+        load=None if place is None else LoadPlace(position_m=round(place.position_m, 3), std_m=round(place.std_m, 3)),
     )
 
 

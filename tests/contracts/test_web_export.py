@@ -83,9 +83,14 @@ def test_the_vehicle_is_told_with_its_calibration_and_ranges(tmp_path: Path) -> 
     assert (told["vehicle_id"], told["vin"]) == ("van-17", "VF1" + "0" * 14)
     assert told["calibration"] == {
         "id": "sha256:ab",
+        "estimators": ["ratio_index"],
         "payload_seen_kg": [0.0, 420.0],
         "front_share_seen_pct": [42.0, 55.0],
+        "payload_believed_kg": [-105.0, 525.0],
+        "front_share_believed_pct": [38.75, 58.25],
+        "speed_seen_mps": [13.0, 15.0],
     }
+    assert told["figures"]["sensor_position_m"] == 0.0
     assert told["figures"]["empty_mass_kg"] == 1240.0
     assert told["figures"]["rear_axle_limit_kg"] is None
     assert told["signals"][0]["rate_hz"] == 5.0

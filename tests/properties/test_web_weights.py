@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.core.vehicle import Vehicle, axle_loads_n, front_share_pct
-from gateway.core.weights import RELEASE_SHARE, is_over_limit, unsprung_kg, weights_of
+from gateway.core.weights import RELEASE_SHARE, Z95, is_over_limit, place_of, unsprung_kg, weights_of
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 VAN = Vehicle("van", 1240.0, 2.8, empty_front_share_pct=52.0, unsprung_front_kg=90.0, unsprung_rear_kg=110.0)
@@ -87,3 +87,26 @@ def test_an_unknown_weight_changes_no_warning() -> None:
     assert not is_over_limit([math.nan], 2000.0)
     assert not is_over_limit([], 2000.0)
     assert not is_over_limit([9999.0], None)
+
+
+@given(st.floats(20.0, 800.0), positions)
+def test_the_place_told_is_the_place_loaded(payload_kg: float, position_m: float) -> None:
+    place = place_of(VAN, payload_kg, 1.0, front_share_pct(VAN, payload_kg, position_m), 0.0)
+    assert place is not None
+    assert place.position_m == pytest.approx(position_m, abs=1e-6)
+
+
+def test_the_deviation_of_the_place_is_that_of_many_draws() -> None:
+    random = np.random.default_rng(7)
+    share_pct = front_share_pct(VAN, 270.0, 1.3)
+    draws = zip(random.normal(270.0, 8.0, 20_000), random.normal(share_pct, 0.3, 20_000), strict=True)
+    drawn = [place.position_m for p, s in draws if (place := place_of(VAN, p, 0.0, s, 0.0)) is not None]
+    told = place_of(VAN, 270.0, 8.0, share_pct, 0.3)
+    assert told is not None
+    assert told.std_m == pytest.approx(float(np.std(drawn)), rel=0.03)
+
+
+@given(st.floats(-100.0, 100.0), st.floats(0.1, 50.0), shares)
+def test_what_may_not_be_there_has_no_place(payload_kg: float, std_kg: float, share_pct: float) -> None:
+    place = place_of(VAN, payload_kg, std_kg, share_pct, 0.3)
+    assert (place is None) == (payload_kg - Z95 * std_kg <= 0.0)
