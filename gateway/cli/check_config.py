@@ -8,6 +8,7 @@ from gateway.cli.options import FILE, as_json
 from gateway.config import load_settings
 from gateway.offline.estimates import setup_of
 from gateway.records import json_line
+from gateway.uplink import uplink_settings
 
 
 @click.command("check-config")
@@ -17,6 +18,7 @@ def check_config(config: Path, as_json: bool) -> None:
     """Check CONFIG, its signal map, its DBC files and its calibration; name every fault."""
     settings = load_settings(config)
     setup = setup_of(settings)
+    forwarding = uplink_settings(settings.uplink, settings.vehicle)
     found = {
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
@@ -24,6 +26,7 @@ def check_config(config: Path, as_json: bool) -> None:
         "estimator": setup.estimator,
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,
+        "uplink": forwarding.broker if forwarding else None,
     }
     if as_json:
         click.echo(json_line(found))

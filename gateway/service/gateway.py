@@ -14,12 +14,14 @@ from gateway.bus.source import LiveSource
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.offline.estimates import Setup
+from gateway.service.forwarding import uplink_of
 from gateway.service.log import log_event
 from gateway.service.notify import Notifier
 from gateway.service.pipeline import Pipeline
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
 from gateway.store import Retention, Store
+from gateway.uplink import uplink_settings
 from gateway.web import Board, TokenFile, create_app, refuse_open_address, server_config
 
 SUPERVISE_S = 0.25
@@ -59,6 +61,7 @@ class Gateway:
         token_file = TokenFile(settings.store.directory / "tokens.json")
         tokens = token_file if token_file.tokens() else None
         refuse_open_address(settings.web.host, has_tokens=tokens is not None)
+        forwarding = uplink_settings(settings.uplink, settings.vehicle)
         self.store = Store.open(
             settings.store.directory,
             Retention(
@@ -80,7 +83,8 @@ class Gateway:
         )
         flow = setup.flow(settings.batch.for_core(is_live=True))
         self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board)
-        self.status = StatusReport(settings, setup, self.source, self.pipeline, self.store, self.board)
+        self.uplink = uplink_of(forwarding, setup, self.store)
+        self.status = StatusReport(settings, setup, self.source, self.pipeline, self.store, self.board, self.uplink)
         calibrated = setup.calibration.for_core() if setup.calibration else None
         app = create_app(self.board, self.store.reader(), self.status, calibrated=calibrated, tokens=tokens)
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
@@ -119,6 +123,8 @@ class Gateway:
         loop.add_signal_handler(signal.SIGHUP, self._reload_told)
         self.source.start()
         self.pipeline.start()
+        if self.uplink is not None:
+            self.uplink.start()
         self.store.write_event("started", {"interface": self._settings.bus.interface})
         serving = asyncio.create_task(self._serve_web())
         supervising = asyncio.create_task(self._supervise(serving))
@@ -168,6 +174,8 @@ class Gateway:
             return f"the pipeline died: {self.pipeline.failure!r}"
         if not self.store.is_alive():
             return "the database writer died"
+        if self.uplink is not None and not self.uplink.is_alive():
+            return "the uplink died"
         if serving.done():
             return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: is it taken?"
         return None
@@ -177,6 +185,8 @@ class Gateway:
         self._notifier.send(STOPPING="1", STATUS="Stopping.")
         self.source.stop()
         self.pipeline.stop()
+        if self.uplink is not None:
+            self.uplink.stop()
         self.board.close()
         self.store.write_event("stopped", {"failure": self._failure})
         n_lost = self.store.close()

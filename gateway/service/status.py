@@ -11,7 +11,18 @@ from gateway.offline.estimates import Setup
 from gateway.records import Signal
 from gateway.service.pipeline import Pipeline
 from gateway.store import Store
-from gateway.web import BatchCounts, Board, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
+from gateway.uplink import Uplink
+from gateway.web import (
+    BatchCounts,
+    Board,
+    BusStatus,
+    DecodeCount,
+    SignalHealth,
+    State,
+    Status,
+    StoreStatus,
+    UplinkStatus,
+)
 
 SPEED_LOST_S = 10.0  # without a valid speed for this long the service waits for one
 
@@ -20,7 +31,14 @@ class StatusReport:
     """Callable that tells the present :class:`Status`; quick, and safe from any thread."""
 
     def __init__(
-        self, settings: Settings, setup: Setup, source: LiveSource, pipeline: Pipeline, store: Store, board: Board
+        self,
+        settings: Settings,
+        setup: Setup,
+        source: LiveSource,
+        pipeline: Pipeline,
+        store: Store,
+        board: Board,
+        uplink: Uplink | None = None,
     ) -> None:
         self._settings = settings
         self._setup = setup
@@ -28,6 +46,7 @@ class StatusReport:
         self._pipeline = pipeline
         self._store = store
         self._board = board
+        self._uplink = uplink
         self._started = time.monotonic()
 
     def __call__(self) -> Status:
@@ -52,6 +71,7 @@ class StatusReport:
                 rejected_by_reason=dict(self._pipeline.rejected_by_reason),
             ),
             store=StoreStatus.model_validate(asdict(self._store.health())),
+            uplink=UplinkStatus.model_validate(asdict(self._uplink.report())) if self._uplink else None,
             is_ready=not_ready is None,
             not_ready_reason=not_ready,
         )

@@ -13,6 +13,7 @@ from gateway.web.status import (
     State,
     Status,
     StoreStatus,
+    UplinkStatus,
 )
 from gateway.web.tokens import Scope, Token, TokenFile
 
@@ -30,6 +31,7 @@ __all__ = [
     "Tls",
     "Token",
     "TokenFile",
+    "UplinkStatus",
     "WebSettings",
     "create_app",
     "refuse_open_address",

@@ -9,7 +9,7 @@ from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from gateway.web.board import Board
-from gateway.web.status import State, Status
+from gateway.web.status import State, Status, UplinkStatus
 from gateway.web.weights import LatestWeights, Scales, weigh_latest
 
 
@@ -33,6 +33,8 @@ class StatusCollector:
         yield from _signals(now)
         yield from _batches(now)
         yield from _store(now)
+        if now.uplink is not None:
+            yield from _uplink(now.uplink)
         yield from _web(self._board, self._responses)
         yield from _estimate(self._board)
         yield from _weights(weigh_latest(self._board, self._scales))
@@ -131,6 +133,18 @@ def _store(now: Status) -> Iterator[Metric]:
             "duplicate": store.n_duplicates,
             "pruned": store.n_pruned,
         },
+    )
+
+
+def _uplink(uplink: UplinkStatus) -> Iterator[Metric]:
+    yield _gauge("springscale_uplink_connected", "1 while connected to the broker.", float(uplink.is_connected))
+    yield _gauge("springscale_uplink_waiting_rows", "Rows still to be delivered.", uplink.n_waiting)
+    yield _counter("springscale_uplink_connections_total", "Times the broker was reached.", uplink.n_connections)
+    yield _labelled(
+        "springscale_uplink_rows_total",
+        "Rows by what became of them.",
+        "outcome",
+        {"delivered": uplink.n_delivered, "refused": uplink.n_refused, "pruned": uplink.n_pruned},
     )
 
 

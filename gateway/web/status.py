@@ -88,6 +88,19 @@ class StoreStatus(_Told):
     set_aside: str | None = Field(None, description="damaged database that was renamed out of the way")
 
 
+class UplinkStatus(_Told):
+    """How estimates get to the fleet's broker; counts begin at the start but for those the store keeps."""
+
+    broker: str = Field(examples=["fleet.example:8883"])
+    is_connected: bool = False
+    n_delivered: int = Field(0, description="acknowledged by the broker")
+    n_refused: int = Field(0, description="given up: the broker will never take them")
+    n_waiting: int = Field(0, description="in the store, still to be delivered; as of a few seconds ago")
+    n_pruned: int = Field(0, description="removed by retention before they could be delivered")
+    n_connections: int = 0
+    last_fault: str | None = None
+
+
 class Status(_Told):
     """The service as it is now; counts begin at its start."""
 
@@ -104,6 +117,7 @@ class Status(_Told):
     signals: tuple[SignalHealth, ...] = ()
     batches: BatchCounts = BatchCounts()
     store: StoreStatus = StoreStatus()
+    uplink: UplinkStatus | None = Field(None, description="null where no broker is configured")
     is_ready: bool = Field(True, description="whether estimates can come: what /health/ready tells")
     not_ready_reason: str | None = None
 
@@ -120,4 +134,6 @@ class Status(_Told):
             said.append("No calibration: spectra only, no payload.")
         if self.store.state != "ok":
             said.append(f"Estimates are kept in memory only ({self.store.reason}).")
+        if self.uplink is not None and not self.uplink.is_connected and self.uplink.last_fault:
+            said.append(f"Not connected to the fleet's broker ({self.uplink.last_fault}); estimates wait.")
         return " ".join(said)

@@ -1,0 +1,91 @@
+"""The real service forwards what its store holds to a real broker, tells how it goes, and says goodbye."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import httpx
+from support.broker import Listener, free_port, needs_mosquitto, running_broker
+from support.estimates import make_record
+
+from gateway.store import Store
+
+pytestmark = needs_mosquitto
+
+
+def configuration(folder: Path, web_port: int, broker_port: int) -> Path:
+    path = folder / "springscale.toml"
+    path.write_text(
+        f"""
+        signals = "springscale:reference"
+        [vehicle]
+        id = "van-17"
+        [bus]
+        interface = "virtual"
+        channel = "{folder.name}"
+        [web]
+        port = {web_port}
+        [store]
+        directory = "state"
+        [uplink]
+        host = "127.0.0.1"
+        port = {broker_port}
+        tls = false
+        """
+    )
+    return path
+
+
+def asked(url: str, end_s: float) -> httpx.Response:
+    while True:
+        try:
+            return httpx.get(url)
+        except httpx.TransportError:
+            if time.monotonic() > end_s:
+                raise
+            time.sleep(0.05)
+
+
+def test_the_service_forwards_its_history_and_tells_how_it_goes(tmp_path: Path) -> None:
+    records = [make_record(n) for n in range(3)]
+    store = Store.open(tmp_path / "state")
+    for record in records:
+        store.write_estimate(record)
+    store.close()
+    web_port = free_port()
+    end_s = time.monotonic() + 30.0
+    with running_broker(tmp_path) as broker:
+        listener = Listener(broker.port, "springscale/van-17/#")
+        service = subprocess.Popen(
+            [sys.executable, "-m", "gateway", "run", "--config", str(configuration(tmp_path, web_port, broker.port))]
+        )
+        status: dict[str, int] = {}
+        while status.get("n_delivered") != len(records) and time.monotonic() < end_s:
+            status = asked(f"http://127.0.0.1:{web_port}/api/v1/status", end_s).json()["uplink"]
+        metrics = asked(f"http://127.0.0.1:{web_port}/metrics", end_s).text
+        service.send_signal(signal.SIGTERM)
+        assert service.wait(20.0) == 0
+        listener.wait_for(5, 10.0)
+        listener.close()
+    assert status["n_delivered"] == len(records)
+    assert status["is_connected"]
+    assert 'springscale_uplink_rows_total{outcome="delivered"} 3.0' in metrics
+    said = [json.loads(message.payload) for message in listener.heard]
+    assert said[0]["state"] == "online"
+    assert [one["id"] for one in said[1:4]] == [record["id"] for record in records]
+    assert said[4] == {"state": "offline", "reason": "stopped"}
+
+
+def test_a_broken_setting_stops_the_start_with_one_clear_line(tmp_path: Path) -> None:
+    path = configuration(tmp_path, 0, 1)
+    path.write_text(path.read_text() + '        topic = "fleet/#"\n')
+    for command in (["run", "--config"], ["check-config"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "gateway", *command, str(path)], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2
+        assert "[uplink] topic 'fleet/#'" in done.stderr
+        assert "Traceback" not in done.stderr
