@@ -25,6 +25,14 @@ class CalibrationFileError(ConfigurationError):
     """A calibration file is missing, damaged, of another version or of another vehicle."""
 
 
+class TareRefusedError(SpringscaleError):
+    """A vehicle cannot be re-zeroed now. ``reason`` is one of core.tare.Refusal; the message says what to do."""
+
+    def __init__(self, reason: str, message: str) -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
 class CalibrationImpossibleError(SpringscaleError):
     """The known-load drives do not carry enough to calibrate from."""
 

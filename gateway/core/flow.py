@@ -9,6 +9,7 @@ from gateway.core.estimator import estimate
 from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, fields_of, fused
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
+from gateway.core.tare import Tare, Weighed, remembered, tared
 from gateway.records import Batch, Estimate, Motion
 
 
@@ -21,7 +22,11 @@ class Identity:
 
 
 class Flow:
-    """Scheduler and estimator in a row. Feed it decoded rows in order of arrival."""
+    """Scheduler and estimator in a row. Feed it decoded rows in order of arrival.
+
+    ``tare`` may be set from any thread and counts from the next batch on; ``weighed`` is the last load
+    epoch with a counted batch, in raw numbers: what a tare is made from.
+    """
 
     def __init__(
         self,
@@ -30,6 +35,7 @@ class Flow:
         calibrated: CalibratedVehicle | None,
         estimator: str,
         identity: Identity,
+        tare: Tare | None = None,
     ) -> None:
         self.scheduler = Scheduler(settings, traits)
         self._calibrated = calibrated
@@ -37,6 +43,17 @@ class Flow:
         self._identity = identity
         self._epoch: LoadEpoch | None = None
         self._drive_start_ns: int | None = None
+        self._is_epoch_over = False
+        self.tare = tare
+        self.weighed: Weighed | None = None
+
+    @property
+    def load_may_have_changed(self) -> bool:
+        """True where the vehicle has driven on since ``weighed`` after a stop long enough to load or unload."""
+        weighed, drive_start_ns = self.weighed, self.scheduler.drive_start_ns
+        if weighed is None or drive_start_ns is None:
+            return False
+        return self._is_epoch_over or drive_start_ns != weighed.drive_start_ns
 
     def feed(self, motion: Motion) -> Iterator[Estimate]:
         """Estimates and rejections of the batches that end with these rows, provisional ones among them."""
@@ -49,7 +66,13 @@ class Flow:
     def _estimate(self, batch: Batch) -> Estimate:
         found = estimate(batch, self._calibrated, self._estimator)
         found = replace(found, vehicle_id=self._identity.vehicle_id, vin=self._identity.vin)
-        return found if batch.is_provisional else replace(found, epoch=self._fused(batch, found))
+        if batch.is_provisional:
+            self._is_epoch_over |= batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
+            return tared(found, self.tare)
+        shown = tared(replace(found, epoch=self._fused(batch, found)), self.tare)
+        self.weighed = remembered(self.weighed, self._epoch, shown, batch.drive_start_ns)
+        self._is_epoch_over = self._epoch is None
+        return shown
 
     def _fused(self, batch: Batch, found: Estimate) -> Mapping[str, float]:
         """Fields of the load epoch that this batch belongs to; a new drive or a long stop opens a new one."""

@@ -1,0 +1,177 @@
+"""Taring: the zero corrected in the field, while the vehicle is known to be empty.
+
+    zero = zero_of(weighed, vehicle)      # what the empty vehicle was weighed as, less what it is
+    tared(estimate, tare)                 # every later estimate, less that zero; the raw numbers ride along
+
+A tare corrects an offset, whatever its cause. It is no calibration: the scale stays as it is, and the
+offset is the same at every load. Estimators and their gates see the raw numbers throughout.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Final
+
+from gateway.core.fusion import LoadEpoch
+from gateway.core.vehicle import Vehicle
+from gateway.errors import TareRefusedError
+from gateway.records import Estimate
+
+MOST_PAYLOAD_SHARE: Final = 0.05  # of the empty sprung mass: a larger offset is a load, or asks for a calibration
+MOST_FRONT_SHARE_PCT: Final = 3.0  # percentage points
+MOST_STD_SHARE: Final = 0.5  # of these two bounds: a zero less sure than that corrects nothing
+BATCH_IDS: Final = 20  # the newest that a weighing names; it may rest on more
+Z95: Final = 1.959964
+
+
+class Refusal(StrEnum):
+    """Why a tare is refused. docs/calibration.md tells what each asks of a person."""
+
+    NO_CALIBRATION = "no_calibration"
+    NO_COUNTED_BATCH = "no_counted_batch"
+    LOAD_MAY_HAVE_CHANGED = "load_may_have_changed"
+    STALE = "stale"
+    OFFSET_TOO_LARGE = "offset_too_large"
+    OFFSET_UNCERTAIN = "offset_uncertain"
+    NOT_STORED = "not_stored"
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """A load epoch in raw numbers, as the calibration alone has it, and the batches it rests on.
+
+    ``drive_start_ns`` and ``t_end_ns`` are of its last counted batch; ``batch_ids`` the newest, newest last.
+    """
+
+    epoch: LoadEpoch
+    drive_start_ns: int
+    t_end_ns: int
+    batch_ids: tuple[str, ...]
+
+    @property
+    def n_batches(self) -> int:
+        """Counted batches in all."""
+        return self.epoch.payload_kg.n
+
+
+@dataclass(frozen=True, slots=True)
+class Zero:
+    """An offset with its standard deviation: payload in kg, front share in percentage points."""
+
+    payload_kg: float
+    payload_std_kg: float
+    front_share_pct: float
+    front_share_std_pct: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tare:
+    """A zero in use. It belongs to one calibration and one estimator; ``id`` is the hash of what was found."""
+
+    id: str
+    calibration_id: str
+    estimator: str
+    zero: Zero
+
+    def is_for(self, estimate: Estimate) -> bool:
+        """Whether this estimate is by the calibration and the estimator that the zero was found with."""
+        return (self.calibration_id, self.estimator) == (estimate.calibration_id, estimate.estimator)
+
+
+def remembered(before: Weighed | None, epoch: LoadEpoch | None, shown: Estimate, drive_start_ns: int) -> Weighed | None:
+    """The weighing after one more full batch; ``shown`` is its estimate as it leaves, ``epoch`` the epoch after it.
+
+    A batch that taught nothing changes nothing, nor does a stop: the last weighing stays until there is another.
+    """
+    if epoch is None or (before is not None and before.epoch is epoch):
+        return before
+    continues = before is not None and before.epoch.t_start_ns == epoch.t_start_ns
+    earlier = before.batch_ids if before is not None and continues else ()
+    return Weighed(epoch, drive_start_ns, shown.t_end_ns, (*earlier, shown.id)[-BATCH_IDS:])
+
+
+def zero_of(weighed: Weighed, vehicle: Vehicle) -> Zero:
+    """The zero that makes the weighed epoch an empty ``vehicle``. Raises TareRefusedError beyond the bounds.
+
+    An empty vehicle has payload 0 and the front share its campaign stated. Standard deviations are the
+    epoch's: what its batches share does not average out (core.fusion).
+    """
+    epoch = weighed.epoch
+    zero = Zero(
+        payload_kg=epoch.payload_kg.mean,
+        payload_std_kg=math.sqrt(epoch.payload_kg.var),
+        front_share_pct=epoch.front_share_pct.mean - vehicle.empty_front_share_pct,
+        front_share_std_pct=math.sqrt(epoch.front_share_pct.var),
+    )
+    most_kg = MOST_PAYLOAD_SHARE * vehicle.empty_mass_kg
+    _refuse_beyond(zero.payload_kg, zero.payload_std_kg, most_kg, "payload", "kg")
+    _refuse_beyond(zero.front_share_pct, zero.front_share_std_pct, MOST_FRONT_SHARE_PCT, "front share", "pp")
+    return zero
+
+
+def _refuse_beyond(offset: float, std: float, most: float, what: str, unit: str) -> None:
+    if not abs(offset) <= most:
+        raise TareRefusedError(
+            Refusal.OFFSET_TOO_LARGE,
+            f"the {what} is {offset:+.1f} {unit} off, a tare corrects up to {most:.1f} {unit}: "
+            "either the vehicle is not empty, or it needs a calibration",
+        )
+    if not std <= MOST_STD_SHARE * most:
+        raise TareRefusedError(
+            Refusal.OFFSET_UNCERTAIN,
+            f"the {what} is known to {std:.1f} {unit} only, a tare needs {MOST_STD_SHARE * most:.1f} {unit}: "
+            "drive on, empty, for another batch",
+        )
+
+
+def tared(estimate: Estimate, tare: Tare | None) -> Estimate:
+    """``estimate`` less the zero, its standard deviations widened by the zero's own in quadrature.
+
+    What was raw rides along in ``Estimate.tare``. Rejections, and estimates that the tare is not for,
+    stay as they are. Intervals keep their shape: each half of one widens in quadrature by the zero's 1.96 std.
+    """
+    if tare is None or not estimate.counted or not tare.is_for(estimate):
+        return estimate
+    zero, e = tare.zero, estimate
+    return replace(
+        e,
+        payload_kg=e.payload_kg - zero.payload_kg,
+        payload_std_kg=math.hypot(e.payload_std_kg, zero.payload_std_kg),
+        payload_interval95_kg=_moved(e.payload_interval95_kg, e.payload_kg, zero.payload_kg, zero.payload_std_kg),
+        front_share_pct=e.front_share_pct - zero.front_share_pct,
+        front_share_std_pct=math.hypot(e.front_share_std_pct, zero.front_share_std_pct),
+        front_share_interval95_pct=_moved(
+            e.front_share_interval95_pct, e.front_share_pct, zero.front_share_pct, zero.front_share_std_pct
+        ),
+        epoch=_moved_epoch(e.epoch, zero),
+        tare={
+            "tare_id": tare.id,
+            "tare_payload_kg": zero.payload_kg,
+            "tare_payload_std_kg": zero.payload_std_kg,
+            "tare_front_share_pct": zero.front_share_pct,
+            "tare_front_share_std_pct": zero.front_share_std_pct,
+            "raw_payload_kg": e.payload_kg,
+            "raw_payload_std_kg": e.payload_std_kg,
+            "raw_front_share_pct": e.front_share_pct,
+            "raw_front_share_std_pct": e.front_share_std_pct,
+        },
+    )
+
+
+def _moved(interval: tuple[float, float], centre: float, offset: float, std: float) -> tuple[float, float]:
+    """The interval of centre - offset; NaN stays NaN."""
+    below, above = centre - interval[0], interval[1] - centre
+    return centre - offset - math.hypot(below, Z95 * std), centre - offset + math.hypot(above, Z95 * std)
+
+
+def _moved_epoch(epoch: Mapping[str, float], zero: Zero) -> Mapping[str, float]:
+    if not epoch:
+        return epoch
+    return {
+        **epoch,
+        "payload_kg": epoch["payload_kg"] - zero.payload_kg,
+        "payload_std_kg": math.hypot(epoch["payload_std_kg"], zero.payload_std_kg),
+        "front_share_pct": epoch["front_share_pct"] - zero.front_share_pct,
+        "front_share_std_pct": math.hypot(epoch["front_share_std_pct"], zero.front_share_std_pct),
+    }
