@@ -32,6 +32,7 @@ check: .venv/.development
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python docs/make_settings.py --check
+	$(BIN)/python docs/make_reasons.py --check
 	$(BIN)/python docs/make_calibration_schema.py --check
 
 bench: .venv/.development
@@ -39,6 +40,7 @@ bench: .venv/.development
 
 docs: .venv/.development
 	$(BIN)/python docs/make_settings.py
+	$(BIN)/python docs/make_reasons.py
 	$(BIN)/python docs/make_calibration_schema.py
 
 # --no-emit-*: the lock names no package index, so it serves behind any mirror.

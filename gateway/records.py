@@ -42,7 +42,7 @@ class Signal(StrEnum):
 
 
 class Why(StrEnum):
-    """Why a batch gave no estimate. docs/reasons.md tells what each asks of a person."""
+    """Why a batch gave no estimate. gateway.reasons tells what each asks of a person."""
 
     NO_ESTIMATE_YET = "no_estimate_yet"
     NO_CALIBRATION = "no_calibration"

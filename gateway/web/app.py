@@ -19,6 +19,7 @@ from gateway.web.health import health_router
 from gateway.web.latest import LatestFirst
 from gateway.web.metrics import metrics_registry
 from gateway.web.reader import Reader
+from gateway.web.reasons import reasons_router
 from gateway.web.rfms import rfms_router
 from gateway.web.settings import WebSettings
 from gateway.web.spectra import spectra_router
@@ -69,6 +70,7 @@ def create_app(
     problems.install(app)
     scales = Scales(calibrated)
     app.include_router(api_router(board, reader, status, chosen))
+    app.include_router(reasons_router())
     app.include_router(vehicle_router(status, calibrated))
     app.include_router(spectra_router(board, calibrated))
     app.include_router(export_router(reader))

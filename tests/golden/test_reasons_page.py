@@ -1,13 +1,24 @@
 """docs/reasons.md explains every reason there is, and none that is not."""
 
+import importlib.util
 import re
 from pathlib import Path
 
 from gateway.config import BatchSection
 from gateway.records import Why
 
-PAGE = (Path(__file__).parents[2] / "docs" / "reasons.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "reasons.md").read_text(encoding="utf-8")
 ROWS = [line.split("|") for line in PAGE.splitlines() if line.startswith("| `")]
+
+
+def test_the_page_is_made_from_the_explanations() -> None:
+    spec = importlib.util.spec_from_file_location("make_reasons", DOCS / "make_reasons.py")
+    assert spec is not None
+    assert spec.loader is not None
+    maker = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(maker)
+    assert maker.reasons_page() == PAGE, "run `make docs`"
 
 
 def test_every_reason_is_explained_once() -> None:

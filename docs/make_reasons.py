@@ -1,0 +1,46 @@
+"""Writes docs/reasons.md from gateway/reasons.py; with --check only tells whether it is up to date."""
+
+import sys
+from pathlib import Path
+
+from gateway.reasons import EXPLANATIONS, Cause
+
+PAGE = Path(__file__).with_name("reasons.md")
+
+INTRODUCTION = """\
+# Why a batch gave no estimate
+
+Generated from `gateway/reasons.py` by `python docs/make_reasons.py`; do not edit by hand.
+
+Every batch ends as an estimate or with reasons in `rejected`; then the numbers are null. A reason is no fault of the
+software: it says that this stretch of driving cannot be weighed honestly. `shares` in the same record tells which part
+of the window each cause masked. Limits named below are [settings](settings.md) of `[batch]` unless another place is
+given.
+"""
+
+
+def reasons_page() -> str:
+    """The whole page as Markdown."""
+    return "\n".join([INTRODUCTION, *(_table(cause) for cause in Cause)])
+
+
+def _table(cause: Cause) -> str:
+    rows = [
+        f"| `{why}` | {explained.happened} | {explained.advice} |"
+        for why, explained in EXPLANATIONS.items()
+        if explained.cause is cause
+    ]
+    head = "| reason | what happened | what to do |\n|---|---|---|"
+    return f"## {cause}\n\n{head}\n" + "\n".join(rows) + "\n"
+
+
+def main() -> None:
+    """Write the page, or compare it."""
+    if "--check" not in sys.argv[1:]:
+        PAGE.write_text(reasons_page(), encoding="utf-8")
+    elif not PAGE.is_file() or PAGE.read_text(encoding="utf-8") != reasons_page():
+        sys.exit("docs/reasons.md does not say what gateway/reasons.py does: run `make docs`")
+
+
+if __name__ == "__main__":
+    main()

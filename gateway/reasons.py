@@ -1,0 +1,148 @@
+"""Why a batch gave no estimate, in words for people: what happened, and what to do about it.
+
+docs/reasons.md and the dashboard say this. Names in backquotes are settings of ``[batch]`` unless the
+text gives another place.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
+
+from gateway.records import Why
+
+
+class Cause(StrEnum):
+    """Where a reason comes from."""
+
+    NOTHING_YET = "Nothing to say yet"
+    DRIVE = "The drive"
+    SENSORS = "The sensors"
+    ANSWER = "The answer"
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """One reason in words; ``happened`` and ``advice`` are parts of sentences, as a table holds them."""
+
+    cause: Cause
+    happened: str
+    advice: str
+
+
+def _missing(sensor: str) -> Explanation:
+    return Explanation(
+        Cause.SENSORS,
+        f"the {sensor} sensor was silent, or what it sent was marked not available",
+        "check the signal map and the device",
+    )
+
+
+def _stuck(sensor: str) -> Explanation:
+    return Explanation(
+        Cause.SENSORS, f"the {sensor} repeated one number for `stuck_s`", "power-cycle or replace the device"
+    )
+
+
+def _saturated(sensor: str) -> Explanation:
+    return Explanation(
+        Cause.SENSORS, f"the {sensor} sat at the end of its range", "choose a larger range in the device"
+    )
+
+
+EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
+    {
+        Why.NO_ESTIMATE_YET: Explanation(
+            Cause.NOTHING_YET,
+            "nothing has been estimated since the store was made",
+            "drive; the first batch ends after `window_s`",
+        ),
+        Why.NO_CALIBRATION: Explanation(
+            Cause.NOTHING_YET,
+            "no calibration file is given, or it does not hold the chosen estimator",
+            "`springscale calibrate`, then name the file under `calibration`",
+        ),
+        Why.TOO_SHORT: Explanation(
+            Cause.DRIVE,
+            "the drive ended before the window was full (`last_batch_share_min`), or left too little even driving",
+            "drive on, or shorten `window_s`",
+        ),
+        Why.GAP: Explanation(
+            Cause.DRIVE,
+            "frames of both sensors are missing (`gap_s`, `gap_share_max`), or silence ended the drive (`silence_s`)",
+            "look at drops and bus state in `/api/v1/status`; check wiring and gateway load",
+        ),
+        Why.CLOCK_STEP: Explanation(
+            Cause.DRIVE,
+            "time stamps stepped back by more than `clock_step_s`",
+            "let the clock be set before the service starts",
+        ),
+        Why.TOO_SLOW: Explanation(
+            Cause.DRIVE,
+            "too much of the window below `speed_min_mps`: town, queue, yard",
+            "nothing; the next open road will do",
+        ),
+        Why.TOO_FAST: Explanation(
+            Cause.DRIVE,
+            "too much of the window above `speed_max_mps`",
+            "check the speed's unit in the signal map",
+        ),
+        Why.SPEED_SPREAD: Explanation(
+            Cause.DRIVE,
+            "speed varied more than the ratio index bears, or changed too fast throughout for even stretches to be "
+            "found",
+            "steady driving; `cross_spectrum` bears more than `ratio_index`",
+        ),
+        Why.SPEED_UNCALIBRATED: Explanation(
+            Cause.DRIVE,
+            "the mean speed is outside those the calibration has seen",
+            "calibrate with drives at this speed too",
+        ),
+        Why.NOT_ENOUGH_EXCITATION: Explanation(
+            Cause.DRIVE, "the road was too smooth to tell loads apart", "nothing; an ordinary road will do"
+        ),
+        Why.SPEED_MISSING: Explanation(
+            Cause.SENSORS,
+            "no valid speed for too much of the window (`speed_hold_s`)",
+            "check the antenna and `valid_when` in the signal map; map `wheel_speed` too",
+        ),
+        Why.SPEED_FROZEN: Explanation(
+            Cause.SENSORS,
+            "the speed repeated one number for `speed_frozen_s` while frames came",
+            "restart the receiver; check its antenna",
+        ),
+        Why.ACCELERATION_MISSING: _missing("acceleration"),
+        Why.PITCH_RATE_MISSING: _missing("pitch rate"),
+        Why.ACCELERATION_STUCK: _stuck("acceleration"),
+        Why.PITCH_RATE_STUCK: _stuck("pitch rate"),
+        Why.ACCELERATION_SATURATED: _saturated("acceleration"),
+        Why.PITCH_RATE_SATURATED: _saturated("pitch rate"),
+        Why.GRAVITY_MISSING: Explanation(
+            Cause.SENSORS,
+            "the mean vertical acceleration is far from 9.81 m/s2",
+            "wrong axis, sign or unit in the signal map, or the device has removed gravity",
+        ),
+        Why.SENSOR_RATE_LOW: Explanation(Cause.SENSORS, "the sensor sends too seldom for `rate_hz`", "raise its rate"),
+        Why.SENSOR_DISAGREEMENT: Explanation(
+            Cause.SENSORS,
+            "acceleration and pitch rate do not move together as one body does",
+            "check that both come from the same rigid place and time stamps",
+        ),
+        Why.WRONG_SIGN: Explanation(
+            Cause.SENSORS,
+            "the pitch rate fits the vehicle only when turned over",
+            "turn `sign` of `pitch_rate` in the signal map (positive nose down)",
+        ),
+        Why.OUT_OF_RANGE: Explanation(
+            Cause.ANSWER,
+            "the 95 % interval lies wholly outside the loads or shares of the calibration plus a margin",
+            "calibrate with such loads, or suspect vehicle and sensor",
+        ),
+        Why.MODEL_MISFIT: Explanation(
+            Cause.ANSWER,
+            "no payload and share explain these spectra as well as calibration leads to expect",
+            "look for a changed tyre, spring or sensor mount; calibrate anew",
+        ),
+    }
+)
