@@ -14,6 +14,7 @@ from typing import Any, Final, Literal
 import click
 
 from gateway.bus.sink import BusSink, replay_frames
+from gateway.cli.sentence import sentence
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
 from gateway.offline.demo_drive import demo_frames
 from gateway.offline.estimates import setup_of
@@ -105,14 +106,4 @@ def _print_estimates(folder: Path, as_json: bool) -> None:
     finally:
         store.close()
     for record in records:
-        click.echo(json_line(record) if as_json else _sentence(record))
-
-
-def _sentence(record: dict[str, Any]) -> str:
-    when = f"{record['t_start'][:19]}Z"
-    if record["rejected"]:
-        return f"{when}  no estimate: {', '.join(record['rejected'])}"
-    return (
-        f"{when}  payload {record['payload_kg']:7.1f} kg ± {record['payload_std_kg']:5.1f}   "
-        f"front share {record['front_share_pct']:5.2f} % ± {record['front_share_std_pct']:4.2f}"
-    )
+        click.echo(json_line(record) if as_json else sentence(record))

@@ -5,10 +5,11 @@ from pathlib import Path
 import click
 
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
+from gateway.cli.sentence import sentence
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.offline.estimates import Setup, estimates_of_logs, load_setup, setup_of
-from gateway.records import Estimate, estimate_to_json, iso_utc, json_line
+from gateway.records import estimate_to_json, json_line
 
 
 @click.command("estimate")
@@ -31,7 +32,8 @@ def estimate(
     """One line per batch of every LOG, rejected ones included with their reasons."""
     setup, settings = _prepared(config_path, signals, calibration, estimator, window_s)
     for found in estimates_of_logs(logs, setup, settings):
-        click.echo(json_line(estimate_to_json(found)) if as_json else _sentence(found))
+        record = estimate_to_json(found)
+        click.echo(json_line(record) if as_json else sentence(record))
 
 
 def _prepared(
@@ -51,14 +53,3 @@ def _prepared(
     if signals is None:
         raise click.UsageError("give --config FILE, or --signals FILE (and --calibration FILE)")
     return load_setup(signals, calibration, estimator), batch_settings(window_s)
-
-
-def _sentence(found: Estimate) -> str:
-    when = f"{iso_utc(found.t_start_ns)[:19]}Z"
-    if not found.counted:
-        return f"{when}  no estimate: {', '.join(found.rejected)}"
-    return (
-        f"{when}  payload {found.payload_kg:7.1f} kg ± {found.payload_std_kg:5.1f}   "
-        f"front share {found.front_share_pct:5.2f} % ± {found.front_share_std_pct:4.2f}   "
-        f"{found.mean_speed_mps * 3.6:5.1f} km/h"
-    )

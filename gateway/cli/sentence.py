@@ -1,0 +1,18 @@
+"""An estimate as a line for people."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from gateway.units import si_factor
+
+
+def sentence(record: Mapping[str, Any]) -> str:
+    """One line of the object of ``estimate_to_json``: when, how much, how sure; or why not."""
+    when = f"{record['t_start'][:19]}Z"
+    if record["rejected"]:
+        return f"{when}  no estimate: {', '.join(record['rejected'])}"
+    return (
+        f"{when}  payload {record['payload_kg']:7.1f} kg ± {record['payload_std_kg']:5.1f}   "
+        f"front share {record['front_share_pct']:5.2f} % ± {record['front_share_std_pct']:4.2f}   "
+        f"{record['mean_speed_mps'] / si_factor('speed', 'km/h'):5.1f} km/h"
+    )
