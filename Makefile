@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check bench lock docs clean
+.PHONY: demo test check bench deb lock docs clean
 .DEFAULT_GOAL := demo
 
 .venv/bin/python:
@@ -37,6 +37,10 @@ check: .venv/.development
 
 bench: .venv/.development
 	for bench in benchmarks/bench_*.py; do echo "== $$bench"; $(BIN)/python $$bench || exit 1; done
+
+# Debian packages in build/, for this machine's architecture; dpkg-deb must be there, root need not.
+deb: .venv/.package
+	$(BIN)/python deploy/deb/build.py
 
 docs: .venv/.development
 	$(BIN)/python docs/make_settings.py

@@ -35,6 +35,9 @@ _COMMANDS = {
 }
 
 
+_WORKBENCH = frozenset({"matplotlib", "numba"})  # the vehicle's Debian package leaves these to a package for desks
+
+
 class _Lazy(click.Group):
     """A group that imports a command's module only when the command is called."""
 
@@ -72,6 +75,11 @@ def main(arguments: list[str] | None = None) -> None:
     except SpringscaleError as fault:
         click.echo(f"springscale: {fault}", err=True)
         sys.exit(fault.exit_code)
+    except ModuleNotFoundError as fault:
+        if fault.name is None or fault.name.partition(".")[0] not in _WORKBENCH:
+            raise
+        click.echo(f"springscale: this command needs {fault.name}: apt install springscale-workbench", err=True)
+        sys.exit(1)
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)

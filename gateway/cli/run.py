@@ -1,5 +1,6 @@
 """springscale run: the service."""
 
+import faulthandler
 import os
 from functools import partial
 from pathlib import Path
@@ -19,5 +20,6 @@ def run(config_path: Path) -> None:
     """Read the bus, estimate, store and serve until SIGTERM."""
     load = partial(load_settings, config_path)
     settings = load()
+    faulthandler.enable()  # systemd's watchdog ends a hung process with SIGABRT: every stack goes to the journal
     set_up_log(settings.log.level, under_journald="JOURNAL_STREAM" in os.environ)
     Gateway(settings, setup_of(settings), load=load).run()
