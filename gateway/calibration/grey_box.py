@@ -39,8 +39,8 @@ UNTESTED: Final = "intervals_untested"
 _STARTS: Final = ((0.0, 0.0), (0.4, 0.3), (-0.4, -0.3))  # log springs, log dampers, off the prior's centre
 
 
-class _Known:
-    """A run's spectra with its truth."""
+class KnownSpectra:
+    """A run's spectra and likelihood with its true load."""
 
     def __init__(self, run: KnownRun, vehicle: Vehicle, spectra: CrossSpectra) -> None:
         ground = Ground(vehicle.empty_mass_kg, vehicle.empty_front_share_pct / 100.0, vehicle.wheelbase_m)
@@ -49,6 +49,7 @@ class _Known:
         self.whittle = Whittle(spectra, ground, EVIDENCE_WEIGHT)
 
     def at(self, theta: F64) -> Point:
+        """The parameters theta (p,) with the run's load."""
         return Point(theta, self.run.payload_kg, self.run.front_share_pct / 100.0)
 
 
@@ -80,7 +81,7 @@ def fit_cross_spectrum(
     ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError where no
     run holds enough steady driving.
     """
-    known = _usable(runs, vehicle)
+    known = known_spectra(runs, vehicle)
     prior = prior_of(vehicle)
     can_leave_out = len(known) >= LEAST_RUNS_TO_LEAVE_ONE_OUT
     n_steps = 1 + len(known) * can_leave_out
@@ -93,7 +94,7 @@ def fit_cross_spectrum(
     without: dict[int, CrossSpectrumCalibration] = {}
     for left_out, one in enumerate(known):
         others = [k for k in known if k is not one]
-        refound = _fit(others, prior, found.x)
+        refound = fit_half_car(others, prior, found.x)
         without[one.run.number] = _calibration(others, vehicle, refound)
         errors.extend(_left_out_errors(one, without[one.run.number]))
         _tell(progress, 2 + left_out, n_steps)
@@ -120,13 +121,14 @@ def _reading(vehicle: Vehicle) -> Reading:
     return Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT)
 
 
-def _usable(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[_Known]:
+def known_spectra(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[KnownSpectra]:
+    """Those of ``runs`` that hold enough steady driving. Raises CalibrationImpossibleError where none does."""
     known = []
     for run in runs:
         batches = [batch for batch in run.batches if not batch.rejected]
         spectra = cross_spectra_of(batches, _reading(vehicle))
         if spectra is not None:
-            known.append(_Known(run, vehicle, spectra))
+            known.append(KnownSpectra(run, vehicle, spectra))
     if not known:
         raise CalibrationImpossibleError(
             "no run holds enough steady driving for the cross-spectral estimator: drive at least a minute at speed"
@@ -134,12 +136,13 @@ def _usable(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[_Known]:
     return known
 
 
-def _best_fit(known: list[_Known], prior: Prior) -> Found:
+def _best_fit(known: list[KnownSpectra], prior: Prior) -> Found:
     """The best of several starts: the posterior need not have one peak."""
-    return min((_fit(known, prior, prior.start(*shift)) for shift in _STARTS), key=lambda found: found.cost)
+    return min((fit_half_car(known, prior, prior.start(*shift)) for shift in _STARTS), key=lambda found: found.cost)
 
 
-def _fit(known: list[_Known], prior: Prior, start: F64) -> Found:
+def fit_half_car(known: Sequence[KnownSpectra], prior: Prior, start: F64) -> Found:
+    """The most probable parameters (p,) of all known runs together, found from ``start`` (p,)."""
     everything = list(range(len(PARAMETERS)))
 
     def cost(theta: F64) -> float:
@@ -156,7 +159,7 @@ def _fit(known: list[_Known], prior: Prior, start: F64) -> Found:
     return most_probable(start, prior.mean, prior.std, cost, curvature, tolerance=0.05)
 
 
-def _calibration(known: list[_Known], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
+def _calibration(known: list[KnownSpectra], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
     runs = [k.run for k in known]
     payloads, shares = [r.payload_kg for r in runs], [r.front_share_pct for r in runs]
     speeds = [batch.mean_speed_mps for run in runs for batch in run.batches if not batch.rejected]
@@ -183,7 +186,7 @@ def _calibration(known: list[_Known], vehicle: Vehicle, found: Found) -> CrossSp
 
 
 def _left_out_errors(
-    one: _Known, calibration: CrossSpectrumCalibration
+    one: KnownSpectra, calibration: CrossSpectrumCalibration
 ) -> list[tuple[float, float, float, float, float]]:
     """For each batch of an unseen run: (payload, share) errors in their own standard deviations, the misfit,
     and the errors in kg and percentage points.
