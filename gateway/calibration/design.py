@@ -60,8 +60,7 @@ class Design:
             whittle, point = self._seen(load, self._drive, EVIDENCE_WEIGHT)
             everything = list(range(len(PARAMETERS)))
             self._information[load] = whittle.curvature(point, everything, is_load_free=False).information
-        found: F64 = np.linalg.inv(np.linalg.inv(covariance) + self._information[load])
-        return found
+        return np.asarray(np.linalg.inv(np.linalg.inv(covariance) + self._information[load]), float)
 
     def spread(self, covariance: F64) -> Spread:
         """How well the targets would be weighed in batches of five minutes, before any inflation."""

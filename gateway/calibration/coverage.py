@@ -1,0 +1,77 @@
+"""Do 95 % intervals hold the truth 95 times in 100? A share with its own interval, batches of one run being alike.
+
+Batches of one run share load, road and speed, so they are no independent tries: the interval is that
+of as many independent tries as would scatter like the runs' own shares (E. L. Korn and B. I. Graubard,
+"Confidence intervals for proportions with small expected number of positive counts estimated from
+survey data", Survey Methodology 24, 1998), with C. Clopper's and E. S. Pearson's limits (Biometrika 26, 1934).
+"""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import betaincinv, stdtrit
+
+from gateway.records import F64
+
+CONFIDENCE: Final = 0.95
+PROMISED: Final = (0.90, 0.99)
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """Share (0..1) of n intervals that held the truth, with the 95 % limits of that share.
+
+    n_effective is how many independent tries the n are worth.
+    """
+
+    n: int
+    n_clusters: int
+    n_effective: float
+    share: float
+    low: float
+    high: float
+
+    @property
+    def falls_short(self) -> bool:
+        """True where the limits lie wholly outside 90 to 99 %: too narrow intervals, or too wide ones."""
+        return self.high < PROMISED[0] or self.low > PROMISED[1]
+
+
+def coverage_of(covered: Sequence[bool], cluster: Sequence[Hashable]) -> Coverage:
+    """Pooled over all; ``cluster`` (n,) tells which tries belong together.
+
+    Raises ValueError for fewer than two clusters: nothing tells how they scatter.
+    """
+    labels, member = np.unique([str(label) for label in cluster], return_inverse=True)
+    n, n_clusters = len(covered), len(labels)
+    if n_clusters < 2:
+        raise ValueError(f"coverage needs batches of at least two runs, there are {n_clusters}")
+    hits: F64 = np.asarray(covered, dtype=float)
+    share = float(hits.mean())
+    n_effective = _effective(hits - share, member, n_clusters, share)
+    low, high = _clopper_pearson(share * n_effective, n_effective)
+    return Coverage(n, n_clusters, n_effective, share, low, high)
+
+
+def _effective(residual: F64, member: np.ndarray, n_clusters: int, share: float) -> float:
+    """p (1 - p) over the variance of p between clusters, less what Student's t takes for their number.
+
+    Never more than n. Where all tries agree no scatter can be seen: each cluster then counts as one.
+    """
+    n = len(residual)
+    if share in (0.0, 1.0):
+        return float(n_clusters)
+    by_cluster = np.bincount(member, residual, n_clusters)
+    variance = n_clusters / (n_clusters - 1.0) * float(np.sum(by_cluster**2)) / n**2
+    effective = min(share * (1.0 - share) / variance, float(n)) if variance > 0.0 else float(n)
+    tail = 0.5 * (1.0 + CONFIDENCE)
+    return effective * float(stdtrit(n - 1, tail) / stdtrit(n_clusters - 1, tail)) ** 2
+
+
+def _clopper_pearson(hits: float, n: float) -> tuple[float, float]:
+    alpha = 0.5 * (1.0 - CONFIDENCE)
+    low = float(betaincinv(hits, n - hits + 1.0, alpha)) if hits > 0.0 else 0.0
+    high = float(betaincinv(hits + 1.0, n - hits, 1.0 - alpha)) if hits < n else 1.0
+    return low, high

@@ -1,0 +1,147 @@
+"""Many batches of many vehicles in one table: errors (12), refusals and coverage, a line for each kind of drive."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from gateway.calibration.coverage import Coverage, coverage_of
+from gateway.calibration.evaluation import Judged
+from gateway.core.vehicle import Vehicle
+from gateway.records import Why
+
+ALL_KINDS: Final = "all"
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedBatch:
+    """One batch: errors in percent of its vehicle's ranges, and whether the 95 % intervals held the truth.
+
+    Where the batch was rejected the errors are those of a mid-range answer, and no interval covers.
+    """
+
+    van: str
+    run: str
+    kind: str
+    estimator: str
+    is_rejected: bool
+    payload_error_pct: float
+    front_share_error_pct: float
+    is_payload_covered: bool
+    is_front_share_covered: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One estimator over one kind of drive. Means are of |error| in percent; None where nothing was answered.
+
+    Coverage is clustered by run, and by van where ``_by_van``: one calibration serves all runs of a van.
+    """
+
+    kind: str
+    estimator: str
+    n_vans: int
+    n_runs: int
+    n_batches: int
+    n_rejected: int
+    payload_mean_abs_pct: float | None
+    payload_mean_abs_pct_with_misses: float
+    payload_coverage: Coverage | None
+    payload_coverage_by_van: Coverage | None
+    front_share_mean_abs_pct: float | None
+    front_share_mean_abs_pct_with_misses: float
+    front_share_coverage: Coverage | None
+    front_share_coverage_by_van: Coverage | None
+
+
+@dataclass(frozen=True, slots=True)
+class CoverageTable:
+    """What a study of coverage found, line by line; the lines of all kinds together come last."""
+
+    seed: int
+    vans: tuple[str, ...]
+    lines: tuple[Line, ...]
+    refused: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain numbers for a file or a page."""
+        return asdict(self)
+
+
+def judged_batches(judged: Sequence[Judged], vehicle: Vehicle, kind: str, estimator: str) -> list[JudgedBatch]:
+    """Complete batches in percent of this vehicle's ranges. Pieces shorter than a window are left out."""
+    return [_judged(one, vehicle, kind, estimator) for one in judged if Why.TOO_SHORT not in one.estimate.rejected]
+
+
+def coverage_table(batches: Sequence[JudgedBatch], seed: int, refused: Sequence[str] = ()) -> CoverageTable:
+    """A line for every kind and estimator, then one for each estimator over all kinds."""
+    kinds = dict.fromkeys(batch.kind for batch in batches)
+    estimators = dict.fromkeys(batch.estimator for batch in batches)
+    lines = [
+        _line(kind, name, [b for b in batches if b.estimator == name and kind in (b.kind, ALL_KINDS)])
+        for kind in (*kinds, ALL_KINDS)
+        for name in estimators
+    ]
+    vans = tuple(dict.fromkeys(batch.van for batch in batches))
+    return CoverageTable(seed, vans, tuple(lines), tuple(refused))
+
+
+def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str) -> JudgedBatch:
+    found = one.estimate
+    payload_kg, share_pct = found.payload_kg, found.front_share_pct
+    is_rejected = not np.isfinite(payload_kg) or not np.isfinite(share_pct)
+    return JudgedBatch(
+        van=vehicle.name,
+        run=f"{vehicle.name} {one.run}",
+        kind=kind,
+        estimator=estimator,
+        is_rejected=is_rejected,
+        payload_error_pct=_percent(payload_kg, one.payload_kg, vehicle.payload_range_kg, is_rejected),
+        front_share_error_pct=_percent(share_pct, one.front_share_pct, vehicle.front_share_range_pct, is_rejected),
+        is_payload_covered=_holds(found.payload_interval95_kg, one.payload_kg),
+        is_front_share_covered=_holds(found.front_share_interval95_pct, one.front_share_pct),
+    )
+
+
+def _percent(found: float, true: float, full_range: tuple[float, float], is_rejected: bool) -> float:
+    low, high = full_range
+    answer = 0.5 * (low + high) if is_rejected else found
+    return 100.0 * (answer - true) / (high - low)
+
+
+def _holds(interval: tuple[float, float], true: float) -> bool:
+    return bool(interval[0] <= true <= interval[1])
+
+
+def _line(kind: str, estimator: str, batches: Sequence[JudgedBatch]) -> Line:
+    answered = [batch for batch in batches if not batch.is_rejected]
+    payload, share = (lambda b: b.is_payload_covered), (lambda b: b.is_front_share_covered)
+    return Line(
+        kind=kind,
+        estimator=estimator,
+        n_vans=len({batch.van for batch in batches}),
+        n_runs=len({batch.run for batch in batches}),
+        n_batches=len(batches),
+        n_rejected=len(batches) - len(answered),
+        payload_mean_abs_pct=_mean_abs([batch.payload_error_pct for batch in answered]),
+        payload_mean_abs_pct_with_misses=float(np.mean(np.abs([batch.payload_error_pct for batch in batches]))),
+        payload_coverage=_coverage(answered, payload, lambda b: b.run),
+        payload_coverage_by_van=_coverage(answered, payload, lambda b: b.van),
+        front_share_mean_abs_pct=_mean_abs([batch.front_share_error_pct for batch in answered]),
+        front_share_mean_abs_pct_with_misses=float(np.mean(np.abs([batch.front_share_error_pct for batch in batches]))),
+        front_share_coverage=_coverage(answered, share, lambda b: b.run),
+        front_share_coverage_by_van=_coverage(answered, share, lambda b: b.van),
+    )
+
+
+def _mean_abs(errors_pct: Sequence[float]) -> float | None:
+    return float(np.mean(np.abs(errors_pct))) if errors_pct else None
+
+
+def _coverage(
+    answered: Sequence[JudgedBatch], is_covered: Callable[[JudgedBatch], bool], cluster: Callable[[JudgedBatch], str]
+) -> Coverage | None:
+    """None where fewer than two clusters answered."""
+    clusters = [cluster(batch) for batch in answered]
+    return coverage_of([is_covered(batch) for batch in answered], clusters) if len({*clusters}) > 1 else None

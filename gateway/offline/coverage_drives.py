@@ -1,0 +1,140 @@
+"""Vans that no calibration was tried on, and the drives on which their intervals are put to the test."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from gateway.bus.decode import Decoder
+from gateway.bus.signal_map import SHIPPED_PREFIX, load_signal_map
+from gateway.core.known_run import KnownRun
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle as StatedVehicle
+from gateway.offline.batches import batches_of_motion
+from gateway.offline.plans import ON_PALLETS, PAPER_SPEED_MPS, share_range_pct
+from gateway.offline.wiring import Wiring
+from gateway.sim.drive import Drive, constant, motorway, rural, urban
+from gateway.sim.obstacles import ObstacleRoad, UnevenRoad
+from gateway.sim.road import RoadRecipe, iso_road
+from gateway.sim.scatter import FROM_DAY_TO_DAY, OF_TYPES, scattered
+from gateway.sim.scenario import simulate_drive
+from gateway.sim.sensors import REFERENCE
+from gateway.sim.vans import VANS
+from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg
+
+MAP_NAME: Final = "reference"
+CALIBRATED_PARTS: Final = (0.25, 0.6, 0.95)  # of the rated payload
+CALIBRATED_PLACES: Final = (0.2, 0.5, 1.0)  # of the wheelbase
+EMPTY_SHARE: Final = 0.15  # of the drives put to the test
+OTHER_SPEEDS_KMH: Final = (30.0, 110.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """How much is driven: per van so many known loads and, of each kind, so many drives put to the test."""
+
+    n_vans: int = 12
+    n_known_loads: int = 6
+    n_tests: int = 2
+    steady_s: float = 620.0
+    mixed_s: float = 1260.0
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """A kind of drive: its name, how it is driven and where, and whether the van has changed since its calibration."""
+
+    kind: str
+    drive: Callable[[Scope, np.random.Generator], Drive]
+    road: RoadRecipe
+    is_changed: bool = False
+    is_on_pallets: bool = False
+
+
+def draw_van(number: int, rng: np.random.Generator) -> Vehicle:
+    """The ``number``-th van: of the types in turn, its masses, springs, dampers, tyres and places scattered."""
+    kinds = list(VANS.values())
+    van = scattered(kinds[number % len(kinds)], OF_TYPES, rng)
+    return replace(van, name=f"{van.name}_{number}")
+
+
+def stated(van: Vehicle) -> StatedVehicle:
+    """What a fitter would write into the campaign file: weights and places, nothing of springs."""
+    return StatedVehicle(
+        name=van.name,
+        empty_mass_kg=van.sprung_kg,
+        wheelbase_m=van.wheelbase_m,
+        empty_front_share_pct=van.empty_front_share_pct,
+        sensor_position_m=REFERENCE.mount.position_m,
+        sensor_offset_left_m=REFERENCE.mount.left_m,
+        payload_range_kg=(0.0, van.rated_payload_kg),
+        front_share_range_pct=share_range_pct(van),
+    )
+
+
+def known_loads(van: Vehicle, n_loads: int, rng: np.random.Generator) -> list[tuple[Load, ...]]:
+    """Empty, and loads drawn from a grid of three masses at three places."""
+    grid = [(part, place) for part in CALIBRATED_PARTS for place in CALIBRATED_PLACES]
+    drawn = rng.choice(len(grid), min(n_loads - 1, len(grid)), replace=False)
+    return [(), *((_load(van, *grid[i]),) for i in sorted(drawn.tolist()))]
+
+
+def unseen_load(van: Vehicle, rng: np.random.Generator) -> tuple[Load, ...]:
+    """Any load at any place from the driver's back to the rear axle; sometimes none."""
+    if rng.random() < EMPTY_SHARE:
+        return ()
+    return (_load(van, float(rng.uniform(0.05, 1.0)), float(rng.uniform(0.15, 1.0))),)
+
+
+def driven(
+    van: Vehicle, loads: tuple[Load, ...], trip: Trip, scope: Scope, seeds: np.random.SeedSequence, number: int
+) -> KnownRun:
+    """One drive through sensors, frames and decoder, as batches with their truth."""
+    plan_rng, day_rng = (np.random.default_rng(seed) for seed in seeds.spawn(2))
+    today = scattered(van, FROM_DAY_TO_DAY, day_rng) if trip.is_changed else van
+    carried = tuple(replace(load, **ON_PALLETS) for load in loads) if trip.is_on_pallets else loads
+    seed = int(seeds.generate_state(1)[0])
+    simulated = simulate_drive(today, carried, trip.road, trip.drive(scope, plan_rng), REFERENCE, seed)
+    signal_map = load_signal_map(SHIPPED_PREFIX + MAP_NAME)
+    motion = Decoder(signal_map).decode(Wiring(MAP_NAME).frames_of(simulated.recording))
+    batches = batches_of_motion(motion, signal_map, BatchSettings())
+    return KnownRun(number, trip.kind, payload_kg(carried), front_share_pct(today, carried), batches)
+
+
+def _load(van: Vehicle, part: float, place: float) -> Load:
+    return Load(part * van.rated_payload_kg, place * van.wheelbase_m)
+
+
+def _as_calibrated(scope: Scope, rng: np.random.Generator) -> Drive:
+    return constant(PAPER_SPEED_MPS, scope.steady_s, rng, jitter_std_mps=0.4)
+
+
+def _at_another_speed(scope: Scope, rng: np.random.Generator) -> Drive:
+    return constant(float(rng.uniform(*OTHER_SPEEDS_KMH)) / 3.6, scope.steady_s, rng, jitter_std_mps=0.4)
+
+
+def _mixed(scope: Scope, rng: np.random.Generator) -> Drive:
+    """Town, country and motorway in any order."""
+    kinds: list[Callable[[float, np.random.Generator], Drive]] = [urban, rural, motorway]
+    rng.shuffle(kinds)
+    first, second, third = (kind(scope.mixed_s / 3.0, rng) for kind in kinds)
+    return first.then(second).then(third)
+
+
+_SMOOTH_AND_ROUGH: Final = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
+_CHANGING: Final = ObstacleRoad(UnevenRoad(iso_road("B"), stretch_m=400.0, spread=0.4), potholes_per_km=1.0)
+
+AS_CALIBRATED: Final = Trip("as calibrated", _as_calibrated, _SMOOTH_AND_ROUGH)
+TRIPS: Final[Mapping[str, Trip]] = MappingProxyType(
+    {
+        trip.kind: trip
+        for trip in (
+            AS_CALIBRATED,
+            Trip("another speed", _at_another_speed, _SMOOTH_AND_ROUGH),
+            Trip("mixed", _mixed, _CHANGING, is_on_pallets=True),
+            Trip("mixed, another day", _mixed, _CHANGING, is_changed=True, is_on_pallets=True),
+        )
+    }
+)
