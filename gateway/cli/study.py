@@ -1,5 +1,6 @@
 """springscale study: what a calibration is worth, found out by experiment. Each takes minutes."""
 
+import json
 from pathlib import Path
 
 import click
@@ -9,9 +10,13 @@ from gateway.cli.options import FILE, as_json, batch_settings, window
 from gateway.cli.progress import bar
 from gateway.cli.study_text import learning_curve_table
 from gateway.config import ESTIMATOR_NAMES
+from gateway.errors import ConfigurationError
+from gateway.offline import coverage as coverage_study
+from gateway.offline.coverage_drives import Scope
 from gateway.offline.learning_curve import MOST_SUBSETS, SEED
 from gateway.offline.learning_curve import learning_curve as study_learning_curve
 from gateway.records import json_line
+from gateway.reports.coverage_page import coverage_page
 
 _estimators = click.option(
     "--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]"
@@ -59,3 +64,25 @@ def learning_curve(
             on_trial=on_trial,
         )
     click.echo(json_line(curve.to_json()) if as_json else learning_curve_table(curve))
+
+
+@study.command("coverage")
+@click.option("--output", type=FILE, required=True, help="directory to write coverage.json and coverage.md to")
+@click.option("--vans", "n_vans", type=click.IntRange(min=2), default=Scope().n_vans, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=coverage_study.SEED, show_default=True)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that drive")
+@as_json
+def coverage(output: Path, n_vans: int, seed: int, workers: int, as_json: bool) -> None:
+    """Do 95 % intervals hold the truth? Simulated vans, each calibrated and then driven elsewhere; ~20 s a van."""
+    numbers = output / "coverage.json"
+    if numbers.exists():
+        raise ConfigurationError(f"{numbers}: there is a study already; name another directory or remove it")
+    output.mkdir(parents=True, exist_ok=True)
+    with bar(n_vans, "calibrating and driving vans") as progress:
+        found = coverage_study.coverage(
+            Scope(n_vans=n_vans), seed, workers=workers, on_van=lambda done, of: progress.update(done - progress.pos)
+        ).to_json()
+    page = coverage_page(found)
+    numbers.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    (output / "coverage.md").write_text(page, encoding="utf-8")
+    click.echo(json_line(found) if as_json else page)
