@@ -34,6 +34,7 @@ class Refusal(StrEnum):
     STALE = "stale"
     OFFSET_TOO_LARGE = "offset_too_large"
     OFFSET_UNCERTAIN = "offset_uncertain"
+    NOT_TARED = "not_tared"
     NOT_STORED = "not_stored"
 
 

@@ -20,6 +20,7 @@ from gateway.service.notify import Notifier
 from gateway.service.pipeline import Pipeline
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
+from gateway.service.tare_desk import Subject, TareDesk
 from gateway.store import Retention, Store
 from gateway.uplink import uplink_settings
 from gateway.web import Board, TokenFile, create_app, refuse_open_address, server_config
@@ -86,7 +87,16 @@ class Gateway:
         self.uplink = uplink_of(forwarding, setup, self.store)
         self.status = StatusReport(settings, setup, self.source, self.pipeline, self.store, self.board, self.uplink)
         calibrated = setup.calibration.for_core() if setup.calibration else None
-        app = create_app(self.board, self.store.reader(), self.status, calibrated=calibrated, tokens=tokens)
+        self.tare = TareDesk(
+            settings.store.directory,
+            Subject(calibrated, setup.estimator, setup.identity.vehicle_id),
+            self.pipeline,
+            stale_after_s=settings.web.stale_after_s,
+            on_event=self.store.write_event,
+        )
+        app = create_app(
+            self.board, self.store.reader(), self.status, calibrated=calibrated, tokens=tokens, tare=self.tare
+        )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = _Server(web)
         self._reload = Reloader(settings, load or (lambda: settings), web)

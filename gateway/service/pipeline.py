@@ -11,11 +11,12 @@ import numpy as np
 from gateway.bus.decode import Decoder
 from gateway.bus.inbox import Inbox
 from gateway.core.flow import Flow
+from gateway.core.tare import Weighed
 from gateway.records import Estimate, Motion, Signal, estimate_to_json
 from gateway.service.log import log_event
 from gateway.store import Store
 from gateway.units import NS_PER_S
-from gateway.web import Board
+from gateway.web import Board, boot_clock_s
 
 DRAIN_S = 0.1  # how long the inbox may gather before it is decoded: a hundred frames in one array operation
 
@@ -59,6 +60,7 @@ class Pipeline:
         self.failure: BaseException | None = None
         self.n_frames = 0  # frames whose estimates, if any, are handed over
         self.progress = 0  # grows with every turn of the loop: what the watchdog follows
+        self._weighed_at: tuple[Weighed | None, float] = (None, 0.0)
         self._inbox = inbox
         self._store = store
         self._board = board
@@ -75,6 +77,11 @@ class Pipeline:
         self._thread.join(timeout_s)
         if self._thread.is_alive():
             log_event("pipeline did not finish in time", level=logging.ERROR, n_frames_waiting=len(self._inbox))
+
+    def weighed_age_s(self) -> float | None:
+        """Seconds since ``flow.weighed`` was found, on the board's clock; None where there is none. From any thread."""
+        weighed, found_s = self._weighed_at
+        return None if weighed is None else boot_clock_s() - found_s
 
     def is_alive(self) -> bool:
         """True while the thread runs."""
@@ -107,6 +114,8 @@ class Pipeline:
     def _hand_over(self, estimates: Any) -> None:
         for found in estimates:
             self._count(found)
+            if self.flow.weighed is not self._weighed_at[0]:
+                self._weighed_at = (self.flow.weighed, boot_clock_s())
             record = estimate_to_json(found)
             cursor = None if found.is_provisional else self._store.write_estimate(record)
             self._board.publish(record, cursor)

@@ -60,6 +60,7 @@ class StatusReport:
             vehicle_id=self._setup.identity.vehicle_id,
             vin=self._setup.identity.vin,
             calibration_id=self._setup.calibration.id if self._setup.calibration else None,
+            tare_id=tare.id if (tare := self._pipeline.flow.tare) else None,
             estimator=self._setup.estimator,
             bus=self._bus(),
             decode=self._decode(),

@@ -1,7 +1,7 @@
 """The HTTP side: latest estimate, history, stream, status, health, metrics, dashboard."""
 
 from gateway.web.app import create_app
-from gateway.web.board import Board
+from gateway.web.board import Board, boot_clock_s
 from gateway.web.reader import Reader
 from gateway.web.serving import Tls, refuse_open_address, renew_certificate, server_config
 from gateway.web.settings import WebSettings
@@ -33,6 +33,7 @@ __all__ = [
     "TokenFile",
     "UplinkStatus",
     "WebSettings",
+    "boot_clock_s",
     "create_app",
     "refuse_open_address",
     "renew_certificate",

@@ -24,6 +24,7 @@ from gateway.web.rfms import rfms_router
 from gateway.web.settings import WebSettings
 from gateway.web.spectra import spectra_router
 from gateway.web.status import Status
+from gateway.web.tare import NoTareDesk, TareDesk, tare_router
 from gateway.web.tokens import TokenFile
 from gateway.web.vehicle import vehicle_router
 from gateway.web.vss import vss_router
@@ -42,6 +43,7 @@ def create_app(
     settings: WebSettings | None = None,
     calibrated: CalibratedVehicle | None = None,
     tokens: TokenFile | None = None,
+    tare: TareDesk | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe).
@@ -73,6 +75,7 @@ def create_app(
     app.include_router(reasons_router())
     app.include_router(vehicle_router(status, calibrated))
     app.include_router(spectra_router(board, calibrated))
+    app.include_router(tare_router(tare or NoTareDesk()))
     app.include_router(export_router(reader))
     app.include_router(weights_router(board, scales))
     app.include_router(vss_router(board, scales))

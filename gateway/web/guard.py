@@ -70,6 +70,7 @@ class Guard:
         token = tokens.verify(text.strip()) if kind.lower() == "bearer" else None
         wanted = Scope.READ if scope["method"] in _SAFE_METHODS else Scope.OPERATE
         if token is not None:
+            scope.setdefault("state", {})["token_name"] = token.name
             return None if token.scope.allows(wanted) else _forbidden(scope, wanted)
         if shown is None:
             return _unauthorised(scope, "a bearer token is needed: `springscale token create` makes one", "")
@@ -88,6 +89,9 @@ def _refuse_strangers(scope: AsgiScope) -> Response | None:
     name = host if host.endswith("]") else host.rpartition(":")[0] or host
     if name not in _LOCAL_NAMES:
         return _problem(scope, 421, f"without tokens only {', '.join(sorted(_LOCAL_NAMES))} are answered for")
+    origin = _header(scope, b"origin")
+    if origin is not None and scope["method"] not in _SAFE_METHODS and origin.lower().partition("://")[2] != host:
+        return _problem(scope, 403, "without tokens a page from elsewhere may change nothing")
     return None
 
 

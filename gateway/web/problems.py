@@ -20,6 +20,7 @@ def problem_response(
     detail: str,
     instance: str,
     errors: Sequence[Fault] | None = None,
+    reason: str | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> Response:
     """A problem as it goes over the wire."""
@@ -28,6 +29,7 @@ def problem_response(
         status=status,
         detail=detail,
         instance=instance,
+        reason=reason,
         errors=None if errors is None else list(errors),
     )
     return JSONResponse(problem.model_dump(exclude_none=True), status, headers=headers, media_type=MEDIA_TYPE)

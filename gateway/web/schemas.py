@@ -45,6 +45,15 @@ class Estimate(BaseModel):
     shares: dict[str, float | None] = Field(description="part of the batch that each cause masked", examples=[{}])
     rejected: list[str] = Field(description="why there is no answer; empty: this batch counted", examples=[[]])
     diagnostics: dict[str, float | None] = Field(default_factory=dict, examples=[{}])
+    tare_id: str | None = Field(None, description="the zero taken off this answer; absent: the factory zero")
+    tare_payload_kg: float | None = Field(None, description="taken off the raw payload", examples=[12.4])
+    tare_payload_std_kg: float | None = None
+    tare_front_share_pct: float | None = Field(None, description="percentage points taken off the raw front share")
+    tare_front_share_std_pct: float | None = None
+    raw_payload_kg: float | None = Field(None, description="as the calibration alone has it", examples=[283.7])
+    raw_payload_std_kg: float | None = None
+    raw_front_share_pct: float | None = None
+    raw_front_share_std_pct: float | None = None
     provisional: bool | None = Field(None, description="true: an early look at a batch that is still growing")
     spectra: Spectra | None = None
 
@@ -97,6 +106,7 @@ class Problem(BaseModel):
     status: int = Field(examples=[422])
     detail: str = Field(examples=["query.limit: Input should be less than or equal to 1000"])
     instance: str = Field(examples=["/api/v1/estimates"])
+    reason: str | None = Field(None, description="for programs, where a person could mend it", examples=["stale"])
     errors: list[Fault] | None = None
 
 

@@ -1,0 +1,172 @@
+"""/api/v1/calibration/tare: the zero of an empty vehicle, set, undone and looked at."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Annotated, Any, Final, Literal, Protocol
+
+from fastapi import APIRouter, Query, Request
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.json_schema import SkipJsonSchema
+from starlette.responses import Response
+
+from gateway.errors import TareRefusedError
+from gateway.records import json_line
+from gateway.web.problems import problem_response
+from gateway.web.schemas import problem_responses
+
+TARE_PATH: Final = "/calibration/tare"
+LOCAL: Final = "local"  # who asks where no tokens are in use
+_CONFLICT: Final = 409
+_UNAVAILABLE: Final = 503
+_NO_ROOM: Final = "not_stored"  # the one refusal that the disk causes
+
+
+class TareDesk(Protocol):
+    """Who keeps the tares. Blocking calls, each from a thread of its own; answers are JSON as described below."""
+
+    def told(self) -> str:
+        """A TareState."""
+        ...
+
+    def tare(self, by: str, note: str | None) -> str:
+        """The new Tare. Raises TareRefusedError."""
+        ...
+
+    def undo(self, by: str, *, to_factory: bool) -> str:
+        """The TareState after it. Raises TareRefusedError."""
+        ...
+
+
+class NoTareDesk:
+    """Where nothing is weighed there is nothing to re-zero."""
+
+    def told(self) -> str:
+        """The factory zero, for good."""
+        offer = {"is_possible": False, "reason": "no_calibration", "detail": self._why(), "zero": None}
+        return json_line({"active": None, "offer": offer, "history": []})
+
+    def tare(self, by: str, note: str | None) -> str:
+        """Always refused."""
+        raise TareRefusedError("no_calibration", self._why())
+
+    def undo(self, by: str, *, to_factory: bool) -> str:
+        """Always refused."""
+        raise TareRefusedError("not_tared", "there is no tare in use: this is the factory zero already")
+
+    @staticmethod
+    def _why() -> str:
+        return "there is no calibration, and so nothing to correct"
+
+
+class TareRequest(BaseModel):
+    """The claim that makes a tare, and a word on it."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    is_empty: Literal[True] = Field(
+        description="you know that the vehicle is empty, and was so while it was last weighed (`offer` tells when)"
+    )
+    note: str | SkipJsonSchema[None] = Field(None, max_length=200, description="kept in the history")
+
+
+class TareEnd(BaseModel):
+    """How a tare went out of use."""
+
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    by: str
+    why: Literal["undone", "back_to_factory", "other_calibration"]
+
+
+class Tare(BaseModel):
+    """One tare: what the empty vehicle was weighed as, less what it is. Payload in kg, share in percentage points."""
+
+    id: str = Field(examples=["sha256:9f86d081"])
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    by: str = Field(description="name of the token; `local` where none are in use", examples=["workshop"])
+    note: str | None
+    vehicle_id: str | None
+    calibration_id: str = Field(description="it belongs to this calibration and ends with it")
+    estimator: str
+    payload_kg: float = Field(description="taken off every later payload", examples=[12.4])
+    payload_std_kg: float = Field(description="carried into every later standard deviation", examples=[6.1])
+    front_share_pct: float
+    front_share_std_pct: float
+    n_batches: int
+    batch_ids: list[str] = Field(description="the newest of the batches it rests on, newest last")
+    t_start: str
+    t_end: str
+    ended: TareEnd | None = Field(description="null: it has not ended; the last of these is in use")
+
+
+class OfferedZero(BaseModel):
+    """The raw weighing that a tare would make the zero."""
+
+    payload_kg: float
+    payload_std_kg: float
+    front_share_pct: float = Field(description="offset from the empty share, percentage points")
+    front_share_std_pct: float
+    n_batches: int
+    t_start: str
+    t_end: str
+
+
+class TareOffer(BaseModel):
+    """Whether a tare is possible now, and of what; else why not."""
+
+    is_possible: bool
+    reason: str | None = Field(examples=["no_counted_batch"])
+    detail: str | None
+    zero: OfferedZero | None
+
+
+class TareState(BaseModel):
+    """The tare in use (null: the factory zero), what another would be made from, the history newest first."""
+
+    active: Tare | None
+    offer: TareOffer
+    history: list[Tare]
+
+
+UndoTo = Annotated[
+    Literal["previous", "factory"], Query(description="the tare before this one, or none: as it was calibrated")
+]
+
+
+def tare_router(desk: TareDesk) -> APIRouter:
+    """The routes of the tare."""
+    router = APIRouter(prefix="/api/v1", tags=["calibration"])
+    refusals = problem_responses(_CONFLICT, _UNAVAILABLE)
+
+    @router.get(TARE_PATH, response_model=TareState)
+    async def tare_state() -> Response:
+        """The tare in use, what another would be made from now, and the history."""
+        return _json(await asyncio.to_thread(desk.told))
+
+    @router.post(TARE_PATH, status_code=201, response_model=Tare, responses={**refusals, **problem_responses(422)})
+    async def set_tare(request: Request, claim: TareRequest) -> Response:
+        """Make the last weighing the zero of the empty vehicle, from the next batch on. On disk when answered."""
+        return await _answered(request, lambda: desk.tare(_who(request), claim.note), 201)
+
+    @router.delete(TARE_PATH, response_model=TareState, responses={**refusals, **problem_responses(422)})
+    async def undo_tare(request: Request, to: UndoTo = "previous") -> Response:
+        """Take the last tare out of use, or all of them; raw numbers never change. On disk when answered."""
+        return await _answered(request, lambda: desk.undo(_who(request), to_factory=to == "factory"), 200)
+
+    return router
+
+
+async def _answered(request: Request, ask: Callable[[], str], status: int) -> Response:
+    try:
+        return _json(await asyncio.to_thread(ask), status)
+    except TareRefusedError as refusal:
+        code = _UNAVAILABLE if refusal.reason == _NO_ROOM else _CONFLICT
+        return problem_response(code, str(refusal), request.url.path, reason=refusal.reason)
+
+
+def _who(request: Request) -> str:
+    name: Any = getattr(request.state, "token_name", None)
+    return LOCAL if name is None else str(name)
+
+
+def _json(text: str, status: int = 200) -> Response:
+    return Response(text, status, media_type="application/json")
