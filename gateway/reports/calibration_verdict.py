@@ -119,7 +119,7 @@ _NAMES: Final = {"payload": ("payload", "kg"), "front_share": ("front share", "p
 
 def _coverage(judged: Sequence[Judged], part: Part, quantity: str) -> Reason | None:
     """By the limits of the coverage, for a few runs tell little; None where there are fewer than two."""
-    covered = [(found, one.run) for one in judged if (found := is_covered(one, quantity)) is not None]
+    covered = [(hit, one.run) for one in judged if (hit := is_covered(one, quantity)) is not None]
     if len({run for _, run in covered}) < 2:
         return None
     found = coverage_of([hit for hit, _ in covered], [run for _, run in covered])
