@@ -125,7 +125,7 @@ def load_tares(path: Path) -> TareHistory:
     except FileNotFoundError:
         return TareHistory()
     except OSError as fault:
-        raise ConfigurationError(f"{path}: cannot be read: {fault}") from None
+        raise ConfigurationError(f"{path}: cannot be read: {fault.strerror or fault}") from None
     except ValidationError as fault:
         raise ConfigurationError(f"{describe_faults(path, fault)}: {_MEND}") from None
     changed = [entry.id for entry in history.entries if entry.id != entry.content_id()]

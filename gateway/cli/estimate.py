@@ -4,10 +4,12 @@ from pathlib import Path
 
 import click
 
+from gateway.calibration.tare_file import FILE_NAME
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.sentence import sentence
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
+from gateway.errors import ConfigurationError
 from gateway.offline.estimates import Setup, estimates_of_logs, load_setup, setup_of
 from gateway.records import estimate_to_json, json_line
 
@@ -17,6 +19,8 @@ from gateway.records import estimate_to_json, json_line
 @click.option("--config", "config_path", type=FILE, default=None, help="springscale.toml of the service")
 @click.option("--signals", default=None, help="signal map: a TOML file, or springscale:NAME")
 @click.option("--calibration", type=FILE, default=None, help="calibration file")
+@click.option("--tare", type=FILE, default=None, help="tare.json of a service [default: that of --config]")
+@click.option("--no-tare", is_flag=True, help="the zero of the calibration, whatever tare the service has in use")
 @one_estimator
 @window
 @as_json
@@ -25,12 +29,18 @@ def estimate(
     config_path: Path | None,
     signals: str | None,
     calibration: Path | None,
+    tare: Path | None,
+    no_tare: bool,
     estimator: str | None,
     window_s: float | None,
     as_json: bool,
 ) -> None:
     """One line per batch of every LOG, rejected ones included with their reasons."""
-    setup, settings = _prepared(config_path, signals, calibration, estimator, window_s)
+    if tare is not None and no_tare:
+        raise click.UsageError("give --tare FILE or --no-tare, not both")
+    setup, settings, state = _prepared(config_path, signals, calibration, estimator, window_s)
+    if not no_tare:
+        setup = _tared(setup, tare, state)
     for found in estimates_of_logs(logs, setup, settings):
         record = estimate_to_json(found)
         click.echo(json_line(record) if as_json else sentence(record))
@@ -42,14 +52,29 @@ def _prepared(
     calibration: Path | None,
     estimator: str | None,
     window_s: float | None,
-) -> tuple[Setup, BatchSettings]:
+) -> tuple[Setup, BatchSettings, Path | None]:
+    """What estimates, how batches are formed, and where the service keeps its state (None without a service)."""
     if config_path is not None:
         if signals is not None:
             raise click.UsageError("give --config or --signals, not both")
         configured = load_settings(config_path)
         if calibration is not None:
             configured = configured.model_copy(update={"calibration": calibration})
-        return setup_of(configured, estimator), configured.batch.for_core(window_s=window_s)
+        batch = configured.batch.for_core(window_s=window_s)
+        return setup_of(configured, estimator), batch, configured.store.directory
     if signals is None:
         raise click.UsageError("give --config FILE, or --signals FILE (and --calibration FILE)")
-    return load_setup(signals, calibration, estimator), batch_settings(window_s)
+    return load_setup(signals, calibration, estimator), batch_settings(window_s), None
+
+
+def _tared(setup: Setup, named: Path | None, state: Path | None) -> Setup:
+    """With the tare of a file that was named, which must have one for this calibration; else with the service's."""
+    if named is None:
+        return setup if state is None else setup.with_tare_of(state / FILE_NAME)
+    found = setup.with_tare_of(named)
+    if found.tare is None:
+        calibration_id = setup.calibration.id if setup.calibration else "none"
+        raise ConfigurationError(
+            f"{named}: has no tare in use for the estimator {setup.estimator} and the calibration {calibration_id}"
+        )
+    return found

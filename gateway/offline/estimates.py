@@ -1,15 +1,17 @@
 """Logs in, estimates out: what `springscale estimate` prints."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gateway.bus.logs import motion_of_log
 from gateway.bus.signal_map import SignalMap, load_signal_map
 from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.tare_file import load_tares
 from gateway.config import Settings
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
+from gateway.core.tare import Tare
 from gateway.errors import ConfigurationError
 from gateway.records import Estimate
 
@@ -24,11 +26,21 @@ class Setup:
     calibration: CalibrationFile | None
     estimator: str
     identity: Identity
+    tare: Tare | None = None
 
     def flow(self, settings: BatchSettings) -> Flow:
         """A fresh pipeline."""
         calibrated = self.calibration.for_core() if self.calibration else None
-        return Flow(settings, self.signal_map.traits, calibrated, self.estimator, self.identity)
+        return Flow(settings, self.signal_map.traits, calibrated, self.estimator, self.identity, self.tare)
+
+    def with_tare_of(self, path: Path) -> "Setup":
+        """With the tare that ``path`` has in use for this calibration and estimator; without any where it has none.
+
+        Raises ConfigurationError for a file that cannot be believed.
+        """
+        calibration_id = self.calibration.id if self.calibration else None
+        active = load_tares(path).active(calibration_id, self.estimator)
+        return replace(self, tare=active.for_core() if active else None)
 
 
 def load_setup(

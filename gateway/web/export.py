@@ -38,6 +38,9 @@ COLUMNS: Final = [
     "gap_share",
     "usable_share",
     "rejected",
+    "tare_id",
+    "tare_payload_kg",
+    "tare_front_share_pct",
 ]
 _INTERVALS: Final = {"payload_interval95_kg": "payload_{}95_kg", "front_share_interval95_pct": "front_share_{}95_pct"}
 _PAGE: Final = 500
