@@ -1,0 +1,168 @@
+"""Estimates against the truth: charts of errors, of residuals and of how often intervals hold."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from scipy.special import ndtri
+
+from gateway.records import F64
+from gateway.reports.calibration_answers import LEVELS, Answers, answers_of, observed_coverage, standardised
+from gateway.reports.calibration_error_tables import batches_table, runs_table, summary_table
+from gateway.reports.calibration_evidence import PART_NAMES, PART_TEXT, Judgement, Part
+from gateway.reports.calibration_text import estimator_name, percent, shown
+from gateway.reports.chart import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
+
+_MARKERS: Final[Mapping[Part, Marker]] = {Part.LEFT_OUT: "circle", Part.VALIDATION: "diamond"}
+_COLOURS: Final[Mapping[Part, int]] = {Part.LEFT_OUT: 0, Part.VALIDATION: 1, Part.IDENTIFICATION: GREY, Part.ALL: 0}
+
+
+def accuracy_section(judgement: Judgement) -> Section:
+    """Everything about one estimator's errors."""
+    name = estimator_name(judgement.estimator)
+    quantities = [q for q in ("payload", "front_share") if _has_answers(judgement, q)]
+    charts = (
+        _estimated_over_true(judgement, quantities),
+        _residuals(judgement, quantities),
+        _coverage(judgement, quantities),
+    )
+    tables = tuple(runs_table(judgement, part) for part in judgement.tables)
+    batches = tuple(batches_table(judgement, part) for part in judgement.tables)
+    return Section(
+        f"accuracy-{judgement.estimator.replace('_', '-')}",
+        f"Accuracy of the {name}",
+        tuple(PART_TEXT[part] for part in judgement.tables),
+        tuple(chart for chart in charts if chart is not None),
+        (summary_table(judgement),),
+        (("Errors run by run", tables), ("Every batch", batches)),
+    )
+
+
+def _has_answers(judgement: Judgement, quantity: str) -> bool:
+    return any(table[quantity]["mean_abs_pct"] is not None for table in judgement.tables.values())
+
+
+_TRUE: Final = {"payload": "payload [kg]", "front_share": "front share [%]"}
+_ERROR: Final = {"payload": "error of payload [kg]", "front_share": "error of front share [pp]"}
+_DOF: Final = {"payload": "payload_dof", "front_share": "front_share_dof"}
+
+
+def _sets(judgement: Judgement, quantity: str) -> list[tuple[Part, Answers]]:
+    """What was not fitted to, or else what there is."""
+    unfitted = [part for part in judgement.judged if part is not Part.IDENTIFICATION]
+    parts: list[Part] = [*unfitted] or [*judgement.judged]
+    found = [(part, answers_of(judgement.judged[part], quantity)) for part in parts]
+    return [(part, answers) for part, answers in found if len(answers.run)]
+
+
+def _points(part: Part, answers: Answers, x: F64, y: F64, half: F64 | None = None) -> Points:
+    low, high = (None, None) if half is None else (y - half, y + half)
+    return Points(x, y, PART_NAMES[part], _COLOURS[part], _MARKERS.get(part, "square"), low, high, answers.notes)
+
+
+def _estimated_over_true(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
+    if not quantities:
+        return None
+    panels = []
+    for quantity in quantities:
+        sets = _sets(judgement, quantity)
+        ends = np.array([f([f(a.true) for _, a in sets]) for f in (min, max)])
+        marks = [_points(part, a, a.true, a.estimated, a.half95) for part, a in sets]
+        exact = Line(ends, ends, "exact", GREY, "dash")
+        panels.append(Panel(Axis(f"true {_TRUE[quantity]}"), Axis(f"estimated {_TRUE[quantity]}"), (exact, *marks)))
+    name = estimator_name(judgement.estimator)
+    return Chart(
+        f"estimated_over_true_{judgement.estimator}",
+        f"Estimates of the {name} over the truth, with 95 % intervals. On the dashed line an estimate is exact.",
+        f"Estimated over true {' and '.join(_PLAIN[q] for q in quantities)} of the {name}. {_summary(judgement)}",
+        tuple(panels),
+        row_height_px=400,
+    )
+
+
+_PLAIN: Final = {"payload": "payload", "front_share": "front share"}
+
+
+def _summary(judgement: Judgement) -> str:
+    return " ".join(
+        f"{PART_NAMES[part].capitalize()}: mean error {shown(table['payload']['mean_abs_kg'], ' kg')} and "
+        f"{shown(table['front_share']['mean_abs_pp'], ' pp')}."
+        for part, table in judgement.tables.items()
+    )
+
+
+def _residuals(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
+    """Errors over the truth, over speed and over what a normal law would have."""
+    if not quantities:
+        return None
+    panels = [panel for quantity in quantities for panel in _residual_panels(judgement, quantity)]
+    return Chart(
+        f"residuals_{judgement.estimator}",
+        "Errors over the truth and over speed: a slope or a bow is something the model misses. Right: errors in their "
+        "own standard deviations, in order, over those of a normal law; on the dashed line intervals are as wide as "
+        "errors are, a steeper course means intervals too narrow.",
+        f"Residuals of the {estimator_name(judgement.estimator)} over truth, speed and normal quantiles.",
+        tuple(panels),
+        n_columns=3,
+        row_height_px=300,
+    )
+
+
+def _residual_panels(judgement: Judgement, quantity: str) -> list[Panel]:
+    sets = _sets(judgement, quantity)
+    zero, error = Rule(0.0), Axis(_ERROR[quantity])
+    over_truth = tuple(_points(part, a, a.true, a.error) for part, a in sets)
+    over_speed = tuple(_points(part, a, 3.6 * a.speed_mps, a.error) for part, a in sets)
+    dof = getattr(judgement, _DOF[quantity])
+    in_order = tuple(_in_order(part, a, dof) for part, a in sets)
+    ends = np.array([-2.5, 2.5])
+    return [
+        Panel(Axis(f"true {_TRUE[quantity]}"), error, (zero, *over_truth)),
+        Panel(Axis("mean speed [km/h]"), error, (zero, *over_speed)),
+        Panel(
+            Axis("normal quantile"),
+            Axis(f"{_PLAIN[quantity]}: error / standard deviation"),
+            (Line(ends, ends, "exact", GREY, "dash"), *in_order),
+        ),
+    ]
+
+
+def _in_order(part: Part, answers: Answers, dof: float | None) -> Points:
+    z = standardised(answers, dof)
+    order = np.argsort(z, kind="stable")
+    expected = ndtri((np.arange(len(z)) + 0.5) / len(z))
+    notes = tuple(answers.notes[i] for i in order)
+    return Points(expected, z[order], PART_NAMES[part], _COLOURS[part], _MARKERS.get(part, "square"), notes=notes)
+
+
+def _coverage(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
+    panels = [panel for quantity in quantities if (panel := _coverage_panel(judgement, quantity)) is not None]
+    if not panels:
+        return None
+    return Chart(
+        f"coverage_{judgement.estimator}",
+        "How often intervals of each nominal level hold the truth. Above the dashed line they are wider than they "
+        "need be, below it narrower than they claim. Bars: what so few runs can tell, batches of one run being alike.",
+        f"Observed over nominal coverage of the {estimator_name(judgement.estimator)}: "
+        + " ".join(
+            f"95 % intervals of payload hold {percent(table['payload']['coverage95'])} over the {PART_NAMES[part]}."
+            for part, table in judgement.tables.items()
+        ),
+        tuple(panels),
+        row_height_px=360,
+    )
+
+
+def _coverage_panel(judgement: Judgement, quantity: str) -> Panel | None:
+    ends = np.array([0.0, 100.0])
+    dof = getattr(judgement, _DOF[quantity])
+    marks = []
+    for shift, (part, answers) in enumerate(_sets(judgement, quantity)):
+        if len(np.unique(answers.run)) > 1:
+            share, low, high = 100.0 * observed_coverage(answers, dof).T
+            x, marker = 100.0 * LEVELS + 0.8 * shift, _MARKERS.get(part, "square")
+            marks.append(Points(x, share, PART_NAMES[part], _COLOURS[part], marker, low, high))
+    if not marks:
+        return None
+    nominal = Line(ends, ends, "exact", GREY, "dash")
+    return Panel(Axis("nominal [%]"), Axis("observed [%]"), (nominal, *marks), _PLAIN[quantity])
