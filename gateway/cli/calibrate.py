@@ -7,61 +7,77 @@ from pathlib import Path
 import click
 
 from gateway.calibration.campaign import load_campaign
+from gateway.calibration.draft import load_draft
 from gateway.calibration.file import CalibrationFile
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
+from gateway.cli.plan_text import plan_sentences
 from gateway.cli.progress import bar
 from gateway.config import ESTIMATOR_NAMES
 from gateway.offline.calibrate import calibrate as fit
+from gateway.offline.plan import Plan, plan_first, plan_next
 from gateway.records import json_line
 
 
 @click.command("calibrate")
 @click.argument("campaign", type=FILE)
-@click.option("--output", type=FILE, required=True, help="calibration file to write")
+@click.option("--output", type=FILE, default=None, help="calibration file to write; needed but for --plan")
 @click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]")
 @click.option("--runs", "numbers", type=RunNumbers(), default=None, help="these runs only, counted from 1: 1,5,10")
+@click.option("--plan", "wants_plan", is_flag=True, help="advise which load to drive next; [vehicle] alone is enough")
 @window
 @as_json
 def calibrate(
     campaign: Path,
-    output: Path,
+    output: Path | None,
     estimators: tuple[str, ...],
     numbers: tuple[int, ...] | None,
+    wants_plan: bool,
     window_s: float | None,
     as_json: bool,
 ) -> None:
     """Fit every estimator on the identification parts of CAMPAIGN's runs."""
+    if output is None and not wants_plan:
+        raise click.UsageError("name the calibration file to write with --output, or ask for a plan with --plan")
+    if wants_plan and not (draft := load_draft(campaign)).runs:
+        plan = plan_first(draft.vehicle)
+        click.echo(json_line({"plan": plan.to_json()}) if as_json else plan_sentences(plan))
+        return
     loaded = load_campaign(campaign)
     with bar(len(loaded.runs) if numbers is None else len(numbers), "reading drives") as progress:
-        found = fit(
+        outcome = fit(
             loaded,
             batch_settings(window_s),
             estimators=estimators or ESTIMATOR_NAMES,
             numbers=numbers,
             command=shlex.join(["springscale", *sys.argv[1:]]),
             on_run=lambda done, of: progress.update(done - progress.pos),
-        ).file
-    output.write_text(found.to_json(), encoding="utf-8")
-    click.echo(json_line(_summary(found, output)) if as_json else _sentences(found, output))
+        )
+    found = outcome.file
+    if output is not None:
+        output.write_text(found.to_json(), encoding="utf-8")
+    next_runs = plan_next(outcome, loaded.vehicle) if wants_plan else None
+    click.echo(json_line(_summary(found, output, next_runs)) if as_json else _sentences(found, output, next_runs))
 
 
-def _summary(found: CalibrationFile, output: Path) -> dict[str, object]:
+def _summary(found: CalibrationFile, output: Path | None, plan: Plan | None) -> dict[str, object]:
     return {
         "calibration_id": found.id,
-        "output": str(output),
+        "output": str(output) if output else None,
         "estimators": list(found.estimators),
         "seen": found.seen.model_dump(mode="json"),
         "expected_errors": {name: errors.model_dump(mode="json") for name, errors in found.expected_errors.items()},
         "warnings": list(found.warnings),
+        **({"plan": plan.to_json()} if plan else {}),
     }
 
 
-def _sentences(found: CalibrationFile, output: Path) -> str:
+def _sentences(found: CalibrationFile, output: Path | None, plan: Plan | None) -> str:
     low, high = found.seen.payload_kg
     lines = [
-        f"{output}: {', '.join(found.estimators)}; payloads {low:g} to {high:g} kg, "
+        f"{output or 'no file written'}: {', '.join(found.estimators)}; payloads {low:g} to {high:g} kg, "
         f"{len(found.provenance.runs)} runs, {sum(run.n_batches for run in found.provenance.runs)} batches",
         f"id {found.id}",
         *(f"warning: {warning}" for warning in found.warnings),
+        *([plan_sentences(plan)] if plan else []),
     ]
     return "\n".join(lines)

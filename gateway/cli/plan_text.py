@@ -1,0 +1,57 @@
+"""A plan as sentences a fitter understands."""
+
+from gateway.calibration.design_loads import PlacedLoad
+from gateway.offline.plan import Advice, Expected, Plan
+
+
+def plan_sentences(plan: Plan) -> str:
+    """What is expected now, the runs to drive in order, and what each would bring."""
+    kmh = 3.6 * plan.drive.speed_mps
+    lines = [
+        _now(plan),
+        f"drive next, each for {plan.drive.duration_s / 60.0:.0f} minutes near {kmh:.0f} km/h:",
+        *(f"{i}. {_load(step.load)}: then {_expected(step.expected)}" for i, step in enumerate(plan.advice, 1)),
+    ]
+    if plan.least is not None:
+        lines.append(f"least useful would be: {_load(plan.least.load)}: then {_expected(plan.least.expected)}")
+    index = _ratio_index(plan)
+    return "\n".join([*lines, index] if index else lines)
+
+
+def _now(plan: Plan) -> str:
+    if plan.now is None:
+        return f"{plan.vehicle}: nothing driven yet; expected from what is usual for road vehicles"
+    return f"{plan.vehicle}, {plan.n_driven} runs driven: expected {_expected(plan.now)}"
+
+
+def _load(load: PlacedLoad) -> str:
+    if load.position_m is None:
+        return "the empty vehicle"
+    return f"load {load.payload_kg:g} kg with its centre {load.position_m:g} m behind the front axle"
+
+
+def _expected(expected: Expected) -> str:
+    text = f"+- {expected.payload_std_kg:.0f} kg and +- {expected.front_share_std_pct:.1f} percentage points"
+    if expected.reach_share is None:
+        return text
+    return f"{text}, {100.0 * expected.reach_share:.0f} % of the loads it may carry within reach"
+
+
+def _ratio_index(plan: Plan) -> str | None:
+    """One line for the other estimator, where it is calibrated."""
+    if plan.now is None or plan.now.ratio_index is None or not plan.advice:
+        return None
+    now, then = plan.now.ratio_index, _first(plan.advice).ratio_index
+    pairs = [
+        f"{what} +- {before:.{digits}f} to +- {after:.{digits}f} {unit}"
+        for what, before, after, unit, digits in (
+            ("payload", now.payload_std_kg, then and then.payload_std_kg, "kg", 0),
+            ("share", now.front_share_std_pct, then and then.front_share_std_pct, "points", 1),
+        )
+        if before is not None and after is not None
+    ]
+    return f"for the ratio index the first of these would bring {', '.join(pairs)}" if pairs else None
+
+
+def _first(advice: tuple[Advice, ...]) -> Expected:
+    return advice[0].expected
