@@ -10,6 +10,7 @@ import click
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.file_comparison import Difference, differences
+from gateway.cli.calibration_tare import tare_commands
 from gateway.cli.calibration_text import calibration_text
 from gateway.cli.options import FILE, as_json
 from gateway.offline.calibration_check import Check, Verdict, check_against_campaign
@@ -19,6 +20,9 @@ from gateway.records import json_line
 @click.group("calibration")
 def calibration_commands() -> None:
     """Look at calibration files, compare and check them; re-zero a running service (tare)."""
+
+
+calibration_commands.add_command(tare_commands)
 
 
 @calibration_commands.command("show")
