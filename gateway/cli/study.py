@@ -8,10 +8,11 @@ import click
 from gateway.calibration.campaign import load_campaign
 from gateway.cli.options import FILE, as_json, batch_settings, window
 from gateway.cli.progress import bar
-from gateway.cli.study_text import learning_curve_table
+from gateway.cli.study_text import advice_table, learning_curve_table
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import ConfigurationError
 from gateway.offline import coverage as coverage_study
+from gateway.offline.advice_study import advice_study
 from gateway.offline.coverage_drives import Scope
 from gateway.offline.learning_curve import MOST_SUBSETS, SEED
 from gateway.offline.learning_curve import learning_curve as study_learning_curve
@@ -64,6 +65,28 @@ def learning_curve(
             on_trial=on_trial,
         )
     click.echo(json_line(curve.to_json()) if as_json else learning_curve_table(curve))
+
+
+@study.command("advice")
+@click.argument("campaign", type=FILE)
+@window
+@as_json
+def advice(campaign: Path, window_s: float | None, as_json: bool) -> None:
+    """Does it help to drive what --plan advises? Tried with CAMPAIGN's own runs as the next ones."""
+    loaded = load_campaign(campaign)
+    with bar(len(loaded.runs), "reading drives") as progress:
+
+        def on_fit(done: int, of: int) -> None:
+            progress.label, progress.length = "calibrating and judging", of
+            progress.update(done - progress.pos)
+
+        found = advice_study(
+            loaded,
+            batch_settings(window_s),
+            on_run=lambda done, of: progress.update(done - progress.pos),
+            on_fit=on_fit,
+        )
+    click.echo(json_line(found.to_json()) if as_json else advice_table(found))
 
 
 @study.command("coverage")

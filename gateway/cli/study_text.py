@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from gateway.calibration.advice_study import AdviceStudy, Comparison
 from gateway.calibration.learning_curve import LearningCurve, Rung, Spread
 
 _HEAD = (
@@ -24,6 +25,39 @@ def learning_curve_table(curve: LearningCurve) -> str:
         "left out: all batches of runs that calibration did not see; later part: the validation part of every run",
     ]
     return "\n".join(lines)
+
+
+def advice_table(found: AdviceStudy) -> str:
+    """Errors before and after a fourth run: the one advised, the others, and the best and worst by hindsight."""
+    return "\n".join(
+        [
+            f"{found.campaign}: mean |error| of payload and share in percent (12), validation part of all runs, "
+            f"over {found.with_misses.n_choices} triples of runs",
+            f"{'':26}{'rejected counts as mid-range':>30}{'answered batches only':>30}",
+            *(
+                f"{what:26}{_pair(found.with_misses, key):>30}{_pair(found.answered, key):>30}"
+                for what, key in (
+                    ("three runs", "before"),
+                    ("and the advised fourth", "advised"),
+                    ("and another, on average", "others"),
+                    ("and the least useful", "least"),
+                    ("best by hindsight", "best"),
+                    ("worst by hindsight", "worst"),
+                )
+            ),
+            f"{'advised beats the average':26}{_often(found.with_misses):>30}{_often(found.answered):>30}",
+        ]
+    )
+
+
+def _pair(comparison: Comparison, key: str) -> str:
+    payload, share = getattr(comparison, key)
+    return f"{payload:.2f} %  {share:.2f} %"
+
+
+def _often(comparison: Comparison) -> str:
+    payload, share = comparison.better_share
+    return f"{100 * payload:.0f} %   {100 * share:.0f} %"
 
 
 def _rung_lines(rungs: Sequence[Rung]) -> list[str]:

@@ -1,0 +1,114 @@
+"""Does it help to drive what the plan advises? Tried on a campaign whose next runs were driven already.
+
+From every triple of the empty run and two loads at different positions, each remaining run in turn is
+taken as the fourth; the plan chooses among them knowing the triple alone. Judged on the validation part
+of all runs, the same batches for every choice.
+"""
+
+from collections.abc import Callable, Sequence
+
+from gateway.calibration.advice_study import AdviceStudy, Choice, Errors, compared
+from gateway.calibration.campaign import Campaign
+from gateway.calibration.design import Design
+from gateway.calibration.design_loads import PlacedLoad, weighed_loads
+from gateway.calibration.evaluation import error_table
+from gateway.calibration.learning_curve import triples_at_different_positions
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle
+from gateway.errors import CalibrationImpossibleError
+from gateway.offline.known_runs import OnRun, SplitRun, split_runs
+from gateway.offline.plan import usual_drive
+from gateway.offline.trials import calibrated_on, judged_all
+
+ESTIMATOR = "cross_spectrum"
+OnFit = Callable[[int, int], None]  # (calibrations done, calibrations in all)
+Scored = tuple[Errors, Errors]  # with misses, and of what was answered
+
+
+def advice_study(
+    campaign: Campaign,
+    settings: BatchSettings,
+    on_run: OnRun = lambda done, of: None,
+    on_fit: OnFit = lambda done, of: None,
+) -> AdviceStudy:
+    """Raises CalibrationImpossibleError where the campaign holds no such triple with runs to choose from."""
+    split = split_runs(campaign, settings, on_run=on_run)
+    runs = [one.identification for one in split]
+    triples = triples_at_different_positions(runs, campaign.vehicle)
+    if not triples or len(runs) < 5:
+        raise CalibrationImpossibleError(
+            f"{campaign.path}: needs an empty run, loads at two positions or more and five runs in all, to choose from"
+        )
+    tried = _Tried(split, campaign.vehicle, on_fit, _n_calibrations(triples, [run.number for run in runs]))
+    choices = [tried.choice(triple) for triple in triples]
+    return AdviceStudy(
+        campaign.vehicle.name, compared([choice[0] for choice in choices]), compared([choice[1] for choice in choices])
+    )
+
+
+def _n_calibrations(triples: Sequence[tuple[int, ...]], numbers: Sequence[int]) -> int:
+    """Triples, and the different quadruples that follow from them."""
+    fours = {frozenset((*triple, number)) for triple in triples for number in numbers if number not in triple}
+    return len(triples) + len(fours)
+
+
+class _Tried:
+    """Calibrations made so far, each once."""
+
+    def __init__(self, split: Sequence[SplitRun], vehicle: Vehicle, on_fit: OnFit, n_fits: int) -> None:
+        self._split = {one.identification.number: one for one in split}
+        self._vehicle = vehicle
+        self._on_fit, self._n_fits = on_fit, n_fits
+        self._made: dict[frozenset[int], tuple[CalibratedVehicle, Scored]] = {}
+
+    def choice(self, numbers: tuple[int, ...]) -> tuple[Choice, Choice]:
+        """What could follow these runs, once with misses and once of what was answered."""
+        calibrated, before = self._calibrated(numbers)
+        advised, least = self._advice(numbers, calibrated)
+        after = {number: self._calibrated((*numbers, number))[1] for number in self._split if number not in numbers}
+        both = [
+            Choice(numbers, advised, least, before[which], {number: errors[which] for number, errors in after.items()})
+            for which in (0, 1)
+        ]
+        return both[0], both[1]
+
+    def _advice(self, numbers: tuple[int, ...], calibrated: CalibratedVehicle) -> tuple[int, int]:
+        """The runs not driven yet that the plan expects most and least of."""
+        found = calibrated.cross_spectrum
+        if found is None:
+            raise ValueError("a study of the advice needs the cross-spectral calibration")
+        drive = usual_drive([self._split[number].identification for number in numbers])
+        design = Design(self._vehicle, found.parameters, drive, weighed_loads(self._vehicle))
+        number_of = {
+            PlacedLoad(one.identification.payload_kg, None, one.identification.front_share_pct): number
+            for number, one in self._split.items()
+            if number not in numbers
+        }
+        loads = list(number_of)
+        return (
+            number_of[design.best(found.covariance, loads)],
+            number_of[design.worst(found.covariance, loads)],
+        )
+
+    def _calibrated(self, numbers: tuple[int, ...]) -> tuple[CalibratedVehicle, Scored]:
+        key = frozenset(numbers)
+        if key not in self._made:
+            runs = [self._split[number].identification for number in sorted(numbers)]
+            calibrated = calibrated_on(runs, self._vehicle, ESTIMATOR)
+            self._made[key] = calibrated, self._scored(calibrated)
+            self._on_fit(len(self._made), self._n_fits)
+        return self._made[key]
+
+    def _scored(self, calibrated: CalibratedVehicle) -> Scored:
+        judged = judged_all((one.validation for one in self._split.values()), calibrated, ESTIMATOR)
+        table = error_table(judged, self._vehicle, ESTIMATOR)
+        payload, share = table["payload"], table["front_share"]
+        return (
+            (payload["mean_abs_pct_with_misses"], share["mean_abs_pct_with_misses"]),
+            (_or_nan(payload["mean_abs_pct"]), _or_nan(share["mean_abs_pct"])),
+        )
+
+
+def _or_nan(x: float | None) -> float:
+    return float("nan") if x is None else x
