@@ -1,0 +1,44 @@
+"""A vehicle as a tare desk sees it, without a pipeline behind it."""
+
+from typing import Any
+
+from gateway.core.fusion import fused
+from gateway.core.tare import Weighed
+from gateway.records import Estimate
+from gateway.units import NS_PER_S
+
+
+class FakeFlow:
+    """What the desk sees of a flow."""
+
+    def __init__(self) -> None:
+        self.tare: Any = None
+        self.weighed: Weighed | None = None
+        self.load_may_have_changed = False
+
+
+class FakePipeline:
+    """A vehicle weighed a minute ago as 12 kg and 51 %; the test may say otherwise."""
+
+    def __init__(self) -> None:
+        self.flow: Any = FakeFlow()
+        self.age_s: float | None = 60.0
+        self.weigh(12.0)
+
+    def weigh(self, payload_kg: float, share_pct: float = 51.0, std_kg: float = 5.0) -> None:
+        """One batch, and no other."""
+        found = Estimate(
+            t_start_ns=0,
+            t_end_ns=300 * NS_PER_S,
+            estimator="ratio_index",
+            payload_kg=payload_kg,
+            payload_std_kg=std_kg,
+            front_share_pct=share_pct,
+            front_share_std_pct=0.4,
+        )
+        epoch = fused(None, found)
+        assert epoch is not None
+        self.flow.weighed = Weighed(epoch, 0, found.t_end_ns, ("5-abc",))
+
+    def weighed_age_s(self) -> float | None:
+        return self.age_s
