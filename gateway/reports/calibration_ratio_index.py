@@ -1,0 +1,128 @@
+"""The ratio index over load and share: its curves with the fitted model, its bands, and its coefficients."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from gateway.core.known_run import KnownRun
+from gateway.core.ratio_index import Band, RatioIndexCalibration
+from gateway.core.regression import RegressionModel
+from gateway.offline.left_out import IndexRows, index_rows
+from gateway.records import F64
+from gateway.reports.calibration_text import NONE
+from gateway.reports.chart import Axis, Chart, Line, Mark, Marker, Panel, Points, Ribbon, Section, Table
+
+N_ALONG: Final = 60
+INTERVAL: Final = "95 % interval of a new batch"
+MIDDLE: Final = "model, the other index at its median"
+QUARTILES: Final = "model, the other index at its quartiles"
+
+
+def ratio_index_section(
+    calibration: RatioIndexCalibration, identification: Sequence[KnownRun], validation: Sequence[KnownRun]
+) -> Section:
+    """R_a and R_g of every batch, the regression through them, and what it consists of."""
+    fitted, later = index_rows(identification, calibration), index_rows(validation, calibration)
+    panels = []
+    if calibration.acceleration_bands is not None:
+        panels += _panels("R_a", fitted, later, calibration.payload)
+    if calibration.pitch_rate_bands is not None:
+        panels += _panels("R_g", fitted, later, calibration.front_share)
+    chart = Chart(
+        "ratio_index",
+        "Ratio indexes R_a and R_g of every batch over the load and over the front share. Lines: the static regression "
+        "that answers from both indexes, drawn along one of them with the other held; the ribbon is the 95 % interval "
+        "of a new batch. Where points of one payload spread, it is the share (or the road) that moves them.",
+        f"Ratio indexes over load and share. {len(fitted.run)} batches identify, {len(later.run)} validate.",
+        tuple(panels),
+    )
+    tables = (_bands_table(calibration), *_model_tables(calibration))
+    return Section("ratio-index", "Ratio index", (), (chart,), tables)
+
+
+def _panels(name: str, fitted: IndexRows, later: IndexRows, model: RegressionModel | None) -> list[Panel]:
+    """The index over payload and over share; the model where its own target is."""
+    is_a = name == "R_a"
+    curves = _curves(name, fitted, model) if model is not None else []
+    over_payload = (*(curves if is_a else ()), *_points(name, fitted, later, of_payload=True))
+    over_share = (*(() if is_a else curves), *_points(name, fitted, later, of_payload=False))
+    return [
+        Panel(Axis(name), Axis("payload [kg]"), over_payload),
+        Panel(Axis(name), Axis("front share [%]"), over_share),
+    ]
+
+
+def _points(name: str, fitted: IndexRows, later: IndexRows, *, of_payload: bool) -> list[Points]:
+    sets: list[tuple[IndexRows, str, int, Marker]] = [
+        (fitted, "identification", 0, "circle"),
+        (later, "validation", 1, "diamond"),
+    ]
+    return [
+        Points(
+            rows.ra if name == "R_a" else rows.rg,
+            rows.payload_kg if of_payload else rows.front_share_pct,
+            label,
+            colour,
+            marker,
+            notes=_notes(rows),
+        )
+        for rows, label, colour, marker in sets
+        if len(rows.run)
+    ]
+
+
+def _notes(rows: IndexRows) -> tuple[str, ...]:
+    columns = zip(rows.run, rows.payload_kg, rows.front_share_pct, strict=True)
+    return tuple(f"run {run}: {payload_kg:g} kg, {share_pct:.1f} %" for run, payload_kg, share_pct in columns)
+
+
+def _curves(name: str, rows: IndexRows, model: RegressionModel) -> list[Mark]:
+    """The model along one index, with the other held at its median and, where that matters, at its quartiles."""
+    own, other = (rows.ra, rows.rg) if name == "R_a" else (rows.rg, rows.ra)
+    along = np.linspace(own.min(), own.max(), N_ALONG)
+    lower, middle, upper = (
+        _predicted(name, model, along, held) for held in np.quantile(other, (0.25, 0.5, 0.75)).tolist()
+    )
+    marks: list[Mark] = [Ribbon(along, middle[:, 1], middle[:, 2], INTERVAL, 2), Line(along, middle[:, 0], MIDDLE, 2)]
+    if np.isfinite(lower).all() and not np.allclose(lower, upper):
+        marks += [Line(along, each[:, 0], QUARTILES, 2, "dot") for each in (lower, upper)]
+    return marks
+
+
+def _predicted(name: str, model: RegressionModel, along: F64, held: float) -> F64:
+    """Answer and 95 % limits (n, 3)."""
+    rows = [model.predict(x, held) if name == "R_a" else model.predict(held, x) for x in along.tolist()]
+    return np.array([(centre, *interval) for centre, _, interval in rows])
+
+
+def _bands_table(calibration: RatioIndexCalibration) -> Table:
+    rows = [
+        (index, *(_band(band) for band in bands or ()))
+        for index, bands in (("R_a", calibration.acceleration_bands), ("R_g", calibration.pitch_rate_bands))
+    ]
+    padded = tuple((*row, *(NONE,) * (3 - len(row))) for row in rows)
+    return Table("Bands: centre and width at -3 dB", ("Index", "numerator", "denominator"), padded)
+
+
+def _band(band: Band) -> str:
+    return f"{band.centre_hz:g} Hz, {band.width_hz:g} Hz wide"
+
+
+def _model_tables(calibration: RatioIndexCalibration) -> list[Table]:
+    models = (("payload [kg]", calibration.payload), ("front share [%]", calibration.front_share))
+    return [_model_table(target, model) for target, model in models if model is not None]
+
+
+def _model_table(target: str, model: RegressionModel) -> Table:
+    stds = model.residual_std * np.sqrt(np.diag(model.gram_inverse))
+    rows = tuple(
+        (term, f"{coefficient:.4g}", f"{std:.3g}", f"{coefficient / std:.1f}" if std > 0.0 else NONE)
+        for term, coefficient, std in zip(("constant", *model.terms), model.coefficients, stds, strict=True)
+    )
+    return Table(
+        f"Regression of {target}: terms scaled to -1..1 over what was seen; residual standard deviation over runs left "
+        f"out {model.residual_std:.3g}, {model.dof:g} degrees of freedom",
+        ("Term", "coefficient", "standard deviation", "ratio"),
+        rows,
+    )

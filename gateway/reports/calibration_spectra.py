@@ -1,0 +1,108 @@
+"""Spectra of both sensors for every load driven, with the scatter that so much driving leaves."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import gammaincinv
+
+from gateway.core.known_run import KnownRun
+from gateway.core.ratio_index import Band, RatioIndexCalibration
+from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
+from gateway.records import F64, Batch
+from gateway.reports.chart import Axis, Chart, Line, Mark, Panel, Ribbon, Section, Span
+
+N_SEGMENT: Final = 512
+SHOWN_HZ: Final = (0.7, 15.0)
+MOST_CURVES: Final = 6
+OVERLAP_LOSS: Final = 1.0 + 2.0 / 36.0  # of independence between Hann segments that overlap by half (Welch 1967)
+ACCELERATION: Final = "acceleration"
+PITCH_RATE: Final = "pitch_rate"
+_AXIS: Final = {ACCELERATION: "vertical acceleration [m/s²/√Hz]", PITCH_RATE: "pitch rate [rad/s/√Hz]"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Density:
+    """Amplitude density and its 95 % limits (m,) at freq_hz (m,), from n_segments half-overlapping segments."""
+
+    freq_hz: F64
+    amplitude: F64
+    low: F64
+    high: F64
+    n_segments: int
+
+
+def density_of(batches: Iterable[Batch], sensor: str) -> Density | None:
+    """Root of the mean power over all segments of ``batches``; None where no segment fits between the gaps.
+
+    A mean of K segments follows chi-square with about 2 K / OVERLAP_LOSS degrees of freedom (P. D. Welch,
+    IEEE Trans. Audio Electroacoust. 15, 1967); roads differ besides.
+    """
+    powers, rate_hz = [], 1.0
+    for batch in batches:
+        x = batch.vertical_acceleration_mps2 if sensor == ACCELERATION else batch.pitch_rate_radps
+        starts = segment_starts(batch.usable & np.isfinite(x), N_SEGMENT, N_SEGMENT // 2)
+        powers.append(np.abs(segment_transforms(x, starts, N_SEGMENT, batch.rate_hz)) ** 2)
+        rate_hz = batch.rate_hz
+    n_segments = sum(len(power) for power in powers)
+    if not n_segments:
+        return None
+    freq_hz = frequencies_hz(N_SEGMENT, rate_hz)
+    kept = (freq_hz >= SHOWN_HZ[0]) & (freq_hz <= SHOWN_HZ[1])
+    mean = np.concatenate(powers)[:, kept].mean(axis=0)
+    half_dof = n_segments / OVERLAP_LOSS
+    low, high = (np.sqrt(mean * half_dof / gammaincinv(half_dof, p)) for p in (0.975, 0.025))
+    return Density(freq_hz[kept], np.sqrt(mean), low, high, n_segments)
+
+
+def spectra_section(runs: Sequence[KnownRun], ratio_index: RatioIndexCalibration | None) -> Section | None:
+    """Acceleration by payload and pitch rate by front share; None where there is no spectrum at all."""
+    bands_a = ratio_index.acceleration_bands if ratio_index else None
+    bands_g = ratio_index.pitch_rate_bands if ratio_index else None
+    found = (
+        _panel(runs, ACCELERATION, [(f"{kg:g} kg", kg) for kg in sorted({run.payload_kg for run in runs})], bands_a),
+        _panel(runs, PITCH_RATE, [(f"{pct:.1f} %", pct) for pct in sorted({_share(run) for run in runs})], bands_g),
+    )
+    panels = tuple(panel for panel in found if panel is not None)
+    if not panels:
+        return None
+    chart = Chart(
+        "spectra",
+        "Amplitude densities of the identification part: acceleration by payload, pitch rate by front share. The "
+        "ribbon is the 95 % scatter of the mean over that much driving on the same road; roads differ besides. Shaded "
+        "upright: the bands whose ratio is the index, solid over dashed.",
+        "Spectra of vertical acceleration for each payload and of pitch rate for front shares: more load lowers and "
+        "moves the resonances of body and wheels.",
+        panels,
+        row_height_px=380,
+    )
+    return Section("spectra", "Spectra", (), (chart,))
+
+
+def _share(run: KnownRun) -> float:
+    return round(run.front_share_pct, 1)
+
+
+def _panel(
+    runs: Sequence[KnownRun], sensor: str, groups: Sequence[tuple[str, float]], bands: tuple[Band, Band] | None
+) -> Panel | None:
+    chosen = [groups[i] for i in np.unique(np.linspace(0, len(groups) - 1, MOST_CURVES).round().astype(int))]
+    marks: list[Mark] = []
+    for colour, (label, level) in enumerate(chosen):
+        alike = [run for run in runs if (run.payload_kg if sensor == ACCELERATION else _share(run)) == level]
+        density = density_of((b for run in alike for b in run.batches if not b.rejected), sensor)
+        if density is not None:
+            marks.append(Ribbon(density.freq_hz, density.low, density.high, "", colour))
+            marks.append(Line(density.freq_hz, density.amplitude, label, colour))
+    if not marks:
+        return None
+    return Panel(Axis("frequency [Hz]"), Axis(_AXIS[sensor], is_log=True), (*_spans(bands), *marks))
+
+
+def _spans(bands: tuple[Band, Band] | None) -> tuple[Span, ...]:
+    names = ("band above the line of the ratio", "band below the line")
+    return tuple(
+        Span(band.centre_hz - 0.5 * band.width_hz, band.centre_hz + 0.5 * band.width_hz, name, colour)
+        for band, name, colour in zip(bands or (), names, (6, 7), strict=False)
+    )
