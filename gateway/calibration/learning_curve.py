@@ -131,8 +131,8 @@ def subsets_to_drive(runs: Sequence[KnownRun], n_runs: int, most: int, seed: int
 
     All such subsets where there are at most ``most``, otherwise ``most`` of them drawn by ``seed``.
     """
-    empty = [run.number for run in runs if run.payload_kg == 0.0][:1]
-    others = [run.number for run in runs if run.number not in empty]
+    empty = sorted(run.number for run in runs if run.payload_kg == 0.0)[:1]
+    others = sorted(run.number for run in runs if run.number not in empty)
     n_chosen = n_runs - len(empty)
     if not 0 <= n_chosen <= len(others):
         return []

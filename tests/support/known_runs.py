@@ -1,0 +1,35 @@
+"""Known-load drives of the half-car of support.half_car_road, as calibration reads them."""
+
+from pathlib import Path
+
+from gateway.core.known_run import KnownRun
+from gateway.core.vehicle import front_share_pct
+from gateway.offline.known_runs import SplitRun
+from support.half_car_road import VAN, batch_over_road
+
+LOADS = ((0.0, None), (200.0, 0.5), (300.0, 1.4), (400.0, 2.6))  # payload, metres behind the front axle
+
+
+def known_run(
+    number: int, payload_kg: float, position_m: float | None, seed: int, n_batches: int = 1, duration_s: float = 200.0
+) -> KnownRun:
+    """One drive at 14 m/s."""
+    share_pct = front_share_pct(VAN, payload_kg, position_m)
+    batches = tuple(
+        batch_over_road(payload_kg, share_pct, 1000 * seed + 10 * number + i, duration_s) for i in range(n_batches)
+    )
+    return KnownRun(number, f"{number}.log", payload_kg, share_pct, batches)
+
+
+def split_run(number: int, payload_kg: float, position_m: float | None, seed: int = 1) -> SplitRun:
+    """One batch to identify and one to validate."""
+    both = known_run(number, payload_kg, position_m, seed, n_batches=2)
+    identification, validation = (
+        KnownRun(number, both.name, both.payload_kg, both.front_share_pct, (batch,)) for batch in both.batches
+    )
+    return SplitRun(Path(both.name), "0" * 64, identification, validation)
+
+
+def campaign(seed: int = 1) -> tuple[SplitRun, ...]:
+    """A drive with each of LOADS, numbered from 1."""
+    return tuple(split_run(number, *load, seed=seed) for number, load in enumerate(LOADS, 1))

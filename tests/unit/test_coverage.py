@@ -1,0 +1,93 @@
+"""The interval of a coverage against closed forms, and by trying it many times."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binomtest
+
+from gateway.calibration.coverage import coverage_of
+from gateway.calibration.coverage_table import ALL_KINDS, JudgedBatch, coverage_table
+
+
+def test_batches_of_different_runs_give_the_exact_binomial_limits() -> None:
+    covered = [True] * 190 + [False] * 10
+    found = coverage_of(covered, list(range(200)))
+    exact = binomtest(190, 200).proportion_ci(0.95, method="exact")
+    assert found.n_effective == pytest.approx(199.0)  # the variance between 200 clusters is a sample's
+    assert (found.low, found.high) == pytest.approx((exact.low, exact.high), abs=2e-4)
+
+
+@given(st.integers(2, 8), st.integers(0, 2**32 - 1))
+def test_saying_everything_k_times_over_adds_nothing(k: int, seed: int) -> None:
+    covered = np.random.default_rng(seed).random(60) < 0.9
+    once = coverage_of(covered.tolist(), list(range(60)))
+    repeated = coverage_of(np.repeat(covered, k).tolist(), np.repeat(np.arange(60), k).tolist())
+    assert repeated.share == pytest.approx(once.share)
+    assert repeated.n_effective <= once.n_effective * (1.0 + 1e-9)
+    assert repeated.high - repeated.low >= 0.999 * (once.high - once.low)
+
+
+def test_where_all_are_covered_each_run_counts_once() -> None:
+    found = coverage_of([True] * 60, [i // 6 for i in range(60)])
+    assert (found.n, found.n_clusters, found.n_effective, found.high) == (60, 10, 10.0, 1.0)
+    assert found.low == pytest.approx(binomtest(10, 10).proportion_ci(0.95, method="exact").low)
+
+
+def test_the_limits_hold_the_true_share_when_runs_differ() -> None:
+    """Runs with shares of their own (beta, correlation 0.2), 40 runs of 6 batches: 95 % limits, tried 400 times."""
+    rng = np.random.default_rng(5)
+    cluster = np.repeat(np.arange(40), 6)
+    n_held = n_naive = 0
+    for _ in range(400):
+        hits = rng.random(240) < rng.beta(0.92 * 4.0, 0.08 * 4.0, 40)[cluster]
+        found = coverage_of(hits.tolist(), cluster.tolist())
+        naive = binomtest(int(hits.sum()), 240).proportion_ci(0.95, method="exact")
+        n_held += found.low <= 0.92 <= found.high
+        n_naive += naive.low <= 0.92 <= naive.high
+    assert n_held >= 0.93 * 400
+    assert n_naive < n_held
+
+
+@pytest.mark.parametrize(("n_misses", "falls_short"), [(0, False), (10, False), (40, True)])
+def test_only_limits_wholly_outside_what_is_promised_fall_short(n_misses: int, falls_short: bool) -> None:
+    covered = [i >= n_misses for i in range(200)]
+    assert coverage_of(covered, list(range(200))).falls_short is falls_short
+
+
+def test_one_run_tells_nothing_of_how_runs_scatter() -> None:
+    with pytest.raises(ValueError, match="at least two runs"):
+        coverage_of([True, False], ["a", "a"])
+
+
+def batch(
+    van: str, run: str, kind: str, error_pct: float, *, is_covered: bool, is_rejected: bool = False
+) -> JudgedBatch:
+    return JudgedBatch(van, run, kind, "cross_spectrum", is_rejected, error_pct, -error_pct, is_covered, is_covered)
+
+
+def test_a_line_for_every_kind_and_one_for_all() -> None:
+    table = coverage_table(
+        [
+            batch("a", "a 1", "town", 2.0, is_covered=True),
+            batch("a", "a 2", "town", -4.0, is_covered=False),
+            batch("b", "b 1", "town", 30.0, is_covered=False, is_rejected=True),
+            batch("b", "b 2", "country", 6.0, is_covered=True),
+        ],
+        seed=3,
+        refused=("b: ratio_index: too few",),
+    )
+    town, country, everything = table.lines
+    assert [line.kind for line in table.lines] == ["town", "country", ALL_KINDS]
+    assert (town.n_batches, town.n_rejected, town.n_vans, town.n_runs) == (3, 1, 2, 3)
+    assert town.payload_mean_abs_pct == pytest.approx(3.0)  # the rejected batch gave no answer
+    assert town.payload_mean_abs_pct_with_misses == pytest.approx(12.0)
+    assert town.payload_coverage is not None
+    assert town.payload_coverage.share == 0.5
+    assert town.payload_coverage_by_van is None  # only one van answered
+    assert country.front_share_coverage is None
+    assert everything.payload_coverage is not None
+    assert everything.payload_coverage.n == 3
+    assert everything.payload_coverage_by_van is not None
+    assert everything.payload_coverage_by_van.n_clusters == 2
+    assert table.to_json()["refused"] == ("b: ratio_index: too few",)
