@@ -1,0 +1,131 @@
+"""The report of a calibration, or of an evaluation alone: report.html with its figures, and report.json.
+
+    write_calibration_report(DIR, campaign, outcome)      springscale calibrate ... --report DIR
+    write_evaluation_report(DIR, evidence)                springscale evaluate ... --report DIR
+
+The directory is whole: the page fetches nothing from elsewhere, and reads without scripts.
+"""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from gateway.calibration.campaign import Campaign
+from gateway.offline.calibrate import Outcome
+from gateway.offline.plan import Plan, plan_next
+from gateway.reports.calibration_accuracy import accuracy_section
+from gateway.reports.calibration_evidence import Evidence, evidence_of_calibration
+from gateway.reports.calibration_half_car import half_car_section
+from gateway.reports.calibration_page import Page, page_html
+from gateway.reports.calibration_ratio_index import ratio_index_section
+from gateway.reports.calibration_runs import best_next, plan_section, provenance_section, runs_section
+from gateway.reports.calibration_spectra import spectra_section
+from gateway.reports.calibration_text import span
+from gateway.reports.calibration_verdict import Verdict, verdicts_of
+from gateway.reports.chart import Chart, Section
+from gateway.reports.chart_live import plotly_json, plotly_script
+from gateway.reports.chart_still import save_still
+
+
+def write_calibration_report(directory: Path, campaign: Campaign, outcome: Outcome) -> Path:
+    """Everything known of a calibration; the path of report.html."""
+    evidence = evidence_of_calibration(campaign, outcome)
+    plan = plan_next(outcome, campaign.vehicle) if outcome.cross_spectrum else None
+    sections = [*_calibration_sections(outcome, campaign, plan), *_evaluation_sections(evidence)]
+    return _write(directory, evidence, sections, plan)
+
+
+def write_evaluation_report(directory: Path, evidence: Evidence) -> Path:
+    """How a calibration did on a campaign; the path of report.html."""
+    return _write(directory, evidence, _evaluation_sections(evidence), None)
+
+
+def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: Plan | None) -> Iterator[Section]:
+    identification = [one.identification for one in outcome.split]
+    yield runs_section(outcome)
+    if plan is not None:
+        yield plan_section(plan)
+    ratio_index = outcome.ratio_index.calibration if outcome.ratio_index else None
+    spectra = spectra_section(identification, ratio_index)
+    if spectra is not None:
+        yield spectra
+    if ratio_index is not None:
+        yield ratio_index_section(ratio_index, identification, [one.validation for one in outcome.split])
+    if outcome.cross_spectrum is not None:
+        yield half_car_section(identification, outcome.cross_spectrum, campaign.vehicle)
+
+
+def _evaluation_sections(evidence: Evidence) -> list[Section]:
+    return [*(accuracy_section(judgement) for judgement in evidence.judgements), provenance_section(evidence)]
+
+
+def _write(directory: Path, evidence: Evidence, sections: list[Section], plan: Plan | None) -> Path:
+    charts = list(_charts(sections))
+    for chart in charts:
+        save_still(chart, directory / "figures")
+    verdicts = verdicts_of(evidence)
+    page = Page(
+        evidence.title,
+        _subtitle(evidence),
+        verdicts,
+        best_next(plan) if plan else None,
+        tuple(sections),
+        {chart.name: plotly_json(chart) for chart in charts},
+    )
+    (directory / "plotly.min.js").write_text(plotly_script(), encoding="utf-8")
+    text = json.dumps(report_json(evidence, verdicts, plan), indent=1, allow_nan=False)
+    (directory / "report.json").write_text(text + "\n", encoding="utf-8")
+    report = directory / "report.html"
+    report.write_text(page_html(page), encoding="utf-8")
+    return report
+
+
+def _charts(sections: list[Section]) -> Iterator[Chart]:
+    for section in sections:
+        yield from section.charts
+        yield from (item for _, inside in section.folded for item in inside if isinstance(item, Chart))
+
+
+def _subtitle(evidence: Evidence) -> str:
+    seen = evidence.file.seen
+    speeds = span(3.6 * seen.speed_mps[0], 3.6 * seen.speed_mps[1], "km/h")
+    return (
+        f"Calibrated on {len(evidence.file.provenance.runs)} runs: payloads of {span(*seen.payload_kg, 'kg')}, front "
+        f"shares of {span(*seen.front_share_pct, '%', 1)}, {speeds}. {evidence.file.id}"
+    )
+
+
+def report_json(evidence: Evidence, verdicts: tuple[Verdict, ...], plan: Plan | None) -> dict[str, Any]:
+    """The report's numbers: verdicts with reasons, error tables (12) by estimator and set, run verdicts, the plan."""
+    return {
+        "calibration_id": evidence.file.id,
+        "vehicle": evidence.vehicle.name,
+        "grade": str(verdicts[0].grade),
+        "verdicts": [
+            {
+                "estimator": verdict.estimator,
+                "grade": str(verdict.grade),
+                "reasons": [
+                    {"rule": reason.rule, "grade": str(reason.grade), "text": reason.text} for reason in verdict.reasons
+                ],
+            }
+            for verdict in verdicts
+        ],
+        "runs": [
+            {
+                "run": one.number,
+                "log": one.name,
+                "is_usable": one.is_usable,
+                "findings": [
+                    {"kind": str(f.kind), "severity": str(f.severity), "text": f.text, "advice": f.advice}
+                    for f in one.findings
+                ],
+            }
+            for one in (evidence.outcome.verdicts if evidence.outcome else ())
+        ],
+        "errors": {
+            one.estimator: {str(part): table for part, table in one.tables.items()} for one in evidence.judgements
+        },
+        "plan": plan.to_json() if plan else None,
+    }

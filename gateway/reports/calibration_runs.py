@@ -1,0 +1,115 @@
+"""What was driven and whether it was sound, what to drive next, and where every number comes from."""
+
+from gateway.calibration.inspection import RunVerdict
+from gateway.offline.calibrate import Outcome
+from gateway.offline.known_runs import SplitRun
+from gateway.offline.plan import Advice, Expected, Plan
+from gateway.reports.calibration_evidence import Evidence
+from gateway.reports.calibration_text import NONE, percent, shown, span
+from gateway.reports.chart import Section, Table
+
+
+def runs_section(outcome: Outcome) -> Section:
+    """Every run with its verdict; what was found of it, and what to do."""
+    verdicts = {verdict.number: verdict for verdict in outcome.verdicts}
+    rows = tuple(_run_row(one, verdicts.get(one.identification.number)) for one in outcome.split)
+    columns = ("Run", "log", "payload", "front share", "identify", "validate", "refused", "verdict")
+    tables = (Table("Runs: batches that identify, that validate, and that no estimator can use", columns, rows),)
+    findings = _findings_table(outcome.verdicts)
+    return Section("runs", "Runs", (), (), (*tables, *((findings,) if findings else ())))
+
+
+def _run_row(one: SplitRun, verdict: RunVerdict | None) -> tuple[str, ...]:
+    run, batches = one.identification, [*one.identification.batches, *one.validation.batches]
+    return (
+        str(run.number),
+        run.name,
+        f"{run.payload_kg:g} kg",
+        f"{run.front_share_pct:.1f} %",
+        *(str(sum(not batch.rejected for batch in part.batches)) for part in (one.identification, one.validation)),
+        str(sum(bool(batch.rejected) for batch in batches)),
+        _verdict(verdict),
+    )
+
+
+def _verdict(verdict: RunVerdict | None) -> str:
+    if verdict is None:
+        return NONE
+    if not verdict.findings:
+        return "sound"
+    worst = "cannot be used" if not verdict.is_usable else "usable"
+    return f"{worst}: {', '.join(finding.kind.replace('_', ' ') for finding in verdict.findings)}"
+
+
+def _findings_table(verdicts: tuple[RunVerdict, ...]) -> Table | None:
+    rows = tuple(
+        (str(verdict.number), str(finding.severity), finding.text, finding.advice)
+        for verdict in verdicts
+        for finding in verdict.findings
+    )
+    columns = ("Run", "weight", "what was found", "what to do")
+    return Table("What was found of the runs", columns, rows) if rows else None
+
+
+def plan_section(plan: Plan) -> Section:
+    """The runs that would teach most, in order."""
+    minutes, kmh = plan.drive.duration_s / 60.0, 3.6 * plan.drive.speed_mps
+    rows = [("now", *_expected(plan.now))] if plan.now else []
+    rows += [(f"{number}. {_load(step)}", *_expected(step.expected)) for number, step in enumerate(plan.advice, 1)]
+    rows += [(f"least useful: {_load(plan.least)}", *_expected(plan.least.expected))] if plan.least else []
+    columns = ("After driving", "payload", "front share", "loads within reach")
+    caption = f"Expected standard deviations of a five-minute batch; each run {minutes:.0f} minutes near {kmh:.0f} km/h"
+    text = (
+        "The runs after which loads would be weighed best, each with those above it. The half-car says so of itself, "
+        "to first order: it tells which run to drive rather than how good the result will be."
+    )
+    return Section("next", "What to drive next", (text,), (), (Table(caption, columns, tuple(rows)),))
+
+
+def best_next(plan: Plan) -> str | None:
+    """The first advice in a sentence; None where there is none."""
+    if not plan.advice:
+        return None
+    first = plan.advice[0]
+    payload, share, reach = _expected(first.expected)
+    now = _expected(plan.now) if plan.now else None
+    before = f" (now {now[0]} and {now[1]})" if now else ""
+    load = _load(first).capitalize()
+    return f"{load}: expected {payload} and {share} afterwards{before}, {reach} of loads within reach."
+
+
+def _load(advice: Advice) -> str:
+    load = advice.load
+    if load.position_m is None:
+        return "the empty vehicle"
+    return f"{load.payload_kg:g} kg with its centre {load.position_m:g} m behind the front axle"
+
+
+def _expected(expected: Expected) -> tuple[str, str, str]:
+    reach = percent(expected.reach_share)
+    return f"± {expected.payload_std_kg:.1f} kg", f"± {expected.front_share_std_pct:.2f} pp", reach
+
+
+def provenance_section(evidence: Evidence) -> Section:
+    """What to know to make the same again, and the ranges it holds in."""
+    file, provenance = evidence.file, evidence.file.provenance
+    seen = file.seen
+    roughness = "not known" if seen.roughness_mps2 is None else span(*seen.roughness_mps2, "m/s²", 2)
+    facts = (
+        ("calibration", file.id),
+        ("vehicle", file.vehicle.name),
+        ("estimators", ", ".join(file.estimators)),
+        ("payloads seen", span(*seen.payload_kg, "kg")),
+        ("front shares seen", span(*seen.front_share_pct, "%", 1)),
+        ("speeds seen", span(3.6 * seen.speed_mps[0], 3.6 * seen.speed_mps[1], "km/h")),
+        ("roughness seen", roughness),
+        ("software", provenance.software),
+        ("command", provenance.command),
+        ("campaign file", f"sha256:{provenance.campaign_sha256}"),
+    )
+    runs = tuple(
+        (str(run.number), run.log, f"{run.payload_kg:g} kg", shown(run.front_share_pct, " %", 1), run.sha256)
+        for run in provenance.runs
+    )
+    logs = Table("Logs it was made from", ("Run", "log", "payload", "front share", "sha256"), runs)
+    return Section("provenance", "Provenance", (), (), (Table("Calibration", ("What", "is"), facts), logs))
