@@ -142,7 +142,7 @@ def tare_router(desk: TareDesk) -> APIRouter:
         """The tare in use, what another would be made from now, and the history."""
         return _json(await asyncio.to_thread(desk.told))
 
-    @router.post(TARE_PATH, status_code=201, response_model=Tare, responses={**refusals, **problem_responses(422)})
+    @router.post(TARE_PATH, status_code=201, response_model=Tare, responses={**refusals, **problem_responses(400, 422)})
     async def set_tare(request: Request, claim: TareRequest) -> Response:
         """Make the last weighing the zero of the empty vehicle, from the next batch on. On disk when answered."""
         return await _answered(request, lambda: desk.tare(_who(request), claim.note), 201)

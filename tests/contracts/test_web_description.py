@@ -13,12 +13,16 @@ from hypothesis import HealthCheck, given, settings
 from schemathesis import GenerationMode
 from schemathesis.schemas import APIOperation, BaseSchema
 from schemathesis.specs.openapi.checks import positive_data_acceptance
+from support.calibrated import calibration_file
 from support.estimates import make_record
+from support.tare import FakePipeline
 from support.web import Gateway
 
 from gateway.records import Why
+from gateway.service.tare_desk import Subject, TareDesk
 from gateway.web import Scope, TokenFile, WebSettings
 
+CHANGES = ["POST /api/v1/calibration/tare", "DELETE /api/v1/calibration/tare"]
 PATHS = [
     "/api/v1/estimates/latest",
     "/api/v1/estimates",
@@ -31,6 +35,7 @@ PATHS = [
     "/api/v1/export.jsonl",
     "/api/v1/weights/latest",
     "/api/v1/vss",
+    "/api/v1/calibration/tare",
     "/rfms/vehicles",
     "/rfms/vehiclestatuses",
     "/health/live",
@@ -50,12 +55,21 @@ def token_file() -> Iterator[TokenFile]:
 
 @pytest.fixture(scope="module")
 def headers(token_file: TokenFile) -> dict[str, str]:
-    return {"Authorization": f"Bearer {token_file.create('schemathesis', Scope.READ)}"}
+    return {"Authorization": f"Bearer {token_file.create('schemathesis', Scope.OPERATE)}"}
+
+
+def tare_desk(directory: Path) -> TareDesk:
+    """A desk whose vehicle can be tared at any time."""
+    subject = Subject(calibration_file().for_core(), "ratio_index", "van-17")
+    return TareDesk(directory, subject, FakePipeline(), stale_after_s=900.0, on_event=lambda kind, detail: None)
 
 
 @pytest.fixture(scope="module")
 def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
-    with tempfile.TemporaryDirectory() as directory, Gateway(Path(directory), PATIENT, token_file) as gateway:
+    with (
+        tempfile.TemporaryDirectory() as directory,
+        Gateway(Path(directory), PATIENT, token_file, tare_desk(Path(directory))) as gateway,
+    ):
         gateway.publish(*(make_record(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
         assert gateway.store.flush(10.0)
         gateway.board.close()  # so that the stream has an end
@@ -63,29 +77,32 @@ def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
 
 
 def operations(schema: BaseSchema) -> dict[str, APIOperation]:
-    return {operation.path: operation for operation in (found.ok() for found in schema.get_all_operations())}
+    return {operation.label: operation for operation in (found.ok() for found in schema.get_all_operations())}
 
 
 def test_no_path_escapes(schema: BaseSchema) -> None:
-    assert set(operations(schema)) == set(PATHS)
+    assert set(operations(schema)) == set(LABELS)
 
 
 # OpenAPI cannot say that two parameters exclude one another, as rFMS has it.
-EXCLUDED = {"/rfms/vehiclestatuses": [positive_data_acceptance]}
+EXCLUDED = {"GET /rfms/vehiclestatuses": [positive_data_acceptance]}
+LABELS = [*(f"GET {path}" for path in PATHS), *CHANGES]
 WITHOUT_PARAMETERS = ("latest", "status", "reasons", "vehicle", "vss", "live", "ready", "metrics")
-WITH_PARAMETERS = [path for path in PATHS if not path.endswith(WITHOUT_PARAMETERS)]
+WITHOUT_PARAMETERS += ("GET /api/v1/calibration/tare",)
+WITH_PARAMETERS = [label for label in LABELS if not label.endswith(WITHOUT_PARAMETERS)]
 
 
 @pytest.mark.parametrize(
-    ("path", "mode"),
-    [(path, GenerationMode.POSITIVE) for path in PATHS] + [(path, GenerationMode.NEGATIVE) for path in WITH_PARAMETERS],
+    ("label", "mode"),
+    [(label, GenerationMode.POSITIVE) for label in LABELS]
+    + [(label, GenerationMode.NEGATIVE) for label in WITH_PARAMETERS],
 )
 def test_every_answer_is_as_described(
-    schema: BaseSchema, headers: dict[str, str], path: str, mode: GenerationMode
+    schema: BaseSchema, headers: dict[str, str], label: str, mode: GenerationMode
 ) -> None:
     @settings(max_examples=20, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-    @given(case=operations(schema)[path].as_strategy(generation_mode=mode))
+    @given(case=operations(schema)[label].as_strategy(generation_mode=mode))
     def ask(case: schemathesis.Case) -> None:
-        case.call_and_validate(headers=headers, excluded_checks=EXCLUDED.get(path))
+        case.call_and_validate(headers=headers, excluded_checks=EXCLUDED.get(label))
 
     ask()

@@ -15,17 +15,24 @@ from fastapi import FastAPI
 
 from gateway.store import Store
 from gateway.web import Board, State, Status, TokenFile, WebSettings, create_app, server_config
+from gateway.web.tare import TareDesk
 
 
 class Gateway:
     """The web room with a real store behind it; ``clock_s`` and ``status`` are the test's to set."""
 
-    def __init__(self, directory: Path, settings: WebSettings | None = None, tokens: TokenFile | None = None) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        settings: WebSettings | None = None,
+        tokens: TokenFile | None = None,
+        tare: TareDesk | None = None,
+    ) -> None:
         self.clock_s = 1000.0
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
         self.store = Store.open(directory)
         self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
-        self._settings, self._tokens = settings, tokens
+        self._settings, self._tokens, self._tare = settings, tokens, tare
         self.app = self._make_app()
 
     def publish(self, *records: dict[str, Any]) -> list[str]:
@@ -43,7 +50,7 @@ class Gateway:
 
     def _make_app(self) -> FastAPI:
         reader = self.store.reader()
-        return create_app(self.board, reader, lambda: self.status, self._settings, tokens=self._tokens)
+        return create_app(self.board, reader, lambda: self.status, self._settings, tokens=self._tokens, tare=self._tare)
 
     def __enter__(self) -> "Gateway":
         return self
