@@ -87,7 +87,7 @@ def fit_cross_spectrum(
     n_steps = 1 + len(known) * can_leave_out
     found = _best_fit(known, prior)
     _tell(progress, 1, n_steps)
-    calibration = _calibration(known, vehicle, found)
+    calibration = half_car_calibration(known, vehicle, found)
     if not can_leave_out:
         return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
     errors: list[tuple[float, float, float, float, float]] = []
@@ -95,7 +95,7 @@ def fit_cross_spectrum(
     for left_out, one in enumerate(known):
         others = [k for k in known if k is not one]
         refound = fit_half_car(others, prior, found.x)
-        without[one.run.number] = _calibration(others, vehicle, refound)
+        without[one.run.number] = half_car_calibration(others, vehicle, refound)
         errors.extend(_left_out_errors(one, without[one.run.number]))
         _tell(progress, 2 + left_out, n_steps)
     payload_z, share_z, misfits, payload_kg, share_pct = (np.array(column) for column in zip(*errors, strict=True))
@@ -159,7 +159,8 @@ def fit_half_car(known: Sequence[KnownSpectra], prior: Prior, start: F64) -> Fou
     return most_probable(start, prior.mean, prior.std, cost, curvature, tolerance=0.05)
 
 
-def _calibration(known: list[KnownSpectra], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
+def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
+    """What the known runs taught, its intervals not yet tested on any run left out."""
     runs = [k.run for k in known]
     payloads, shares = [r.payload_kg for r in runs], [r.front_share_pct for r in runs]
     speeds = [batch.mean_speed_mps for run in runs for batch in run.batches if not batch.rejected]

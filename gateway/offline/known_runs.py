@@ -2,11 +2,12 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from gateway.bus.signal_map import load_signal_map
 from gateway.calibration.campaign import Campaign, RunTable
+from gateway.calibration.inspection_rows import RowFacts, row_facts
 from gateway.core.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.errors import CampaignError
@@ -19,12 +20,17 @@ OnRun = Callable[[int, int], None]  # (runs done, runs in all)
 
 @dataclass(frozen=True, slots=True)
 class SplitRun:
-    """One drive's two parts; either may hold no batch. ``sha256`` is of the log file."""
+    """One drive's two parts; either may hold no batch. ``sha256`` is of the log file, ``facts`` are of both parts.
+
+    has_identification is False where the campaign keeps the whole drive for validation.
+    """
 
     log: Path
     sha256: str
     identification: KnownRun
     validation: KnownRun
+    facts: RowFacts = field(default_factory=RowFacts)
+    has_identification: bool = True
 
 
 def chosen_runs(campaign: Campaign, numbers: Sequence[int] | None) -> list[tuple[int, RunTable]]:
@@ -54,11 +60,13 @@ def split_runs(
         log = campaign.log_of(run)
         motion = rows_within(motion_of_whole_log(log, signal_map), Stretch(run.start_s, run.end_s))
         parts = []
-        for stretch in _parts(motion, run, campaign.identification_fraction):
+        stretches = _parts(motion, run, campaign.identification_fraction)
+        for stretch in stretches:
             rows = rows_within(motion, stretch) if stretch and len(motion) else motion.part(0, 0)
             batches = batches_of_motion(rows, signal_map, settings)
             parts.append(KnownRun(number, str(run.log), run.payload_kg, campaign.front_share_pct(run), batches))
-        found.append(SplitRun(log, file_sha256(log), parts[0], parts[1]))
+        facts = row_facts(motion, signal_map.traits)
+        found.append(SplitRun(log, file_sha256(log), parts[0], parts[1], facts, stretches[0] is not None))
     on_run(len(runs), len(runs))
     return found
 

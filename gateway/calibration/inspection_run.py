@@ -1,0 +1,220 @@
+"""One known-load drive inspected: what its rows, its batches and its cross-spectra say, as a verdict."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Final
+
+import numpy as np
+
+from gateway.calibration.inspection import Finding, RunVerdict, Severity
+from gateway.calibration.inspection_axes import (
+    BELIEVED_AGREEMENT,
+    SPEED_MISREAD,
+    agreement,
+    axis_findings,
+    mended,
+    position_findings,
+    reading_of,
+    speed_unit_finding,
+)
+from gateway.calibration.inspection_kinds import Kind, found
+from gateway.calibration.inspection_rows import (
+    Mended,
+    RowFacts,
+    bias_findings,
+    gravity_findings,
+    rate_findings,
+    stands_still_but_shakes,
+)
+from gateway.core.batch import REASON_SHARE_MIN
+from gateway.core.cross_spectra import CrossSpectra, cross_spectra_of
+from gateway.core.known_run import KnownRun
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle
+from gateway.records import Batch, Signal, Why
+
+GAP_SHARE_NOTED: Final = 0.02
+SMOOTH_MPS2: Final = 0.08  # the quietest ordinary road shakes a vehicle more, in the estimators' band
+STEPS_SHARE_MAX: Final = 0.1  # of a signal's power in that band
+TOO_FEW_SEGMENTS: Final = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Inspected:
+    """A run with all that inspection needs: both its parts, the facts of its rows; ``has_identification`` is
+    False where the campaign keeps the whole run for validation."""
+
+    identification: KnownRun
+    validation: KnownRun
+    facts: RowFacts
+    has_identification: bool = True
+
+    @property
+    def batches(self) -> tuple[Batch, ...]:
+        """Of both parts."""
+        return self.identification.batches + self.validation.batches
+
+    @property
+    def run(self) -> KnownRun:
+        """The run with the batches of both parts."""
+        one = self.identification
+        return KnownRun(one.number, one.name, one.payload_kg, one.front_share_pct, self.batches)
+
+
+def inspect_run(inspected: Inspected, vehicle: Vehicle, settings: BatchSettings) -> RunVerdict:
+    """Every finding of one run, faults first."""
+    facts = inspected.facts
+    acceleration, findings = gravity_findings(facts)
+    findings.extend(rate_findings(facts, settings))
+    if not any(finding.kind is Kind.CHANNELS_SWAPPED for finding in findings):
+        findings.extend(bias_findings(facts))
+    findings.extend(_speed_findings(inspected, settings))
+    findings.extend(_gap_findings(inspected))
+    spectra = cross_spectra_of(inspected.batches, reading_of(vehicle))
+    if spectra is None:
+        findings.extend(_unsteady_findings(inspected, settings))
+    else:
+        findings.extend(_excitation_findings(spectra, facts, acceleration))
+        findings.extend(_motion_findings(spectra, inspected, vehicle, acceleration))
+    findings.extend(_batch_findings(inspected, settings, has_fault=_has_fault(findings)))
+    one = inspected.identification
+    order = list(Severity)
+    return RunVerdict(one.number, one.name, tuple(sorted(findings, key=lambda f: order.index(f.severity))))
+
+
+def _has_fault(findings: Sequence[Finding]) -> bool:
+    return any(finding.severity is Severity.FAULT for finding in findings)
+
+
+def _motion_findings(
+    spectra: CrossSpectra, inspected: Inspected, vehicle: Vehicle, acceleration: Mended
+) -> Iterator[Finding]:
+    """Axes, signs and units by the cross-spectra; then, if these are right, speed and place."""
+    if not acceleration.is_axis_sound:
+        return
+    spectra = mended(spectra, 1.0 / acceleration.factor)
+    axes = list(axis_findings(spectra, inspected.run, vehicle))
+    yield from axes
+    if axes:
+        return
+    as_read = agreement(spectra, inspected.run, vehicle).best
+    units = []
+    if as_read < BELIEVED_AGREEMENT:
+        units = list(speed_unit_finding(as_read, _if_speed_misread(inspected, vehicle, acceleration)))
+    yield from units or position_findings(spectra, inspected.run, vehicle)
+
+
+def _if_speed_misread(inspected: Inspected, vehicle: Vehicle, acceleration: Mended) -> dict[str, float]:
+    """Agreement for each mistake of the speed's unit."""
+    best = {}
+    for what, factor in SPEED_MISREAD.items():
+        spectra = cross_spectra_of(inspected.batches, reading_of(vehicle, factor))
+        if spectra is not None:
+            best[what] = agreement(mended(spectra, 1.0 / acceleration.factor), inspected.run, vehicle).best
+    return best
+
+
+def _excitation_findings(spectra: CrossSpectra, facts: RowFacts, acceleration: Mended) -> Iterator[Finding]:
+    rms_mps2 = spectra.acceleration_rms_mps2 * abs(acceleration.factor)
+    if acceleration.is_axis_sound and rms_mps2 < SMOOTH_MPS2:
+        text = f"vertical acceleration is {rms_mps2:.2g} m/s2 (root mean square)"
+        yield found(Kind.SMOOTH_ROAD, Severity.WARNING, text)
+    low_hz, high_hz = spectra.freq_hz[1], spectra.freq_hz[-2]
+    for signal, rms in (
+        (Signal.VERTICAL_ACCELERATION, spectra.acceleration_rms_mps2),
+        (Signal.PITCH_RATE, spectra.pitch_rate_rms_radps),
+    ):
+        stream = facts.streams.get(signal)
+        if stream is None or not np.isfinite(stream.resolution) or not stream.rate_hz > 0.0:
+            continue
+        steps_rms = stream.resolution * sqrt((high_hz - low_hz) / (6.0 * stream.rate_hz))  # q^2 / 12 over half the rate
+        share = (steps_rms / max(rms, np.finfo(float).tiny)) ** 2
+        if share > STEPS_SHARE_MAX:
+            text = f"{min(share, 1.0):.0%} of {signal}'s power is its steps of {stream.resolution:.3g}"
+            yield found(Kind.COARSE_RESOLUTION, Severity.WARNING, text)
+
+
+def _speed_findings(inspected: Inspected, settings: BatchSettings) -> Iterator[Finding]:
+    """Speed missing, frozen or outside the gate: a fault where no batch is left, else a warning."""
+    if stands_still_but_shakes(inspected.facts):
+        text = "the speed reads 0 from beginning to end, the vehicle shakes as it does when driven"
+        yield found(Kind.SPEED_FROZEN, Severity.FAULT, text)
+        return
+    is_usable = _n_counted(inspected.identification) > 0
+    severity = Severity.WARNING if is_usable else Severity.FAULT
+    for kind, why in ((Kind.SPEED_MISSING, Why.SPEED_MISSING), (Kind.SPEED_FROZEN, Why.SPEED_FROZEN)):
+        share = _share(inspected.batches, why)
+        if share >= REASON_SHARE_MIN:
+            yield found(kind, severity, f"{share:.0%} of the drive")
+    outside = _share(inspected.batches, Why.TOO_SLOW) + _share(inspected.batches, Why.TOO_FAST)
+    if not is_usable and outside >= REASON_SHARE_MIN:  # towns and stops cost time, no more
+        yield found(Kind.SPEED_OUTSIDE_GATE, severity, f"{outside:.0%} of the drive{_speeds(inspected, settings)}")
+
+
+def _speeds(inspected: Inspected, settings: BatchSettings) -> str:
+    """Which speeds there were, and whether another unit would bring them inside the gate."""
+    speed = inspected.facts.streams.get(Signal.SPEED)
+    if speed is None:
+        return ""
+    text = f": {speed.low:.3g} to {speed.high:.3g} m/s, the gate is {settings.speed_min_mps:g} to "
+    text += f"{settings.speed_max_mps:g}"
+    for factor, mistake in ((3.6, "m/s taken for km/h"), (1.0 / 3.6, "km/h taken for m/s")):
+        if settings.speed_min_mps <= factor * speed.low and factor * speed.high <= settings.speed_max_mps:
+            text += f" ({factor * speed.low:.3g} to {factor * speed.high:.3g} if it is {mistake})"
+    return text
+
+
+def _gap_findings(inspected: Inspected) -> Iterator[Finding]:
+    silent = [Why.GAP, Why.ACCELERATION_MISSING, Why.PITCH_RATE_MISSING]
+    if any(stream.n < 2 for stream in inspected.facts.streams.values()):
+        return
+    share = sum(_share(inspected.batches, why) for why in silent)
+    if share > GAP_SHARE_NOTED:
+        yield found(Kind.GAPS, Severity.WARNING, f"{share:.1%} of the drive")
+
+
+def _unsteady_findings(inspected: Inspected, settings: BatchSettings) -> Iterator[Finding]:
+    usable_s = sum(batch.usable_share * batch.duration_s for batch in inspected.batches)
+    if usable_s >= settings.last_batch_share_min * settings.window_s:
+        text = f"{usable_s:.0f} s can be used, fewer than {TOO_FEW_SEGMENTS} stretches of 5 s are at even speed"
+        yield found(Kind.UNSTEADY, Severity.WARNING, text)
+
+
+def _batch_findings(inspected: Inspected, settings: BatchSettings, *, has_fault: bool) -> Iterator[Finding]:
+    """Whether anything is left to identify from; said in general only where nothing else says why not."""
+    if not inspected.has_identification:
+        return
+    batches = inspected.identification.batches
+    rejected = [batch for batch in batches if batch.rejected]
+    if len(rejected) == len(batches):
+        if not has_fault:
+            yield _nothing_left(batches, settings)
+        return
+    lost = [batch for batch in rejected if Why.TOO_SHORT not in batch.rejected]  # ends of drives are no loss
+    if lost:
+        yield found(Kind.BATCHES_LOST, Severity.NOTE, f"{len(lost)} of {len(batches)} batches: {_reasons(lost)}")
+
+
+def _nothing_left(batches: Sequence[Batch], settings: BatchSettings) -> Finding:
+    if all(batch.rejected == (Why.TOO_SHORT,) for batch in batches):
+        longest_s = max((batch.duration_s for batch in batches), default=0.0)
+        needed_s = settings.last_batch_share_min * settings.window_s
+        text = f"its longest unbroken stretch lasts {longest_s:.0f} s, a batch needs {needed_s:.0f} s"
+        return found(Kind.TOO_SHORT, Severity.FAULT, text)
+    return found(Kind.NO_USABLE_BATCH, Severity.FAULT, f"{len(batches)} batches: {_reasons(batches)}")
+
+
+def _reasons(batches: Sequence[Batch]) -> str:
+    names = [str(why) for batch in batches for why in batch.rejected]
+    return ", ".join(f"{name} ({names.count(name)})" for name in dict.fromkeys(names))
+
+
+def _n_counted(run: KnownRun) -> int:
+    return sum(not batch.rejected for batch in run.batches)
+
+
+def _share(batches: Sequence[Batch], why: Why) -> float:
+    """Which part of the drive's time a cause masked."""
+    total_s = sum(batch.duration_s for batch in batches)
+    return sum(batch.shares.get(why, 0.0) * batch.duration_s for batch in batches) / total_s if total_s else 0.0
