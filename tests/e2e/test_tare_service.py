@@ -1,0 +1,227 @@
+"""Re-zeroing a real service: bus, pipeline, web and command line together, through a restart."""
+
+import asyncio
+import json
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from support.calibrated import calibration_file
+
+from gateway.bus.candump_write import write_candump
+from gateway.bus.encode import Encoder
+from gateway.bus.signal_map import load_signal_map
+from gateway.bus.sink import replay
+from gateway.cli import springscale
+from gateway.config import load_settings
+from gateway.errors import SpringscaleError
+from gateway.offline.estimates import setup_of
+from gateway.records import Frames, Signal
+from gateway.service.gateway import Gateway
+from gateway.store import Store
+
+START_NS = 1_790_000_000_000_000_000
+HOUR_NS = 3_600 * 10**9
+
+
+def drive(duration_s: float, start_ns: int, seed: int) -> Frames:
+    """White noise on both sensors at 15 m/s: enough for a regression that always answers the same."""
+    rng = np.random.default_rng(seed)
+    n = round(100 * duration_s)
+    t_ns = start_ns + np.arange(n) * 10_000_000
+    gps_ns = start_ns + np.arange(round(5 * duration_s)) * 200_000_000
+    return Encoder(load_signal_map("springscale:reference")).encode_signals(
+        {Signal.VERTICAL_ACCELERATION: t_ns, Signal.PITCH_RATE: t_ns, Signal.SPEED: gps_ns},
+        {
+            Signal.VERTICAL_ACCELERATION: 9.81 + 0.5 * rng.standard_normal(n),
+            Signal.PITCH_RATE: 0.02 * rng.standard_normal(n),
+            Signal.SPEED: 15.0 + 0.1 * rng.standard_normal(len(gps_ns)),
+        },
+    )
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    """A vehicle that weighs 12 kg and 51 % whatever it carries, on a bus of the test's own."""
+    (tmp_path / "vehicle.json").write_text(calibration_file(payload_kg=12.0, front_share_pct=51.0).to_json())
+    path = tmp_path / "springscale.toml"
+    path.write_text(
+        f"""
+        signals = "springscale:reference"
+        calibration = "vehicle.json"
+        estimator = "ratio_index"
+        [vehicle]
+        id = "van-17"
+        [bus]
+        interface = "virtual"
+        channel = "{tmp_path.name}"
+        [batch]
+        window_s = 20.0
+        provisional_every_s = 0.0
+        [web]
+        port = 0
+        [store]
+        directory = "state"
+        """
+    )
+    return path
+
+
+class Running:
+    """A running service as the test's other thread meets it."""
+
+    def __init__(self, gateway: Gateway, channel: str) -> None:
+        self.gateway = gateway
+        self._channel = channel
+
+    def play(self, log: Path) -> None:
+        """Send a log; return when all of it was worked through."""
+        before = self.gateway.source.counts().frames
+        sent = replay(log, "virtual", self._channel, speed="max").frames
+        deadline = time.monotonic() + 60.0
+        while time.monotonic() < deadline:
+            if self.gateway.source.counts().frames >= before + sent and self.gateway.has_caught_up:
+                return
+            time.sleep(0.02)
+        raise TimeoutError(f"{log} was not worked through")
+
+    def tare(self, *arguments: str) -> Result:
+        """springscale calibration tare ... against this service."""
+        return CliRunner().invoke(springscale, ["calibration", "tare", *arguments, "--url", self.gateway.url])
+
+    def told(self, *arguments: str) -> dict[str, Any]:
+        found = self.tare(*arguments, "--json")
+        assert found.exit_code == 0, (found.output, found.exception)
+        state: dict[str, Any] = json.loads(found.stdout)
+        return state
+
+
+def serve(config: Path, meet: Callable[[Running], None]) -> None:
+    """Run the service while ``meet`` does its part in another thread; what fails there fails here."""
+    settings = load_settings(config)
+    failures: list[BaseException] = []
+
+    def on_started(gateway: Gateway) -> None:
+        loop = asyncio.get_running_loop()
+
+        def part() -> None:
+            try:
+                meet(Running(gateway, settings.bus.channel))
+            except BaseException as failure:  # noqa: BLE001 - raised again in the test's own thread
+                failures.append(failure)
+            loop.call_soon_threadsafe(gateway.request_stop)
+
+        threading.Thread(target=part, daemon=True).start()
+
+    Gateway(settings, setup_of(settings), on_started=on_started).run()
+    if failures:
+        raise failures[0]
+
+
+def stored(config: Path) -> list[str]:
+    store = Store.open(load_settings(config).store.directory)
+    try:
+        return list(store.reader().estimates().items)
+    finally:
+        store.close()
+
+
+def counted(texts: list[str]) -> list[str]:
+    return [text for text in texts if not json.loads(text)["rejected"]]
+
+
+def estimated(config: Path, *logs: Path, options: tuple[str, ...] = ()) -> list[str]:
+    arguments = ["estimate", *map(str, logs), "--config", str(config), "--json", *options]
+    found = CliRunner().invoke(springscale, arguments, catch_exceptions=False)
+    assert found.exit_code == 0, found.output
+    return found.stdout.splitlines()
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> list[Path]:
+    """Three drives, an hour from one to the next."""
+    paths = [tmp_path / f"drive{n}.log" for n in range(3)]
+    for n, path in enumerate(paths):
+        write_candump(drive(45.0, START_NS + n * HOUR_NS, seed=n), "can0", path)
+    return paths
+
+
+def test_a_tare_counts_from_the_next_batch_survives_a_restart_and_is_undone(config: Path, logs: list[Path]) -> None:
+    made: dict[str, Any] = {}
+
+    def first_run(service: Running) -> None:
+        refused = service.tare("set", "--empty")
+        assert isinstance(refused.exception, SpringscaleError)
+        assert "no_counted_batch" in str(refused.exception)
+        service.play(logs[0])
+        offer = service.told("show")["offer"]
+        assert (offer["zero"]["payload_kg"], offer["zero"]["n_batches"]) == (12.0, 2)
+        made.update(service.told("set", "--empty", "--note", "yard"))
+        assert "+12.0" in service.tare("show").output
+        service.play(logs[1])
+
+    def second_run(service: Running) -> None:
+        assert service.told("show")["active"] == made
+        service.play(logs[2])
+        undone = service.told("undo", "--factory")
+        assert undone["active"] is None
+        assert undone["history"][0]["ended"]["why"] == "back_to_factory"
+
+    serve(config, first_run)
+    tared = estimated(config, *logs[1:])  # as the service would now: with its tare
+    raw = estimated(config, *logs, options=("--no-tare",))
+    serve(config, second_run)
+
+    # The first drive's two batches were sent before the tare. The short rests of drives differ in their reasons: on
+    # the bus silence ended them, in a file its end.
+    found = counted(stored(config))
+    assert found == [*counted(raw)[:2], *counted(tared)]
+    assert len(found) == 6
+    assert all("tare_id" not in text for text in stored(config) if text not in found[2:])
+    for record in map(json.loads, found[2:]):
+        assert (record["payload_kg"], record["raw_payload_kg"], record["tare_payload_kg"]) == (0.0, 12.0, 12.0)
+        assert record["payload_std_kg"] ** 2 == pytest.approx(
+            record["raw_payload_std_kg"] ** 2 + record["tare_payload_std_kg"] ** 2
+        )
+        assert record["tare_id"] == made["id"]
+    assert [json.loads(text)["id"] for text in found[:2]] == made["batch_ids"]
+    assert estimated(config, *logs) == raw  # undone: the factory zero again, byte for byte
+
+
+def test_a_copied_tare_file_gives_the_same_numbers_elsewhere(config: Path, logs: list[Path], tmp_path: Path) -> None:
+    def meet(service: Running) -> None:
+        service.play(logs[0])
+        service.told("set", "--empty")
+
+    serve(config, meet)
+    here = estimated(config, logs[1])
+    copy = tmp_path / "elsewhere.json"
+    (tmp_path / "state" / "tare.json").rename(copy)
+    assert estimated(config, logs[1]) != here
+    assert estimated(config, logs[1], options=("--tare", str(copy))) == here
+    (tmp_path / "vehicle.json").write_text(calibration_file(payload_kg=13.0, front_share_pct=51.0).to_json())
+    arguments = ["estimate", str(logs[1]), "--config", str(config), "--tare", str(copy)]
+    other = CliRunner().invoke(springscale, arguments)
+    assert isinstance(other.exception, SpringscaleError)
+    assert "has no tare in use" in str(other.exception)
+    assert other.exception.exit_code == 2
+
+
+def test_a_drive_that_has_begun_since_is_refused(config: Path, logs: list[Path], tmp_path: Path) -> None:
+    short = tmp_path / "short.log"
+    write_candump(drive(5.0, START_NS + HOUR_NS, seed=9), "can0", short)
+
+    def meet(service: Running) -> None:
+        service.play(logs[0])
+        service.play(short)
+        refused = service.tare("set", "--empty")
+        assert isinstance(refused.exception, SpringscaleError)
+        assert "load_may_have_changed" in str(refused.exception)
+
+    serve(config, meet)
+    assert not (tmp_path / "state" / "tare.json").exists()
