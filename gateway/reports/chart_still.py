@@ -6,7 +6,9 @@ from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from gateway.reports.chart import COLOURS, Axis, Cells, Chart, Line, Panel, Points, Ribbon, Rule, Span
 from gateway.reports.figures import panels, save
@@ -37,6 +39,8 @@ def draw(chart: Chart) -> Figure:
     if shown:
         n_columns = min(len(shown), _LEGEND_COLUMNS)
         figure.legend(list(shown.values()), list(shown), loc="outside lower center", ncols=n_columns, fontsize=7)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # laid out once, not again for every format
     return figure
 
 
@@ -52,6 +56,7 @@ def _set_x(axes: Axes, axis: Axis) -> None:
     axes.set_xlabel(axis.title)
     if axis.is_log:
         axes.set_xscale("log")
+        _with_plain_ticks(axes.xaxis)
     if axis.limits:
         axes.set_xlim(*axis.limits)
     if axis.places:
@@ -62,10 +67,17 @@ def _set_y(axes: Axes, axis: Axis) -> None:
     axes.set_ylabel(axis.title)
     if axis.is_log:
         axes.set_yscale("log")
+        _with_plain_ticks(axes.yaxis)
     if axis.limits:
         axes.set_ylim(*axis.limits)
     if axis.places:
         axes.set_yticks(range(len(axis.places)), axis.places, fontsize=7)
+
+
+def _with_plain_ticks(axis: XAxis | YAxis) -> None:
+    """0.001 rather than a power of ten, which matplotlib typesets at half a second a figure."""
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _shown(label: str) -> str:
