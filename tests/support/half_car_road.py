@@ -33,6 +33,7 @@ def batch_over_road(
     waviness: float = 2.0,
     pitch_sign: float = 1.0,
     incoherent: float = 0.0,
+    car: HalfCar = CAR,
 ) -> Batch:
     """Constant speed; sensor noise is ``noise`` of each signal's standard deviation.
 
@@ -42,8 +43,8 @@ def batch_over_road(
     n = int(duration_s * RATE_HZ)
     freq_hz = np.fft.rfftfreq(n, 1.0 / RATE_HZ)[1:]
     road = (rng.standard_normal(len(freq_hz)) + 1j * rng.standard_normal(len(freq_hz))) * freq_hz ** (-waviness / 2)
-    r = frequency_response(CAR, payload_kg, front_share_pct / 100.0, freq_hz)
-    later = np.exp(-2j * np.pi * freq_hz * CAR.wheelbase_m / speed_mps)
+    r = frequency_response(car, payload_kg, front_share_pct / 100.0, freq_hz)
+    later = np.exp(-2j * np.pi * freq_hz * car.wheelbase_m / speed_mps)
     in_band = (freq_hz > 0.5) & (freq_hz < 22.0)
     acceleration = _in_time((r.acceleration_front + r.acceleration_rear * later) * road * in_band, n)
     pitch_rate = _in_time((r.pitch_rate_front + r.pitch_rate_rear * later) * road * in_band, n)

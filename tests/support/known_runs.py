@@ -2,21 +2,29 @@
 
 from pathlib import Path
 
+from gateway.core.halfcar import HalfCar
 from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import front_share_pct
 from gateway.offline.known_runs import SplitRun
-from support.half_car_road import VAN, batch_over_road
+from support.half_car_road import CAR, VAN, batch_over_road
 
 LOADS = ((0.0, None), (200.0, 0.5), (300.0, 1.4), (400.0, 2.6))  # payload, metres behind the front axle
 
 
 def known_run(
-    number: int, payload_kg: float, position_m: float | None, seed: int, n_batches: int = 1, duration_s: float = 200.0
+    number: int,
+    payload_kg: float,
+    position_m: float | None,
+    seed: int,
+    n_batches: int = 1,
+    duration_s: float = 200.0,
+    car: HalfCar = CAR,
 ) -> KnownRun:
     """One drive at 14 m/s."""
     share_pct = front_share_pct(VAN, payload_kg, position_m)
     batches = tuple(
-        batch_over_road(payload_kg, share_pct, 1000 * seed + 10 * number + i, duration_s) for i in range(n_batches)
+        batch_over_road(payload_kg, share_pct, 1000 * seed + 10 * number + i, duration_s, car=car)
+        for i in range(n_batches)
     )
     return KnownRun(number, f"{number}.log", payload_kg, share_pct, batches)
 

@@ -1,0 +1,115 @@
+"""Plans: a first campaign from [vehicle] alone, and what to drive after a calibration."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from support.calibrated import calibration_file
+from support.half_car_road import VAN
+from support.known_runs import split_run
+
+from gateway.calibration.grey_box import calibrate_cross_spectrum
+from gateway.cli import springscale
+from gateway.cli.plan_text import plan_sentences
+from gateway.core.weights import weights_of
+from gateway.errors import CalibrationImpossibleError
+from gateway.offline.calibrate import Outcome
+from gateway.offline.plan import FIRST_DRIVE, N_FIRST, Expected, Plan, plan_first, plan_next, usual_drive
+
+DRAFT = """
+[vehicle]
+name = "van"
+empty_mass_kg = 1240.0
+wheelbase_m = 2.8
+sensor_position_m = 3.1
+"""
+
+
+def improves(plan: Plan) -> bool:
+    """Whether each run of the plan lowers what is expected of payload and share together."""
+    steps: list[Expected] = [*([plan.now] if plan.now else []), *(advice.expected for advice in plan.advice)]
+    loss = [(step.payload_std_kg / 450.0) ** 2 + (step.front_share_std_pct / 20.0) ** 2 for step in steps]
+    return loss == sorted(loss, reverse=True)
+
+
+def test_a_first_campaign_begins_empty_and_spreads_the_load() -> None:
+    plan = plan_first(VAN)
+    loads = [advice.load for advice in plan.advice]
+    assert plan.now is None
+    assert len(loads) == N_FIRST
+    assert loads[0].payload_kg == 0.0
+    assert all(load.payload_kg > 0.0 for load in loads[1:])
+    places_m = [load.position_m for load in loads[1:] if load.position_m is not None]
+    assert max(places_m) - min(places_m) > 0.5 * VAN.wheelbase_m
+    assert improves(plan)
+    assert plan.advice[-1].expected.reach_share is not None
+    assert plan.advice[-1].expected.reach_share > 0.9
+
+
+def test_axle_limits_bound_what_is_advised() -> None:
+    limited = replace(VAN, unsprung_front_kg=80.0, unsprung_rear_kg=85.0, rear_axle_limit_kg=900.0)
+    for advice in plan_first(limited).advice:
+        weights = weights_of(limited, advice.load.payload_kg, 0.0, advice.load.front_share_pct, 0.0)
+        assert weights.rear_axle.kg <= 900.0
+
+
+@pytest.fixture(scope="module")
+def outcome() -> Outcome:
+    """After the empty vehicle and one light load."""
+    split = (split_run(1, 0.0, None), split_run(2, 150.0, 1.4))
+    found = calibrate_cross_spectrum([one.identification for one in split], VAN)
+    return Outcome(calibration_file(), (), split, None, found)
+
+
+def test_after_two_runs_a_heavy_load_comes_next(outcome: Outcome) -> None:
+    plan = plan_next(outcome, VAN)
+    assert plan.n_driven == 2
+    assert plan.advice[0].load.payload_kg > 300.0
+    assert improves(plan)
+    assert plan.least is not None
+    assert plan.now is not None
+    first, least = plan.advice[0].expected, plan.least.expected
+    assert first.payload_std_kg < least.payload_std_kg <= plan.now.payload_std_kg * 1.001
+    assert plan.drive.speed_mps == pytest.approx(14.0)
+    assert plan.drive.duration_s == pytest.approx(200.0, rel=0.01)
+
+
+def test_a_plan_is_told_in_sentences_and_in_numbers(outcome: Outcome) -> None:
+    plan = plan_next(outcome, VAN)
+    load = plan.advice[0].load
+    text = plan_sentences(plan)
+    assert f"load {load.payload_kg:g} kg with its centre {load.position_m:g} m behind the front axle" in text
+    assert "2 runs driven" in text
+    assert "least useful would be" in text
+    read = json.loads(json.dumps(plan.to_json(), allow_nan=False))
+    assert read["advice"][0]["load"]["payload_kg"] == load.payload_kg
+    assert read["now"]["ratio_index"] is None
+
+
+def test_without_the_half_car_there_is_no_plan(outcome: Outcome) -> None:
+    with pytest.raises(CalibrationImpossibleError, match="cross-spectral"):
+        plan_next(replace(outcome, cross_spectrum=None), VAN)
+
+
+def test_runs_without_a_usable_batch_leave_the_usual_drive() -> None:
+    assert usual_drive([replace(split_run(1, 0.0, None).identification, batches=())]) == FIRST_DRIVE
+
+
+def test_the_command_plans_from_a_vehicle_alone(tmp_path: Path) -> None:
+    draft = tmp_path / "campaign.toml"
+    draft.write_text(DRAFT, encoding="utf-8")
+    told = CliRunner().invoke(springscale, ["calibrate", str(draft), "--plan"], catch_exceptions=False)
+    assert told.exit_code == 0
+    assert "1. the empty vehicle" in told.stdout
+    numbers = CliRunner().invoke(springscale, ["calibrate", str(draft), "--plan", "--json"], catch_exceptions=False)
+    assert json.loads(numbers.stdout)["plan"]["n_driven"] == 0
+
+
+def test_neither_a_file_nor_a_plan_asked_for_is_a_usage_error(tmp_path: Path) -> None:
+    draft = tmp_path / "campaign.toml"
+    draft.write_text(DRAFT, encoding="utf-8")
+    told = CliRunner().invoke(springscale, ["calibrate", str(draft)])
+    assert told.exit_code == 2
+    assert "--output" in told.stderr
