@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from pydantic import Field, ValidationError
 
@@ -58,7 +58,9 @@ class TareEntry(Part):
 
     def content_id(self) -> str:
         """What ``id`` has to be."""
-        return _content_id(self.model_dump(mode="json", exclude={"id", "ended"}))
+        content = self.model_dump(mode="json", exclude={"id", "ended"})
+        text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
 
 
 class TareHistory(Part):
@@ -99,23 +101,24 @@ def entry_of(
     estimator: str,
 ) -> TareEntry:
     """The entry of a new tare, its id filled in."""
-    content: dict[str, Any] = {
-        "at": iso_utc(at_ns),
-        "by": by,
-        "note": note,
-        "vehicle_id": vehicle_id,
-        "calibration_id": calibration_id,
-        "estimator": estimator,
-        "payload_kg": zero.payload_kg,
-        "payload_std_kg": zero.payload_std_kg,
-        "front_share_pct": zero.front_share_pct,
-        "front_share_std_pct": zero.front_share_std_pct,
-        "n_batches": weighed.n_batches,
-        "batch_ids": list(weighed.batch_ids),
-        "t_start": iso_utc(weighed.epoch.t_start_ns),
-        "t_end": iso_utc(weighed.t_end_ns),
-    }
-    return TareEntry.model_validate({"id": _content_id(content), **content})
+    entry = TareEntry(
+        id="",
+        at=iso_utc(at_ns),
+        by=by,
+        note=note,
+        vehicle_id=vehicle_id,
+        calibration_id=calibration_id,
+        estimator=estimator,
+        payload_kg=zero.payload_kg,
+        payload_std_kg=zero.payload_std_kg,
+        front_share_pct=zero.front_share_pct,
+        front_share_std_pct=zero.front_share_std_pct,
+        n_batches=weighed.n_batches,
+        batch_ids=weighed.batch_ids,
+        t_start=iso_utc(weighed.epoch.t_start_ns),
+        t_end=iso_utc(weighed.t_end_ns),
+    )
+    return entry.model_copy(update={"id": entry.content_id()})
 
 
 def load_tares(path: Path) -> TareHistory:
@@ -150,8 +153,3 @@ def save_tares(path: Path, history: TareHistory) -> None:
 
 
 _MEND: Final = "restore it, or remove it to go on from the factory zero"
-
-
-def _content_id(content: dict[str, Any]) -> str:
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return "sha256:" + hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,119 @@
+"""springscale calibration tare: whom it asks, and what it says where nobody answers as wanted."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from support.calibrated import calibration_file
+from support.tare import FakePipeline
+from support.web import Gateway, serving
+
+from gateway.cli.calibration import calibration_commands
+from gateway.errors import ConfigurationError, SpringscaleError
+from gateway.service.tare_desk import Subject, TareDesk
+from gateway.web import Scope, TokenFile
+
+
+def run(*arguments: str, **environment: str) -> Result:
+    return CliRunner(env=environment).invoke(calibration_commands, ["tare", *arguments])
+
+
+@pytest.fixture
+def pipeline() -> FakePipeline:
+    return FakePipeline()
+
+
+@pytest.fixture
+def tokens(tmp_path: Path) -> TokenFile:
+    return TokenFile(tmp_path / "tokens.json")
+
+
+@pytest.fixture
+def url(tmp_path: Path, tokens: TokenFile, pipeline: FakePipeline) -> Iterator[str]:
+    """A service behind tokens."""
+    tokens.create("somebody", Scope.READ)
+    subject = Subject(calibration_file().for_core(), "ratio_index", "van-17")
+    desk = TareDesk(tmp_path, subject, pipeline, stale_after_s=900.0, on_event=lambda kind, detail: None)
+    with Gateway(tmp_path / "store", tokens=tokens, tare=desk) as gateway, serving(gateway.app) as server:
+        yield server.url
+
+
+def test_set_show_and_undo_with_a_token_from_the_environment(url: str, tokens: TokenFile) -> None:
+    token = tokens.create("workshop", Scope.OPERATE)
+    made = run("set", "--empty", "--note", "yard", "--url", url, SPRINGSCALE_TOKEN=token)
+    assert made.exit_code == 0, made.exception
+    assert "+12.0 ± 5.0 kg and +1.00 ± 0.40 pp from 1 batches, set " in made.output
+    assert "by workshop (yard)" in made.output
+    shown = run("show", "--url", url + "/", "--token", token)
+    assert shown.output.splitlines()[0] == "in use: " + made.output.strip()
+    assert "a tare now would take off +12.0 ± 5.0 kg" in shown.output
+    undone = run("undo", "--url", url, "--token", token, "--json")
+    assert json.loads(undone.output)["active"] is None
+    assert "undone" in run("show", "--url", url, "--token", token).output
+
+
+def test_a_refusal_comes_in_the_services_own_words(url: str, tokens: TokenFile, pipeline: FakePipeline) -> None:
+    token = tokens.create("workshop", Scope.OPERATE)
+    pipeline.weigh(200.0)
+    for arguments, said in (
+        (
+            ("set", "--empty", "--url", url, "--token", token),
+            "either the vehicle is not empty, or it needs a calibration",
+        ),
+        (("undo", "--url", url, "--token", token), "not_tared"),
+        (("show", "--url", url), "a bearer token is needed"),
+    ):
+        fault = run(*arguments).exception
+        assert isinstance(fault, SpringscaleError)
+        assert fault.exit_code == 1
+        assert said in str(fault)
+    assert "no tare now (offset_too_large)" in run("show", "--url", url, "--token", token).output
+
+
+def test_where_nobody_answers_that_is_said() -> None:
+    fault = run("show", "--url", "http://127.0.0.1:1").exception
+    assert isinstance(fault, SpringscaleError)
+    assert "http://127.0.0.1:1/api/v1/calibration/tare: no service answers there" in str(fault)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("set", "--url", "http://127.0.0.1:1"),
+        ("show",),
+        ("show", "--url", "127.0.0.1:8000"),
+        ("show", "--url", "http://127.0.0.1:1", "--config", "x.toml"),
+    ],
+)
+def test_a_wrong_use_ends_with_code_2(arguments: tuple[str, ...]) -> None:
+    assert run(*arguments).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("web", "address"),
+    [
+        ('host = "0.0.0.0"\nport = 1', "http://127.0.0.1:1/api"),
+        ('host = "::1"\nport = 1', "http://[::1]:1/api"),
+        ('port = 1\ntls_certificate = "a.pem"\ntls_key = "a.key"', "https://127.0.0.1:1/api"),
+    ],
+)
+def test_the_configuration_says_where_the_service_is(tmp_path: Path, web: str, address: str) -> None:
+    path = tmp_path / "springscale.toml"
+    path.write_text(f'signals = "springscale:reference"\n[web]\n{web}\n')
+    fault = run("show", "--config", str(path)).exception
+    assert isinstance(fault, SpringscaleError)
+    assert address in str(fault)
+
+
+def test_port_0_and_a_wrong_authority_are_configuration_errors(tmp_path: Path) -> None:
+    path = tmp_path / "springscale.toml"
+    path.write_text('signals = "springscale:reference"\n[web]\nport = 0\n')
+    for arguments, said in (
+        (("--config", str(path)), "names no port"),
+        (("--url", "https://127.0.0.1:1", "--ca", str(path)), "no certificate of an authority"),
+    ):
+        fault = run("show", *arguments).exception
+        assert isinstance(fault, ConfigurationError)
+        assert said in str(fault)
