@@ -205,6 +205,7 @@ class Estimate:
     mean_speed_mps: float = math.nan
     gap_share: float = math.nan
     usable_share: float = math.nan
+    roughness_mps2: float = math.nan  # of the road (core.roughness)
     shares: Mapping[str, float] = field(default_factory=dict)
     rejected: tuple[Why, ...] = ()
     is_provisional: bool = False
@@ -266,6 +267,7 @@ def estimate_to_json(estimate: Estimate) -> dict[str, Any]:
         "mean_speed_mps": _number(e.mean_speed_mps, 9),
         "gap_share": _number(e.gap_share, 9),
         "usable_share": _number(e.usable_share, 9),
+        "roughness_mps2": _number(e.roughness_mps2, 6),
         "shares": {str(why): _number(share, 6) for why, share in e.shares.items()},
         "rejected": [str(why) for why in e.rejected],
         "diagnostics": {name: _number(x, 6) for name, x in e.diagnostics.items()},

@@ -10,6 +10,7 @@ import numpy as np
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum import CrossSpectrum
 from gateway.core.ratio_index import indexes_of
+from gateway.core.roughness import roughness_mps2
 from gateway.core.spectrum import spectra_of
 from gateway.records import Batch, Estimate, Why
 
@@ -26,6 +27,7 @@ class Estimator(Protocol):
 
 def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str) -> Estimate:
     """What ``batch`` tells by the named estimator: numbers, or why not. Never raises on a batch."""
+    spectra = spectra_of(batch)
     blank = Estimate(
         t_start_ns=batch.t_start_ns,
         t_end_ns=batch.t_end_ns,
@@ -34,10 +36,11 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
         mean_speed_mps=batch.mean_speed_mps,
         gap_share=batch.gap_share,
         usable_share=batch.usable_share,
+        roughness_mps2=roughness_mps2(spectra, batch.mean_speed_mps),
         shares={str(why): share for why, share in batch.shares.items()},
         rejected=batch.rejected,
         is_provisional=batch.is_provisional,
-        spectra=spectra_of(batch),
+        spectra=spectra,
     )
     if calibrated is None:
         return replace(blank, rejected=(*batch.rejected, Why.NO_CALIBRATION))

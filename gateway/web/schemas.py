@@ -42,6 +42,9 @@ class Estimate(BaseModel):
     mean_speed_mps: float | None = Field(examples=[13.9])
     gap_share: float | None = Field(description="share of the batch without samples", examples=[0.001])
     usable_share: float | None = Field(description="share of the batch that every gate let through", examples=[0.93])
+    roughness_mps2: float | None = Field(
+        None, description="of the road: rms vertical acceleration, 1 to 15 Hz, brought to 80 km/h", examples=[1.1]
+    )
     shares: dict[str, float | None] = Field(description="part of the batch that each cause masked", examples=[{}])
     rejected: list[str] = Field(description="why there is no answer; empty: this batch counted", examples=[[]])
     diagnostics: dict[str, float | None] = Field(default_factory=dict, examples=[{}])
