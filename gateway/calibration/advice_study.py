@@ -53,8 +53,8 @@ class AdviceStudy:
     answered: Comparison
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers for a file or a report."""
-        return asdict(self)
+        """Plain numbers for a file or a report; null where nothing was answered."""
+        return {"campaign": self.campaign, "with_misses": _plain(self.with_misses), "answered": _plain(self.answered)}
 
 
 def compared(choices: Sequence[Choice]) -> Comparison:
@@ -76,6 +76,13 @@ def compared(choices: Sequence[Choice]) -> Comparison:
     )
 
 
+def _plain(comparison: Comparison) -> dict[str, Any]:
+    return {
+        name: found if isinstance(found, int) else [x if np.isfinite(x) else None for x in found]
+        for name, found in asdict(comparison).items()
+    }
+
+
 def _mean_of_others(choice: Choice) -> Errors:
     return _mean([errors for number, errors in choice.after.items() if number != choice.advised])
 
@@ -90,5 +97,10 @@ def _rows(errors: Any) -> np.ndarray:
 
 
 def _mean(errors: Any) -> Errors:
-    payload, share = np.nanmean(_rows(errors), axis=0).tolist()
+    """Column by column over what was answered; NaN where nothing was."""
+    payload, share = (_mean_known(column[np.isfinite(column)]) for column in _rows(errors).T)
     return payload, share
+
+
+def _mean_known(column: np.ndarray) -> float:
+    return float(np.mean(column)) if column.size else float("nan")

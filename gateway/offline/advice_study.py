@@ -6,6 +6,7 @@ of all runs, the same batches for every choice.
 """
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from gateway.calibration.advice_study import AdviceStudy, Choice, Errors, compared
 from gateway.calibration.campaign import Campaign
@@ -21,7 +22,8 @@ from gateway.offline.known_runs import OnRun, SplitRun, split_runs
 from gateway.offline.plan import usual_drive
 from gateway.offline.trials import calibrated_on, judged_all
 
-ESTIMATOR = "cross_spectrum"
+ESTIMATOR: Final = "cross_spectrum"
+LEAST_RUNS: Final = 5
 OnFit = Callable[[int, int], None]  # (calibrations done, calibrations in all)
 Scored = tuple[Errors, Errors]  # with misses, and of what was answered
 
@@ -32,19 +34,28 @@ def advice_study(
     on_run: OnRun = lambda done, of: None,
     on_fit: OnFit = lambda done, of: None,
 ) -> AdviceStudy:
-    """Raises CalibrationImpossibleError where the campaign holds no such triple with runs to choose from."""
+    """Reads the campaign's logs, then tries. Raises CalibrationImpossibleError as :func:`advice_of`."""
     split = split_runs(campaign, settings, on_run=on_run)
+    return advice_of(split, campaign.vehicle, name=campaign.vehicle.name, on_fit=on_fit)
+
+
+def advice_of(
+    split: Sequence[SplitRun], vehicle: Vehicle, *, name: str, on_fit: OnFit = lambda done, of: None
+) -> AdviceStudy:
+    """The same for runs that were read already.
+
+    Raises CalibrationImpossibleError where no such triple has runs to choose from.
+    """
     runs = [one.identification for one in split]
-    triples = triples_at_different_positions(runs, campaign.vehicle)
-    if not triples or len(runs) < 5:
+    triples = triples_at_different_positions(runs, vehicle)
+    if not triples or len(runs) < LEAST_RUNS:
         raise CalibrationImpossibleError(
-            f"{campaign.path}: needs an empty run, loads at two positions or more and five runs in all, to choose from"
+            "needs an empty run, loads at two positions or more and five runs in all, so as to have a choice"
         )
-    tried = _Tried(split, campaign.vehicle, on_fit, _n_calibrations(triples, [run.number for run in runs]))
+    tried = _Tried(split, vehicle, on_fit, _n_calibrations(triples, [run.number for run in runs]))
     choices = [tried.choice(triple) for triple in triples]
-    return AdviceStudy(
-        campaign.vehicle.name, compared([choice[0] for choice in choices]), compared([choice[1] for choice in choices])
-    )
+    with_misses, answered = (compared([choice[which] for choice in choices]) for which in (0, 1))
+    return AdviceStudy(name, with_misses, answered)
 
 
 def _n_calibrations(triples: Sequence[tuple[int, ...]], numbers: Sequence[int]) -> int:
