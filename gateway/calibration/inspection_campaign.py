@@ -59,7 +59,7 @@ def _beside_the_others(inspected: Sequence[Inspected]) -> Iterator[tuple[int, Fi
             text = f"{speed_mps:.1f} m/s in the mean, the median run {usual_mps:.1f} m/s"
             yield number, found(Kind.SPEED_DIFFERS, Severity.NOTE, text)
         if shakes_mps2 * SMOOTHER_BY < usual_mps2:
-            text = f"vertical acceleration is {shakes_mps2:.2g} m/s2 (standard deviation), the median run's {usual_mps2:.2g}"
+            text = f"vertical acceleration scatters by {shakes_mps2:.2g} m/s2, in the median run by {usual_mps2:.2g}"
             yield number, found(Kind.SMOOTH_ROAD, Severity.WARNING, text)
 
 

@@ -100,8 +100,8 @@ class _Labelled:
 
 def _swap_findings(all_runs: _Labelled, i: int, j: int, evidence: float) -> Iterator[tuple[int, Finding]]:
     numbers = [all_runs.known[n].run.number for n in (i, j)]
-    text = f"exchanging the loads of runs {numbers[0]} and {numbers[1]} explains the drives better: evidence {evidence:.0f}"
-    text += f", {LEAST_EVIDENCE:g} is beyond doubt"
+    text = f"exchanging the loads of runs {numbers[0]} and {numbers[1]} explains the drives better: "
+    text += f"evidence {evidence:.0f}, {LEAST_EVIDENCE:g} is beyond doubt"
     for n in (i, j):
         yield (
             all_runs.known[n].run.number,

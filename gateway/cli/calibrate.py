@@ -2,18 +2,22 @@
 
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
-from gateway.calibration.campaign import load_campaign
+from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.draft import load_draft
 from gateway.calibration.file import CalibrationFile
+from gateway.cli.inspection_text import inspection_json, inspection_sentences
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
 from gateway.cli.plan_text import plan_sentences
 from gateway.cli.progress import bar
 from gateway.config import ESTIMATOR_NAMES
-from gateway.offline.calibrate import calibrate as fit
+from gateway.errors import CalibrationImpossibleError
+from gateway.offline.calibrate import calibrate_inspected
+from gateway.offline.inspect import Inspection, inspect
 from gateway.offline.plan import Plan, plan_first, plan_next
 from gateway.records import json_line
 
@@ -24,6 +28,7 @@ from gateway.records import json_line
 @click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]")
 @click.option("--runs", "numbers", type=RunNumbers(), default=None, help="these runs only, counted from 1: 1,5,10")
 @click.option("--plan", "wants_plan", is_flag=True, help="advise which load to drive next; [vehicle] alone is enough")
+@click.option("--check", "only_checks", is_flag=True, help="inspect the drives and write nothing; exits 1 on a refusal")
 @window
 @as_json
 def calibrate(
@@ -32,31 +37,47 @@ def calibrate(
     estimators: tuple[str, ...],
     numbers: tuple[int, ...] | None,
     wants_plan: bool,
+    only_checks: bool,
     window_s: float | None,
     as_json: bool,
 ) -> None:
     """Fit every estimator on the identification parts of CAMPAIGN's runs."""
-    if output is None and not wants_plan:
-        raise click.UsageError("name the calibration file to write with --output, or ask for a plan with --plan")
+    if output is None and not wants_plan and not only_checks:
+        raise click.UsageError("name the calibration file to write with --output, or ask with --check or --plan")
     if wants_plan and not (draft := load_draft(campaign)).runs:
         plan = plan_first(draft.vehicle)
         click.echo(json_line({"plan": plan.to_json()}) if as_json else plan_sentences(plan))
         return
     loaded = load_campaign(campaign)
-    with bar(len(loaded.runs) if numbers is None else len(numbers), "reading drives") as progress:
-        outcome = fit(
-            loaded,
-            batch_settings(window_s),
-            estimators=estimators or ESTIMATOR_NAMES,
-            numbers=numbers,
-            command=shlex.join(["springscale", *sys.argv[1:]]),
-            on_run=lambda done, of: progress.update(done - progress.pos),
-        )
+    inspection = _inspect(loaded, numbers, window_s)
+    if only_checks or inspection.refusal is not None or not as_json:
+        click.echo(json_line(inspection_json(inspection)) if as_json else inspection_sentences(inspection))
+    if inspection.refusal is not None:
+        raise CalibrationImpossibleError(f"{campaign}: {inspection.refusal}; the findings say what to mend")
+    if only_checks:
+        return
+    command = shlex.join(["springscale", *sys.argv[1:]])
+    outcome = calibrate_inspected(loaded, inspection, estimators=estimators or ESTIMATOR_NAMES, command=command)
     found = outcome.file
     if output is not None:
         output.write_text(found.to_json(), encoding="utf-8")
     next_runs = plan_next(outcome, loaded.vehicle) if wants_plan else None
-    click.echo(json_line(_summary(found, output, next_runs)) if as_json else _sentences(found, output, next_runs))
+    if as_json:
+        summary = _summary(found, output, next_runs) | {"inspection": inspection_json(inspection)}
+        click.echo(json_line(summary))
+    else:
+        click.echo(_sentences(found, output, next_runs, said=inspection.warnings))
+
+
+def _inspect(campaign: Campaign, numbers: Sequence[int] | None, window_s: float | None) -> Inspection:
+    """The chosen drives read and inspected, a bar telling how far."""
+    with bar(len(campaign.runs) if numbers is None else len(numbers), "reading drives") as progress:
+        return inspect(
+            campaign,
+            batch_settings(window_s),
+            numbers=numbers,
+            on_run=lambda done, of: progress.update(done - progress.pos),
+        )
 
 
 def _summary(found: CalibrationFile, output: Path | None, plan: Plan | None) -> dict[str, object]:
@@ -71,13 +92,14 @@ def _summary(found: CalibrationFile, output: Path | None, plan: Plan | None) -> 
     }
 
 
-def _sentences(found: CalibrationFile, output: Path | None, plan: Plan | None) -> str:
+def _sentences(found: CalibrationFile, output: Path | None, plan: Plan | None, said: Sequence[str]) -> str:
+    """What was calibrated, with the warnings that are not ``said`` above it."""
     low, high = found.seen.payload_kg
     lines = [
         f"{output or 'no file written'}: {', '.join(found.estimators)}; payloads {low:g} to {high:g} kg, "
         f"{len(found.provenance.runs)} runs, {sum(run.n_batches for run in found.provenance.runs)} batches",
         f"id {found.id}",
-        *(f"warning: {warning}" for warning in found.warnings),
+        *(f"warning: {warning}" for warning in found.warnings if warning not in said),
         *([plan_sentences(plan)] if plan else []),
     ]
     return "\n".join(lines)

@@ -21,7 +21,7 @@ from gateway.calibration.file import (
     VehiclePart,
 )
 from gateway.calibration.grey_box import CrossSpectrumFit, fit_cross_spectrum
-from gateway.calibration.inspection import RunVerdict
+from gateway.calibration.inspection import Finding, RunVerdict, Severity
 from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum import CrossSpectrumCalibration
@@ -31,6 +31,7 @@ from gateway.core.roughness import roughness_mps2
 from gateway.core.settings import BatchSettings
 from gateway.core.spectrum import spectra_of
 from gateway.errors import CalibrationImpossibleError
+from gateway.offline.inspect import Inspection, inspect
 from gateway.offline.known_runs import OnRun, SplitRun, file_sha256, split_runs
 from gateway.records import F64, Batch
 
@@ -41,7 +42,8 @@ Split = Literal["identification", "validation", "all"]
 class Outcome:
     """A calibration file with all that stands behind it. What no estimator gave is None.
 
-    cross_spectrum_without holds, by run number, what the other runs teach without that run.
+    verdicts are of every run, split holds those without a fault, which calibrated; campaign_findings are of
+    all together. cross_spectrum_without holds, by run number, what the other runs teach without that run.
     """
 
     file: CalibrationFile
@@ -50,6 +52,7 @@ class Outcome:
     ratio_index: RatioIndexFit | None
     cross_spectrum: CrossSpectrumCalibration | None
     cross_spectrum_without: Mapping[int, CrossSpectrumCalibration] = field(default_factory=dict)
+    campaign_findings: tuple[Finding, ...] = ()
 
 
 def calibrate(
@@ -61,16 +64,27 @@ def calibrate(
     command: str = "",
     on_run: OnRun = lambda done, of: None,
 ) -> Outcome:
-    """Fits every named estimator on the identification parts of the chosen runs.
+    """Inspects the chosen runs and fits every named estimator on the identification parts of those without a fault.
 
-    An estimator that these runs cannot carry is left out with a warning; raises
-    CalibrationImpossibleError when none is left, and where no identification batch counts.
+    Raises as :func:`calibrate_inspected` does.
     """
-    split = split_runs(campaign, settings, numbers=numbers, on_run=on_run)
+    inspection = inspect(campaign, settings, numbers=numbers, on_run=on_run)
+    return calibrate_inspected(campaign, inspection, estimators=estimators, command=command)
+
+
+def calibrate_inspected(
+    campaign: Campaign, inspection: Inspection, *, estimators: Sequence[str], command: str = ""
+) -> Outcome:
+    """Fits every named estimator on the identification parts of the runs without a fault.
+
+    An estimator that these runs cannot carry is left out with a warning; raises CalibrationImpossibleError
+    when none is left, and where the faults of the runs leave no calibration worth its name.
+    """
+    if inspection.refusal is not None:
+        raise CalibrationImpossibleError(_refused(campaign, inspection, inspection.refusal))
+    split = inspection.usable
     runs = [one.identification for one in split]
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
-    if not counted:
-        raise CalibrationImpossibleError(f"{campaign.path}: no identification batch can be used: {_why_none(runs)}")
     ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign)
     with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
     speeds = [batch.mean_speed_mps for batch in counted]
@@ -85,16 +99,17 @@ def calibrate(
         cross_spectrum=CrossSpectrumPart.of(cross_spectrum.calibration) if cross_spectrum else None,
         ratio_index=RatioIndexPart.of(ratio_index.calibration) if ratio_index else None,
         expected_errors=_expected_errors(ratio_index=ratio_index, cross_spectrum=cross_spectrum),
-        warnings=tuple(warnings),
+        warnings=(*inspection.warnings, *warnings),
         provenance=_provenance(campaign, split, command),
     )
     return Outcome(
         file,
-        (),
-        tuple(split),
+        inspection.verdicts,
+        split,
         ratio_index,
         cross_spectrum.calibration if cross_spectrum else None,
         cross_spectrum.without if cross_spectrum else {},
+        inspection.findings,
     )
 
 
@@ -119,11 +134,15 @@ def _fit(
     return ratio_index, cross_spectrum, warnings
 
 
-def _why_none(runs: Sequence[KnownRun]) -> str:
-    reasons = [str(why) for run in runs for batch in run.batches for why in batch.rejected]
-    if not reasons:
-        return "the identification part holds no batch (identification_fraction or split leave nothing)"
-    return ", ".join(f"{why} ({reasons.count(why)})" for why in sorted(set(reasons)))
+def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
+    """The refusal with every fault that led to it."""
+    faults = [
+        f"run {verdict.number}: {finding.kind}: {finding.text}: {finding.advice}"
+        for verdict in inspection.verdicts
+        for finding in verdict.findings
+        if finding.severity is Severity.FAULT
+    ]
+    return "\n".join([f"{campaign.path}: {why}", *dict.fromkeys(faults)])
 
 
 def _span(found: Sequence[float]) -> tuple[float, float]:

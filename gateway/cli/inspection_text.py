@@ -1,0 +1,57 @@
+"""Verdicts on known-load drives, as people and programs read them."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from gateway.calibration.inspection import Finding, RunVerdict
+from gateway.offline.inspect import Inspection
+from gateway.offline.known_runs import SplitRun
+
+
+def inspection_sentences(inspection: Inspection) -> str:
+    """A line a run, its findings below with what to do about each; then what is to say of all runs."""
+    lines: list[str] = []
+    for one, verdict in zip(inspection.split, inspection.verdicts, strict=True):
+        lines += [_run_line(one, verdict), *_finding_lines(verdict.findings)]
+    if inspection.findings:
+        lines += ["all runs together", *_finding_lines(inspection.findings)]
+    return "\n".join(lines)
+
+
+def _run_line(one: SplitRun, verdict: RunVerdict) -> str:
+    batches = [batch for part in (one.identification, one.validation) for batch in part.batches if not batch.rejected]
+    n_identifying = sum(not batch.rejected for batch in one.identification.batches)
+    seconds = sum(batch.usable_share * batch.duration_s for batch in batches)
+    driven = f"{n_identifying} batches identify, {len(batches) - n_identifying} validate, {seconds:.0f} s can be used"
+    words = "left out" if not verdict.is_usable else "sound" if not verdict.findings else "usable"
+    load = f"{one.identification.payload_kg:g} kg"
+    return f"run {verdict.number} {verdict.name} ({load}): {words}; {driven}"
+
+
+def _finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
+    for finding in findings:
+        yield f"    {finding.severity} {finding.kind}: {finding.text}"
+        yield f"        {finding.advice}"
+
+
+def inspection_json(inspection: Inspection) -> dict[str, object]:
+    """A verdict a run, what is to say of all runs together, and why there is no calibration (null where there is)."""
+    return {
+        "refusal": inspection.refusal,
+        "runs": [
+            {
+                "number": verdict.number,
+                "log": verdict.name,
+                "is_usable": verdict.is_usable,
+                "findings": _finding_records(verdict.findings),
+            }
+            for verdict in inspection.verdicts
+        ],
+        "campaign_findings": _finding_records(inspection.findings),
+    }
+
+
+def _finding_records(findings: Sequence[Finding]) -> list[dict[str, str]]:
+    return [
+        {"kind": str(one.kind), "severity": str(one.severity), "text": one.text, "advice": one.advice}
+        for one in findings
+    ]
