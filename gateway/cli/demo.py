@@ -4,9 +4,8 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import Iterator
 from importlib.resources import as_file, files
-from itertools import count
+from itertools import count, takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, Literal
@@ -16,17 +15,19 @@ import click
 from gateway.bus.sink import BusSink, replay_frames
 from gateway.cli.sentence import sentence
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
-from gateway.offline.demo_drive import demo_frames
+from gateway.offline.demo_drive import demo_drive, frames_of
 from gateway.offline.estimates import setup_of
-from gateway.records import Frames, json_line
+from gateway.records import json_line
 from gateway.service.gateway import Gateway
 from gateway.service.log import set_up_log
-from gateway.sim.scenario import START_NS
+from gateway.sim.scenario import START_NS, Truth
 from gateway.store import Store
 from gateway.units import NS_PER_S
+from gateway.web import KnownLoad
 
 CHANNEL: Final = "springscale-demo"
-HOUR_NS: Final = 3600 * NS_PER_S  # from the start of one drive to the start of the next
+ROUND_NS: Final = 1800 * NS_PER_S  # from the start of one drive to the start of the next
+N_QUICK_ROUNDS: Final = 1  # driven at full speed, so that there is a history to look at
 QUIET_S: Final = 0.5  # no new frame for this long: the service has taken all that was sent
 
 
@@ -36,7 +37,10 @@ QUIET_S: Final = 0.5  # no new frame for this long: the service has taken all th
 @click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="port of the dashboard")
 @click.option("--speed", type=click.FloatRange(min=1.0), default=30.0, show_default=True, help="times real time")
 def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
-    """A van drives empty, stops, is loaded with 270 kg and drives on; watch the service weigh it."""
+    """A van drives empty, stops, is loaded with 270 kg and drives on; watch the service weigh it.
+
+    The first drive goes through at full speed, further ones with other loads follow at the speed asked for.
+    """
     set_up_log("warning", under_journald=False)
     with TemporaryDirectory(prefix="springscale-demo-") as folder, as_file(files("gateway") / "demo") as shipped:
         settings = Settings(
@@ -47,8 +51,8 @@ def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
             web=WebSection(port=0 if once else port),
             store=StoreSection(directory=Path(folder)),
         )
-        driver = _Driver("max" if once else speed, is_endless=not once)
-        Gateway(settings, setup_of(settings), on_started=driver.start).run()
+        driver = _Driver(speed, is_endless=not once)
+        Gateway(settings, setup_of(settings), on_started=driver.start, known_loads=driver.known_loads).run()
         driver.end()
         if once:
             _print_estimates(Path(folder), as_json)
@@ -57,16 +61,23 @@ def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
 class _Driver:
     """Sends the demonstration drives to the bus from a thread of its own."""
 
-    def __init__(self, speed: float | Literal["max"], *, is_endless: bool) -> None:
+    def __init__(self, speed: float, *, is_endless: bool) -> None:
         self._stop = threading.Event()
         self._speed = speed
         self._is_endless = is_endless
         self._thread: threading.Thread | None = None
+        self._known_loads: tuple[KnownLoad, ...] = ()
+
+    def known_loads(self) -> tuple[KnownLoad, ...]:
+        """What was truly aboard so far, for the dashboard to compare with; from any thread."""
+        return self._known_loads
 
     def start(self, gateway: Gateway) -> None:
         """Begin to drive; called in the service's event loop once it is ready."""
         if self._is_endless:
-            click.echo(f"Dashboard: {gateway.url}   (Ctrl-C ends; the drive runs at {self._speed:g} times real time)")
+            click.echo(
+                f"Dashboard: {gateway.url}   (Ctrl-C ends; after the first, drives run {self._speed:g} times real time)"
+            )
         loop = asyncio.get_running_loop()
         self._thread = threading.Thread(target=self._drive, args=(gateway, loop), name="demo-drive", daemon=True)
         self._thread.start()
@@ -80,23 +91,32 @@ class _Driver:
     def _drive(self, gateway: Gateway, loop: asyncio.AbstractEventLoop) -> None:
         try:
             with BusSink("virtual", CHANNEL) as sink:
-                replay_frames(self._frames(), sink, self._speed, None, self._stop)
+                for seed in takewhile(self._goes_on, count(1)):
+                    self._drive_once(seed, sink)
                 self._wait_until_taken(gateway)
         finally:
             if not self._stop.is_set():
                 loop.call_soon_threadsafe(gateway.request_stop)
 
-    def _frames(self) -> Iterator[Frames]:
-        for seed in count(1):
-            yield from demo_frames(seed, START_NS + (seed - 1) * HOUR_NS)
-            if not self._is_endless:
-                return
+    def _goes_on(self, seed: int) -> bool:
+        return not self._stop.is_set() and (self._is_endless or seed <= N_QUICK_ROUNDS)
+
+    def _drive_once(self, seed: int, sink: BusSink) -> None:
+        driven = demo_drive(seed, START_NS + (seed - 1) * ROUND_NS)
+        self._known_loads += _told(driven.truth)
+        speed: float | Literal["max"] = "max" if seed <= N_QUICK_ROUNDS else self._speed
+        replay_frames([frames_of(driven)], sink, speed, None, self._stop)
 
     def _wait_until_taken(self, gateway: Gateway) -> None:
         n, since = -1, time.monotonic()
         while not self._stop.wait(0.05) and time.monotonic() - since < QUIET_S:
             if (now := gateway.source.counts().frames) != n or not gateway.has_caught_up:
                 n, since = now, time.monotonic()
+
+
+def _told(truth: Truth) -> tuple[KnownLoad, ...]:
+    steps = zip(truth.t_ns.tolist(), truth.payload_kg.tolist(), truth.front_share_pct.tolist(), strict=True)
+    return tuple(KnownLoad(*step) for step in steps)
 
 
 def _print_estimates(folder: Path, as_json: bool) -> None:

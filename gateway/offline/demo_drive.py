@@ -1,6 +1,5 @@
-"""The drive of the demo: a van drives empty, is loaded, and drives on."""
+"""The drives of the demo: a van drives empty, is loaded, and drives on; each time with another load."""
 
-from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -17,7 +16,7 @@ from gateway.sim.vans import PAPER_VAN
 from gateway.sim.vehicle import Load
 
 MAP_NAME: Final = "reference"
-LOAD: Final = Load(270.0, 1.3)
+LOADS: Final = (Load(270.0, 1.3), Load(400.0, 1.8), Load(150.0, 0.6))  # in turn
 WINDOW_S: Final = 300.0
 N_EMPTY_WINDOWS: Final = 3
 N_LOADED_WINDOWS: Final = 2
@@ -25,18 +24,22 @@ STOP_S: Final = 75.0  # longer than the minute of standstill that ends a drive
 _JITTER_MPS: Final = 0.4  # how well a driver holds a speed
 
 
-def demo_frames(seed: int = 1, start_ns: int = START_NS) -> Iterator[Frames]:
-    """The frames of demo_drive as the map "reference" has them, in one chunk."""
-    yield Wiring(MAP_NAME).frames_of(demo_drive(seed, start_ns).recording)
+def frames_of(driven: SimulatedDrive) -> Frames:
+    """The frames of a drive as the map "reference" has them."""
+    return Wiring(MAP_NAME).frames_of(driven.recording)
 
 
 def demo_drive(seed: int = 1, start_ns: int = START_NS) -> SimulatedDrive:
-    """Three windows of five minutes empty, a stop where 270 kg come on board, two windows more; with the truth."""
+    """Three windows of five minutes empty, a stop where a load comes on board, two windows more; with the truth.
+
+    The first seed's load is 270 kg.
+    """
+    load = LOADS[(seed - 1) % len(LOADS)]
     rng = np.random.default_rng(seed)
     empty = _near_50_kmh(N_EMPTY_WINDOWS * WINDOW_S, rng, stops=True)
     loaded = _near_50_kmh(N_LOADED_WINDOWS * WINDOW_S, rng, stops=False)
     whole = empty.then(standstill(STOP_S)).then(loaded)
-    steps = [LoadStep(0.0, ()), LoadStep(empty.duration_s + STOP_S / 2.0, (LOAD,))]
+    steps = [LoadStep(0.0, ()), LoadStep(empty.duration_s + STOP_S / 2.0, (load,))]
     road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
     return simulate_drive(PAPER_VAN, steps, road, whole, REFERENCE, seed, start_ns)
 

@@ -23,7 +23,7 @@ from gateway.service.status import StatusReport
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.store import Retention, Store
 from gateway.uplink import uplink_settings
-from gateway.web import Board, TokenFile, create_app, refuse_open_address, server_config
+from gateway.web import Board, KnownLoads, TokenFile, create_app, refuse_open_address, server_config
 
 SUPERVISE_S = 0.25
 SECONDS_PER_DAY = 86_400.0
@@ -55,6 +55,7 @@ class Gateway:
         *,
         load: LoadSettings | None = None,
         on_started: OnStarted = lambda gateway: None,
+        known_loads: KnownLoads | None = None,
     ) -> None:
         """``load`` reads the settings anew for a reload; without it a reload finds them unchanged."""
         self._settings = settings
@@ -95,7 +96,13 @@ class Gateway:
             on_event=self.store.write_event,
         )
         app = create_app(
-            self.board, self.store.reader(), self.status, calibrated=calibrated, tokens=tokens, tare=self.tare
+            self.board,
+            self.store.reader(),
+            self.status,
+            calibrated=calibrated,
+            tokens=tokens,
+            tare=self.tare,
+            known_loads=known_loads,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = _Server(web)

@@ -24,6 +24,8 @@ from gateway.web import (
     UplinkStatus,
 )
 
+SENSOR_LOST_S = 10.0  # a sensor silent for this long on a bus that is alive is at fault
+NEEDED_SENSORS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
 SPEED_LOST_S = 10.0  # without a valid speed for this long the service waits for one
 
 
@@ -84,6 +86,7 @@ class StatusReport:
             (State.READER_FAULT, lambda: self._source.state is SourceState.READER_FAULT),
             (State.STARTING, lambda: self._source.state is SourceState.STARTING),
             (State.WAITING_FOR_BUS, lambda: self._source.state is not SourceState.RECEIVING),
+            (State.SENSOR_FAULT, self._is_a_sensor_silent),
             (
                 State.WAITING_FOR_SPEED,
                 lambda: self._pipeline.flow.scheduler.is_parked or speed_age_s is None or speed_age_s > SPEED_LOST_S,
@@ -92,6 +95,12 @@ class StatusReport:
             (State.STALE, self._board.is_stale),
         )
         return next((state for state, holds in claims if holds()), State.ESTIMATING)
+
+    def _is_a_sensor_silent(self) -> bool:
+        """Whether a sensor that every estimate needs says nothing; one not heard yet counts from the start."""
+        running_s = time.monotonic() - self._started
+        ages_s = [self._age_s(signal) for signal in NEEDED_SENSORS if signal in self._setup.signal_map.signals]
+        return any((running_s if age_s is None else age_s) > SENSOR_LOST_S for age_s in ages_s)
 
     def _age_s(self, signal: Signal) -> float | None:
         heard = self._pipeline.watch.last_heard.get(signal)

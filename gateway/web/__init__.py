@@ -2,6 +2,7 @@
 
 from gateway.web.app import create_app
 from gateway.web.board import Board, boot_clock_s
+from gateway.web.known_loads import KnownLoad, KnownLoads
 from gateway.web.reader import Reader
 from gateway.web.serving import Tls, refuse_open_address, renew_certificate, server_config
 from gateway.web.settings import WebSettings
@@ -22,6 +23,8 @@ __all__ = [
     "Board",
     "BusStatus",
     "DecodeCount",
+    "KnownLoad",
+    "KnownLoads",
     "Reader",
     "Scope",
     "SignalHealth",

@@ -16,6 +16,7 @@ from gateway.web.export import export_router
 from gateway.web.guard import Failures, Guard, describe_guard
 from gateway.web.headers import SecurityHeaders
 from gateway.web.health import health_router
+from gateway.web.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
 from gateway.web.latest import LatestFirst
 from gateway.web.metrics import metrics_registry
 from gateway.web.reader import Reader
@@ -44,9 +45,11 @@ def create_app(
     calibrated: CalibratedVehicle | None = None,
     tokens: TokenFile | None = None,
     tare: TareDesk | None = None,
+    known_loads: KnownLoads | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
-    service is (``status``, called in the event loop: quick and thread-safe).
+    service is (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the
+    estimates where somebody knows them.
 
     Call ``board.close()`` before the server stops: it ends the streams.
     """
@@ -81,7 +84,9 @@ def create_app(
     app.include_router(vss_router(board, scales))
     app.include_router(rfms_router(board, reader, status, scales))
     app.include_router(health_router(status, metrics_registry(board, scales, status, responses)))
-    pages.install(app)
+    if known_loads is not None:
+        app.include_router(known_loads_router(known_loads))
+    pages.install(app, KNOWN_LOADS_PATH if known_loads else "")
     _describe(app, is_guarded=tokens is not None)
     return app
 

@@ -11,6 +11,7 @@ class State(StrEnum):
 
     STARTING = "starting"
     WAITING_FOR_BUS = "waiting_for_bus"
+    SENSOR_FAULT = "sensor_fault"
     WAITING_FOR_SPEED = "waiting_for_speed"
     COLLECTING = "collecting"
     ESTIMATING = "estimating"
@@ -21,6 +22,7 @@ class State(StrEnum):
 SENTENCES: Final[dict[State, str]] = {
     State.STARTING: "Starting.",
     State.WAITING_FOR_BUS: "The bus is silent: the vehicle is asleep or the channel is not connected.",
+    State.SENSOR_FAULT: "The bus is alive, but a sensor is silent: see the signals.",
     State.WAITING_FOR_SPEED: "Sensors are heard; waiting for the vehicle to drive fast enough.",
     State.COLLECTING: "Driving; collecting the first batch.",
     State.ESTIMATING: "Driving; the estimate is kept up to date.",

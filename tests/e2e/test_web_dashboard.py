@@ -1,21 +1,24 @@
 """The dashboard in a real browser: it shows, follows, grows old, comes back, and loads nothing from elsewhere."""
 
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.dashboard import CONTRASTS, STATUS, Watched, furnished
 from support.estimates import make_record
 from support.web import Gateway, serving
 
 from gateway.records import Why
-from gateway.web import BusStatus, Scope, SignalHealth, State, Status, TokenFile
+from gateway.web import Scope, State, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
 expect = playwright.expect
+LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA
 
 
 @pytest.fixture(scope="module")
@@ -26,22 +29,29 @@ def browser() -> Iterator[Any]:
         opened.close()
 
 
-class Watched:
-    """A page, what it loaded from where, and what its console said."""
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Where a gateway with something to look at is; nobody changes it."""
+    with furnished(tmp_path_factory.mktemp("site")) as gateway, serving(gateway.app) as server:
+        yield server.url
+        gateway.board.close()
 
-    def __init__(self, browser: Any, **options: Any) -> None:
-        self.page = browser.new_page(**options)
-        self.page.set_default_timeout(20_000)
-        self.addresses: list[str] = []
-        self.complaints: list[str] = []
-        self.page.on("request", lambda request: self.addresses.append(request.url))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
+
+@pytest.fixture(scope="module")
+def drawn(site: str, browser: Any) -> Iterator[Watched]:
+    """Its page with every chart drawn and every table opened: to look at, and to be left as it was."""
+    made = Watched(browser, color_scheme="light")
+    made.page.goto(site)
+    made.wait_for_charts()
+    for summary in made.page.locator("summary").all():
+        summary.click()
+    yield made
+    made.page.close()
 
 
 @pytest.fixture
 def watched(browser: Any) -> Iterator[Watched]:
-    made = Watched(browser, locale="en-GB", timezone_id="UTC")
+    made = Watched(browser)
     yield made
     made.page.close()
 
@@ -49,34 +59,92 @@ def watched(browser: Any) -> Iterator[Watched]:
 @pytest.fixture
 def gateway(tmp_path: Path) -> Iterator[Gateway]:
     with Gateway(tmp_path / "store") as opened:
-        opened.status = Status(
-            version="1.2.3",
-            state=State.ESTIMATING,
-            uptime_s=3600.0,
-            vehicle_id="van-17",
-            calibration_id="sha256:ab",
-            bus=BusStatus(interface="socketcan", channel="can0", state="connected", n_frames=12345),
-            signals=(SignalHealth(signal="vertical_acceleration", rate_hz=100.2, last_age_s=0.0, rejected_share=0.01),),
-        )
+        opened.status = STATUS
         yield opened
 
 
-def test_it_shows_the_load_its_band_and_the_recent_batches(gateway: Gateway, watched: Watched) -> None:
-    gateway.publish(make_record(0), make_record(1, Why.TOO_SLOW, Why.GAP))
-    with serving(gateway.app) as server:
-        page = watched.page
-        page.goto(server.url)
-        expect(page.locator("#payload")).to_have_text("100 kg")
-        expect(page.locator("#payload-range")).to_have_text("88 to 112 kg (95 %)")
-        expect(page.locator("#share")).to_have_text("50.5 %")
-        expect(page.locator("#state")).to_contain_text("the estimate is kept up to date")
-        expect(page.locator("#vehicle")).to_have_text("van-17")
-        rows = page.locator("#recent tr")
-        expect(rows).to_have_count(2)
-        expect(rows.nth(0)).to_contain_text("rejected: too slow, gap")
-        expect(page.locator("#signals")).to_contain_text("100.2 Hz")
-        assert all(address.startswith(server.url) for address in watched.addresses)
-    assert not watched.complaints
+def test_it_shows_the_load_and_its_interval(site: str, watched: Watched) -> None:
+    page = watched.page
+    page.goto(site)
+    expect(page.locator("#payload")).to_have_text("270 kg")
+    expect(page.locator("#payload-range")).to_have_text("95 %: 258 to 282 kg")
+    expect(page.locator("#share")).to_have_text("48.0 %")
+    expect(page.locator("#share-range")).to_have_text("95 %: 47.6 to 48.4 %")
+    expect(page.locator("#epoch")).to_have_text("270 ± 8 kg over 2 batches")
+    expect(page.locator("#age")).to_have_text(re.compile(r"^\d+ s ago$"))
+    expect(page.locator("#state")).to_contain_text("Estimating Driving; the estimate is kept up to date.")
+    expect(page.locator("#vehicle")).to_have_text("van-17")
+    expect(page).to_have_title("270 kg – Springscale")
+
+
+def test_it_shows_where_the_load_lies(site: str, watched: Watched) -> None:
+    page = watched.page
+    page.goto(site)
+    expect(page.locator("#weights")).to_contain_text("1.71 ± ")  # 270 kg that leave 48.0 % in front: (3)
+    drawing = page.get_by_role("img", name="Van from above. The load's centre lies 1.71 m behind the front axle.")
+    expect(drawing).to_be_visible()
+    front, rear = (float(x) for x in page.evaluate(AXLE_PLACES))
+    centre = float(drawing.locator("circle.load").get_attribute("cx"))
+    assert (centre - front) / (rear - front) == pytest.approx(1.71 / 2.8, abs=0.01)
+    expect(page.locator("#overload")).to_have_text("The rear axle is over its limit.")
+    expect(drawing.locator("text.over")).to_contain_text("865")
+
+
+AXLE_PLACES = "[...document.querySelectorAll('#van line.axle')].map((line) => line.getAttribute('x1'))"
+
+
+def test_it_says_in_words_why_a_batch_was_not_weighed(site: str, watched: Watched) -> None:
+    page = watched.page
+    page.goto(site)
+    (item,) = page.locator("#rejected li").all()
+    expect(item).to_contain_text("Too slow: too much of the window below speed_min_mps: town, queue, yard.")
+    expect(item).to_contain_text("What to do: nothing; the next open road will do.")
+    expect(item).to_contain_text("Gap: frames of both sensors are missing")
+
+
+def test_it_shows_how_bus_sensors_and_calibration_are(site: str, watched: Watched) -> None:
+    page = watched.page
+    page.goto(site)
+    rows = page.locator("#signals tr")
+    expect(rows.nth(0)).to_contain_text("100.2 Hz")
+    expect(rows.nth(1).locator(".silent")).to_have_text("silent for 75 s")
+    expect(rows.nth(2).locator(".silent")).to_have_text("never heard")
+    expect(page.locator("#bus")).to_contain_text("socketcan can0: receiving")
+    expect(page.locator("#calibrated")).to_contain_text("0 to 420 kg")
+
+
+def test_the_charts_show_estimates_bands_truth_and_model(drawn: Watched) -> None:
+    page = drawn.page
+    truth, band, _early, estimate, refused = page.evaluate("document.getElementById('payload-chart').data")
+    assert [y for y in truth["y"] if y is not None] == [0, 270, 270]
+    assert sorted({y for y in band["y"] if y is not None}) == [-10, 14, 258, 282]
+    assert [y for y in estimate["y"] if y is not None] == [2, 2, 2, 2, 270, 270]
+    assert refused["text"] == ["not weighed: too slow, gap<br>until 01/01/1970, 00:15"]
+    expect(page.locator("#payload-chart-words")).to_contain_text("3 of 4 batches weighed; the last 270 kg")
+    expect(page.locator("#history-legend")).to_contain_text("truly aboard")
+    expect(page.locator("#spectra-of")).to_contain_text("Model: the calibrated vehicle with 270 kg aboard")
+    measured, model = page.evaluate("document.getElementById('spectra-pitch_rate_radps_rthz').data")
+    assert 1.1 <= model["x"][0] < model["x"][-1] <= 14.0
+    assert len(measured["y"]) > len(model["y"]) > 50
+    assert page.locator("#spectra-rows tr").count() == len(measured["y"])
+
+
+def test_all_comes_from_the_gateway_and_the_numbers_come_first(site: str, drawn: Watched) -> None:
+    assert [address for address in drawn.addresses if not address.startswith(f"{site}/")] == []
+    (library,) = [n for n, address in enumerate(drawn.addresses) if "plotly" in address]
+    assert library > drawn.addresses.index(f"{site}/api/v1/estimates/latest")
+    assert drawn.complaints == []  # not of the page's policy either
+
+
+def test_numbers_and_tables_need_no_charts(site: str, watched: Watched) -> None:
+    page = watched.page
+    page.route("**/plotly*", lambda route: route.abort())
+    page.goto(site)
+    expect(page.locator("#payload")).to_have_text("270 kg")
+    expect(page.locator("#recent tr")).to_have_count(4)
+    page.get_by_text("History as a table").click()
+    expect(page.locator("#recent tr").nth(0)).to_contain_text("258 to 282 kg")
+    expect(page.locator("#recent tr").nth(1)).to_contain_text("not weighed: too slow, gap")
 
 
 def test_it_follows_what_happens(gateway: Gateway, watched: Watched) -> None:
@@ -88,10 +156,15 @@ def test_it_follows_what_happens(gateway: Gateway, watched: Watched) -> None:
         expect(page.locator("#link")).to_have_text("live")
         gateway.publish(make_record(7))
         expect(page.locator("#payload")).to_have_text("107 kg")
+        expect(page.locator("#announcement")).to_have_text("Payload 107 kg, 50.5 % on the front axle.")
         expect(page.locator("#note")).to_be_hidden()
         expect(page.locator("#recent tr")).to_have_count(1)
         gateway.board.publish(make_record(20, is_provisional=True))
         expect(page.locator("#note")).to_contain_text("Early value")
+        gateway.publish(make_record(20, Why.SPEED_FROZEN))
+        expect(page.locator("#rejected")).to_contain_text("Speed frozen: the speed repeated one number")
+        expect(page.locator("#recent tr")).to_have_count(2)
+        gateway.board.close()
 
 
 def test_an_old_estimate_is_said_to_be_old(gateway: Gateway, watched: Watched) -> None:
@@ -100,7 +173,35 @@ def test_an_old_estimate_is_said_to_be_old(gateway: Gateway, watched: Watched) -
     with serving(gateway.app) as server:
         watched.page.goto(server.url)
         expect(watched.page.locator("#note")).to_contain_text("This estimate is old")
-        expect(watched.page.locator("#age")).to_have_text("2.0 h")
+        expect(watched.page.locator("#age")).to_have_text("2.0 h ago")
+        expect(watched.page.locator("#latest")).to_have_class(re.compile("stale"))
+        gateway.board.close()
+
+
+STATES = {
+    State.STARTING: ("Starting", "busy"),
+    State.WAITING_FOR_BUS: ("Bus silent", "warn"),
+    State.SENSOR_FAULT: ("Sensor fault", "bad"),
+    State.WAITING_FOR_SPEED: ("Waiting for speed", "busy"),
+    State.COLLECTING: ("First batch under way", "busy"),
+    State.ESTIMATING: ("Estimating", "good"),
+    State.STALE: ("Stale", "warn"),
+    State.READER_FAULT: ("Bus fault", "bad"),
+}
+
+
+def test_every_state_has_a_name_and_a_sentence(gateway: Gateway, watched: Watched) -> None:
+    assert set(STATES) == set(State)
+    with serving(gateway.app) as server:
+        for state, (name, tone) in STATES.items():
+            gateway.status = STATUS.model_copy(update={"state": state, "state_in_words": f"This is {state}."})
+            watched.page.goto(server.url)
+            expect(watched.page.locator("#state")).to_have_text(re.compile(rf"{name}\s+This is {state}\."))
+            expect(watched.page.locator("#state")).to_have_attribute("data-tone", tone)
+        gateway.status = STATUS.model_copy(update={"calibration_id": None})
+        watched.page.goto(server.url)
+        expect(watched.page.locator("#state-name")).to_have_text("No calibration")
+        gateway.board.close()
 
 
 def test_it_stays_readable_without_the_service_and_comes_back_with_it(gateway: Gateway, watched: Watched) -> None:
@@ -112,12 +213,13 @@ def test_it_stays_readable_without_the_service_and_comes_back_with_it(gateway: G
         port = server.socket.getsockname()[1]
         gateway.board.close()
     expect(page.locator("#link")).to_have_text("not connected: trying again")
-    expect(page.locator("#state")).to_contain_text("does not answer")
+    expect(page.locator("#state")).to_contain_text("Offline The gateway does not answer.")
     expect(page.locator("#payload")).to_have_text("100 kg")
     gateway.restart_board()
     with serving(gateway.app, port=port):
         gateway.publish(make_record(1))
         expect(page.locator("#link")).to_have_text("live")
+        expect(page.locator("#state-name")).to_have_text("Estimating")
         expect(page.locator("#payload")).to_have_text("101 kg")
         expect(page.locator("#recent tr")).to_have_count(2)
         gateway.board.close()
@@ -129,42 +231,116 @@ def test_it_asks_for_a_token_where_one_is_needed(tmp_path: Path, watched: Watche
         gateway.publish(make_record(0))
         page = watched.page
         page.goto(server.url)
-        expect(page.locator("#state")).to_have_text("The gateway wants a token.")
+        expect(page.locator("#state")).to_contain_text("The gateway wants a token.")
         page.get_by_label("Token").fill(tokens.create("dispatcher", Scope.READ))
         page.keyboard.press("Enter")
         expect(page.locator("#payload")).to_have_text("100 kg")
         expect(page.locator("#link")).to_have_text("live")
         expect(page.locator("#token")).to_be_hidden()
         assert not any("spr_" in address for address in watched.addresses)
+        page.get_by_text("History as a table").click()
+        with page.expect_download() as download:
+            page.get_by_text("All of it for a spreadsheet (CSV)").click()
+        assert "payload_kg" in Path(download.value.path()).read_text()
         gateway.board.close()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_it_is_readable_on_a_phone_in_light_and_dark(gateway: Gateway, browser: Any, scheme: str) -> None:
-    gateway.publish(make_record(0))
-    watched = Watched(browser, viewport={"width": 360, "height": 740}, color_scheme=scheme)
-    with serving(gateway.app) as server:
-        page = watched.page
-        page.goto(server.url)
-        expect(page.locator("#payload")).to_have_text("100 kg")
-        assert page.evaluate("document.documentElement.scrollWidth") <= 360
-        ink, ground = (
-            page.evaluate(f"getComputedStyle(document.body).{name}") for name in ("color", "backgroundColor")
-        )
-        assert contrast(ink, ground) > 7.0  # WCAG 2.2, level AAA
-        page.close()
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_every_text_can_be_read_in_light_and_dark(drawn: Watched, scheme: str) -> None:
+    drawn.page.emulate_media(color_scheme=scheme)
+    drawn.page.wait_for_timeout(500)  # charts follow two frames later
+    seen = drawn.page.evaluate(CONTRASTS)
+    assert len(seen) > 200
+    assert [text for contrast, text in seen if contrast < LEAST_CONTRAST] == []
 
 
-def contrast(one: str, other: str) -> float:
-    """WCAG 2.2 contrast ratio of two CSS rgb() colours."""
-    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
-    return (light + 0.05) / (dark + 0.05)
+def test_it_fits_a_phone(drawn: Watched) -> None:
+    page = drawn.page
+    usual = page.viewport_size
+    page.set_viewport_size({"width": 360, "height": 740})
+    drawn.wait_until("document.querySelector('#payload-chart .main-svg').clientWidth < 360")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    page.set_viewport_size(usual)
 
 
-def luminance(colour: str) -> float:
-    channels = [int(part) / 255.0 for part in colour.removeprefix("rgb(").removesuffix(")").split(",")]
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+def test_the_theme_is_the_systems_until_another_is_chosen(site: str, browser: Any) -> None:
+    watched = Watched(browser, color_scheme="dark")
+    page = watched.page
+    page.goto(site)
+    button = page.get_by_role("button", name="Theme:")
+    grounds = {}
+    for choice in ("system", "light", "dark"):
+        expect(button).to_have_attribute("aria-label", f"Theme: {choice}")
+        grounds[choice] = page.evaluate("getComputedStyle(document.body).backgroundColor")
+        button.click()
+    assert grounds["system"] == grounds["dark"] != grounds["light"]
+    page.get_by_role("button", name="Theme: system").click()
+    page.reload()
+    expect(button).to_have_attribute("aria-label", "Theme: light")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == grounds["light"]
+    page.close()
+
+
+def test_the_charts_change_their_colours_with_the_page(drawn: Watched) -> None:
+    page = drawn.page
+    grid = "document.getElementById('payload-chart').layout.xaxis.gridcolor"
+    light = page.evaluate(grid)
+    page.emulate_media(color_scheme="dark")
+    drawn.wait_until(f"{grid} !== '{light}'")
+    page.emulate_media(color_scheme="light")
+    drawn.wait_until(f"{grid} === '{light}'")
+
+
+def test_the_keyboard_reaches_everything_in_order(site: str, watched: Watched) -> None:
+    page = watched.page
+    page.goto(site)
+    expect(page.locator("#recent tr")).to_have_count(4)
+    order = []
+    for _ in range(8):
+        page.keyboard.press("Tab")
+        order.append(page.evaluate(FOCUSED))
+        assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid", order[-1]
+    assert order[:4] == ["Skip to the load", "Theme: system", "24", "History as a table"]
+    assert order[4:] == ["Bus and sensors", "Spectra as a table", "API", "Metrics"]
+
+
+FOCUSED = """(() => { const e = document.activeElement;
+  const label = document.getElementById(e.getAttribute("aria-labelledby"))?.textContent;
+  return e === document.body ? "BODY" : e.getAttribute("aria-label") ?? label ?? e.value ?? e.textContent.trim();
+})()"""
+
+
+def test_the_first_key_leads_past_the_head(site: str, watched: Watched) -> None:
+    watched.page.goto(site)
+    watched.page.keyboard.press("Tab")
+    watched.page.keyboard.press("Enter")
+    assert watched.page.evaluate("document.activeElement.id") == "main"
+
+
+def test_it_is_built_for_screen_readers(drawn: Watched) -> None:
+    page = drawn.page
+    for role in ("banner", "main", "contentinfo"):
+        expect(page.get_by_role(role)).to_have_count(1)
+    assert [level for level in page.evaluate(HEADINGS) if level not in ("H1", "H2")] == []
+    assert page.evaluate(HEADINGS)[0] == "H1"
+    assert page.evaluate(HEADINGS).count("H1") == 1
+    assert page.evaluate("document.documentElement.lang") == "en"
+    assert page.evaluate(NAMELESS) == []
+    assert page.evaluate(REPEATED_IDS) == []
+    assert page.locator("th:not([scope])").count() == 0
+    assert page.locator("[role=status][aria-live=polite]").count() == 2
+
+
+HEADINGS = "[...document.querySelectorAll('h1, h2, h3, h4, h5, h6')].map((heading) => heading.tagName)"
+REPEATED_IDS = "[...document.querySelectorAll('[id]')].map((e) => e.id).filter((id, n, all) => all.indexOf(id) !== n)"
+NAMELESS = """[...document.querySelectorAll("[role=img], [role=region], section, button, input, a, fieldset")]
+  .filter((e) => !e.closest(".js-plotly-plot") || e.getAttribute("role"))
+  .filter((e) => {
+    const by = (e.getAttribute("aria-labelledby") ?? "").split(" ").map((id) => document.getElementById(id));
+    const named = [e.getAttribute("aria-label"), ...by.map((other) => other?.textContent)].some((name) => name?.trim());
+    return !named && !e.labels?.length && !e.textContent.trim();
+  })
+  .map((e) => e.outerHTML.slice(0, 80))"""
 
 
 def test_the_api_documentation_renders_without_a_network(gateway: Gateway, watched: Watched) -> None:

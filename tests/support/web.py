@@ -13,8 +13,9 @@ import httpx
 import uvicorn
 from fastapi import FastAPI
 
+from gateway.core.calibrated import CalibratedVehicle
 from gateway.store import Store
-from gateway.web import Board, State, Status, TokenFile, WebSettings, create_app, server_config
+from gateway.web import Board, KnownLoads, State, Status, TokenFile, WebSettings, create_app, server_config
 from gateway.web.tare import TareDesk
 
 
@@ -27,12 +28,20 @@ class Gateway:
         settings: WebSettings | None = None,
         tokens: TokenFile | None = None,
         tare: TareDesk | None = None,
+        calibrated: CalibratedVehicle | None = None,
+        known_loads: KnownLoads | None = None,
     ) -> None:
         self.clock_s = 1000.0
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
         self.store = Store.open(directory)
         self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
-        self._settings, self._tokens, self._tare = settings, tokens, tare
+        self._settings = settings
+        self._known: dict[str, Any] = {
+            "tokens": tokens,
+            "tare": tare,
+            "calibrated": calibrated,
+            "known_loads": known_loads,
+        }
         self.app = self._make_app()
 
     def publish(self, *records: dict[str, Any]) -> list[str]:
@@ -50,7 +59,7 @@ class Gateway:
 
     def _make_app(self) -> FastAPI:
         reader = self.store.reader()
-        return create_app(self.board, reader, lambda: self.status, self._settings, tokens=self._tokens, tare=self._tare)
+        return create_app(self.board, reader, lambda: self.status, self._settings, **self._known)
 
     def __enter__(self) -> "Gateway":
         return self

@@ -1,6 +1,6 @@
 // Server-sent events over fetch: unlike EventSource it can carry a token, and it says why a connection failed.
 
-import { ask } from "/assets/gateway.js";
+import { ask } from "/assets/dashboard/gateway.js";
 
 const FIRST_PAUSE_MS = 1000;
 const LAST_PAUSE_MS = 30000;

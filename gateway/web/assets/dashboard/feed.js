@@ -1,0 +1,80 @@
+// Keeps what the page knows in step with the gateway: asks at the start and now and then, follows the stream between.
+
+import { follow } from "/assets/dashboard/event-stream.js";
+import { Refused, load } from "/assets/dashboard/gateway.js";
+import { known, learn } from "/assets/dashboard/known.js";
+
+const ASK_EVERY_MS = 5000;
+const BATCHES_BY_HOURS = { 3: 300, 24: 300, 168: 1000 };
+
+async function askNow() {
+  try {
+    const [status, latest] = await Promise.all([load("/api/v1/status"), load("/api/v1/estimates/latest")]);
+    learn({ status, latest, latestAtMs: performance.now(), isReachable: true, isRefused: false });
+    if (known.weights?.id !== latest.id || latest.id === null) learn({ weights: await load("/api/v1/weights/latest") });
+  } catch (error) {
+    learn({ isReachable: error instanceof Refused, isRefused: error instanceof Refused });
+  }
+}
+
+async function askBatches() {
+  const page = await load(`/api/v1/estimates?order=newest_first&spectra=false&limit=${BATCHES_BY_HOURS[known.hours]}`);
+  learn({ batches: page.items });
+  return page.last_cursor;
+}
+
+const askSpectra = async () => learn({ spectra: await load("/api/v1/spectra/latest") });
+
+async function askOnce() {
+  const [vehicle, reasons] = await Promise.all([load("/api/v1/vehicle"), load("/api/v1/reasons")]);
+  learn({ vehicle, reasons: new Map(reasons.items.map((told) => [told.reason, told])) });
+}
+
+async function askTruth() {
+  const path = document.body.dataset.knownLoads;
+  if (path) learn({ truth: (await load(path)).items });
+}
+
+const remembered = (record) => [record, ...known.batches.filter((batch) => batch.id !== record.id)];
+
+function onEvent(kind, record) {
+  if (kind === "provisional") {
+    learn({ early: record });
+    askNow();
+  } else if (kind === "estimate" || kind === "rejection") {
+    learn({ early: null, batches: remembered(record) });
+    Promise.all([askNow(), askSpectra(), askTruth()]).catch(giveUpUntilNext);
+  }
+}
+
+const giveUpUntilNext = (error) => console.info(error.message);
+
+/** What needs an answer before the page is whole; asked again whenever the stream comes back. */
+async function catchUp() {
+  await askNow();
+  await Promise.all([askOnce(), askSpectra(), askTruth()]);
+}
+
+/** Begins; never ends. */
+export async function feed() {
+  let cursor = null;
+  await askNow();
+  try {
+    [cursor] = await Promise.all([askBatches(), catchUp()]);
+  } catch (error) {
+    giveUpUntilNext(error);
+  }
+  setInterval(askNow, ASK_EVERY_MS);
+  let hasBeenLive = false;
+  await follow("/api/v1/stream", cursor, onEvent, (isLive) => {
+    learn({ isLive });
+    if (isLive && hasBeenLive) catchUp().catch(giveUpUntilNext);
+    hasBeenLive ||= isLive;
+  });
+}
+
+/** Looks further back, or less far. */
+export function lookBack(hours) {
+  learn({ hours });
+  askBatches().catch(giveUpUntilNext);
+}

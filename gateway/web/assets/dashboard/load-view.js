@@ -1,0 +1,72 @@
+// The load now: numbers, intervals, gauges, age.
+
+import { ageNow, known, show } from "/assets/dashboard/known.js";
+import { element, made, say, write } from "/assets/dashboard/page.js";
+import { ago, between, clock, figure, kmh, number, withStd, words } from "/assets/dashboard/words.js";
+
+const interval = (bounds, digits, unit) => (bounds == null ? "" : `95 %: ${between(bounds, digits, unit)}`);
+
+function notes(latest) {
+  const said = [];
+  if (latest.is_stale) said.push("This estimate is old: the load may have changed since.");
+  if (latest.provisional) said.push("Early value: the batch under way is not complete yet.");
+  if (latest.rejected.length) said.push(`No estimate: ${latest.rejected.map(words).join(", ")}.`);
+  return said.join(" ");
+}
+
+/** A bar over the range that calibration saw, with the interval and the value on it. */
+function gauge(id, value, bounds, seen, unit) {
+  const place = element(id);
+  if (value == null || bounds == null || seen == null) return place.replaceChildren();
+  const from = Math.min(seen[0], bounds[0]), to = Math.max(seen[1], bounds[1]);
+  const at = (x) => `${(100 * (x - from)) / (to - from)}%`;
+  const band = made("span", "", "band"), mark = made("span", "", "mark");
+  band.style.setProperty("--low", at(bounds[0]));
+  band.style.setProperty("--wide", `${(100 * (bounds[1] - bounds[0])) / (to - from)}%`);
+  mark.style.setProperty("--at", at(value));
+  return place.replaceChildren(
+    made("span", "", "track"), band, mark,
+    made("span", `${number(from, 0)} ${unit}`, "from"), made("span", `${number(to, 0)} ${unit}`, "to"),
+  );
+}
+
+function epoch(latest) {
+  const n = latest.epoch_n_batches;
+  if (!(n > 1)) return "one batch or none";
+  return `${withStd(latest.epoch_payload_kg, latest.epoch_payload_std_kg, 0, "kg")} over ${n} batches`;
+}
+
+function showAge() {
+  const age = ageNow();
+  write("age", age == null ? "unknown" : ago(age));
+}
+
+let announcedId = null;
+
+function announce(latest) {
+  if (latest.id === announcedId || latest.payload_kg == null) return;
+  const share = latest.front_share_pct == null ? "" : `, ${figure(latest.front_share_pct, 1, "%")} on the front axle`;
+  write("announcement", `Payload ${figure(latest.payload_kg, 0, "kg")}${share}.`);
+  announcedId = latest.id;
+}
+
+show(({ latest, vehicle }) => {
+  if (latest === null) return;
+  const seen = vehicle?.calibration;
+  write("payload", figure(latest.payload_kg, 0, "kg"));
+  write("payload-range", interval(latest.payload_interval95_kg, 0, "kg"));
+  gauge("payload-gauge", latest.payload_kg, latest.payload_interval95_kg, seen?.payload_seen_kg, "kg");
+  write("share", figure(latest.front_share_pct, 1, "%"));
+  write("share-range", interval(latest.front_share_interval95_pct, 1, "%"));
+  gauge("share-gauge", latest.front_share_pct, latest.front_share_interval95_pct, seen?.front_share_seen_pct, "%");
+  write("age-at", latest.t_end ? `(batch until ${clock(latest.t_end)})` : "");
+  write("epoch", epoch(latest));
+  write("speed", kmh(latest.mean_speed_mps));
+  element("latest").classList.toggle("stale", latest.is_stale);
+  say("note", notes(latest));
+  document.title = latest.payload_kg == null ? "Springscale" : `${figure(latest.payload_kg, 0, "kg")} – Springscale`;
+  showAge();
+  announce(latest);
+}, "latest", "vehicle");
+
+setInterval(() => known.latest && showAge(), 1000);

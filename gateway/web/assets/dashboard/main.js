@@ -1,0 +1,32 @@
+// The dashboard: views first, then what fills them.
+
+import "/assets/dashboard/state-view.js";
+import "/assets/dashboard/load-view.js";
+import "/assets/dashboard/van-view.js";
+import "/assets/dashboard/health-view.js";
+import "/assets/dashboard/history-view.js";
+import "/assets/dashboard/spectra-view.js";
+
+import { feed, lookBack } from "/assets/dashboard/feed.js";
+import { ask, setToken } from "/assets/dashboard/gateway.js";
+import { element } from "/assets/dashboard/page.js";
+
+element("token").addEventListener("submit", (event) => {
+  event.preventDefault();
+  setToken(element("token-text").value);
+  location.reload();
+});
+
+/** A link cannot carry the token; a question can. */
+element("export").addEventListener("click", async (event) => {
+  event.preventDefault();
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(await (await ask(element("export").href)).blob());
+  link.download = "springscale.csv";
+  link.click();
+  URL.revokeObjectURL(link.href);
+});
+
+element("span").addEventListener("change", (event) => lookBack(Number(event.target.value)));
+
+feed();

@@ -1,0 +1,33 @@
+// Small pieces of the page.
+
+export const element = (id) => document.getElementById(id);
+
+export const write = (id, text) => {
+  if (element(id).textContent !== text) element(id).textContent = text;
+};
+
+/** A new element with text, or with children. */
+export function made(name, content = "", className = "") {
+  const built = document.createElement(name);
+  built.className = className;
+  if (Array.isArray(content)) built.append(...content);
+  else built.textContent = content;
+  return built;
+}
+
+/** One term and its description, for a <dl class="pairs">. */
+export const pair = (term, text, className = "") => made("div", [made("dt", term), made("dd", text, className)]);
+
+/** A table row; the first text heads it. */
+export function row(texts, className = "") {
+  const [first, ...rest] = texts;
+  const head = made("th", first);
+  head.scope = "row";
+  return made("tr", [head, ...rest.map((text) => made("td", text))], className);
+}
+
+/** Shows a message, or hides its place. */
+export function say(id, text) {
+  write(id, text);
+  element(id).hidden = text === "";
+}

@@ -1,0 +1,82 @@
+// plotly.js, fetched after the numbers are on the page, and what all charts have in common.
+
+import { learn } from "/assets/dashboard/known.js";
+
+const CONFIG = { displayModeBar: false, responsive: true, showTips: false };
+const isTouch = matchMedia("(pointer: coarse)");
+
+let loading = null;
+
+/** Elements that stand where the library would write styles for maps, which the page's policy forbids. */
+function standIns() {
+  return document.body.dataset.chartStyles.split(" ").filter(Boolean).map((id) => {
+    const meta = document.createElement("meta");
+    meta.id = id;
+    return meta;
+  });
+}
+
+/** Resolves once the library is there; a chart that cannot come leaves its table and its words. */
+function library() {
+  loading ??= new Promise((resolve, reject) => {
+    const script = document.createElement("script");
+    script.src = document.body.dataset.chartLibrary;
+    script.onload = () => resolve(globalThis.Plotly);
+    script.onerror = () => reject(new Error("the chart library did not load"));
+    document.head.append(...standIns(), script);
+  });
+  return loading;
+}
+
+/** A colour of the page as the charts understand it, with an opacity. */
+export function colour(name, opacity = 1) {
+  const probe = document.createElement("span");
+  probe.style.color = `var(--${name})`;
+  document.body.append(probe);
+  const [red, green, blue] = getComputedStyle(probe).color.match(/[\d.]+/g);
+  probe.remove();
+  return `rgba(${red},${green},${blue},${opacity})`;
+}
+
+function axis(more = {}) {
+  return {
+    color: colour("soft"),
+    gridcolor: colour("line"),
+    linecolor: colour("line"),
+    zerolinecolor: colour("line"),
+    automargin: true,
+    fixedrange: isTouch.matches, // on a phone a finger scrolls the page
+    ...more,
+  };
+}
+
+function layout({ xaxis, yaxis, ...more }) {
+  return {
+    margin: { l: 44, r: 8, t: 6, b: 28 },
+    paper_bgcolor: "rgba(0,0,0,0)",
+    plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: "system-ui, sans-serif", size: 12, color: colour("soft") },
+    hoverlabel: { bgcolor: colour("card"), bordercolor: colour("soft"), font: { color: colour("ink") } },
+    hovermode: "closest",
+    showlegend: false,
+    dragmode: isTouch.matches ? false : "zoom",
+    xaxis: axis(xaxis),
+    yaxis: axis(yaxis),
+    ...more,
+  };
+}
+
+/** Draws or redraws a chart, once numbers are on the page. */
+export async function plot(place, traces, shape) {
+  await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+  try {
+    const plotly = await library();
+    await plotly.react(place, traces, layout(shape), CONFIG);
+    place.dataset.drawn = "yes";
+  } catch (error) {
+    console.info(error.message);
+  }
+}
+
+let palette = 0;
+document.addEventListener("themechange", () => learn({ palette: ++palette }));

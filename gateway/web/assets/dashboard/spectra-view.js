@@ -1,0 +1,108 @@
+// Spectra of the last batch, the fitted model over them, and the bands of the ratio indexes.
+
+import { show } from "/assets/dashboard/known.js";
+import { element, made, row, write } from "/assets/dashboard/page.js";
+import { colour, plot } from "/assets/dashboard/plot.js";
+import { clock, figure, number, words } from "/assets/dashboard/words.js";
+
+const PANELS = [
+  { name: "vertical_acceleration_mps2_rthz", title: "Vertical acceleration [m/s²/√Hz], log scale", bands: "acceleration_bands" },
+  { name: "pitch_rate_radps_rthz", title: "Pitch rate [rad/s/√Hz], log scale", bands: "pitch_rate_bands" },
+  { name: "coherence", title: "Coherence of the two", range: [0, 1] },
+  { name: "phase_rad", title: "Phase of pitch rate against acceleration [rad]", range: [-Math.PI, Math.PI] },
+];
+
+function panel({ name, title }) {
+  const place = made("div", "", "chart");
+  place.id = `spectra-${name}`;
+  place.setAttribute("role", "img");
+  place.setAttribute("aria-label", `${title}. The table below holds the numbers.`);
+  return made("figure", [made("figcaption", title), place]);
+}
+
+function line(spectra, name, colourName, width) {
+  return {
+    x: spectra.freq_hz,
+    y: spectra[name],
+    type: "scatter",
+    mode: "lines",
+    line: { color: colour(colourName), width },
+    hovertemplate: "%{x:.2f} Hz: %{y:.3g}<extra></extra>",
+  };
+}
+
+/** A phase that wraps is broken where it jumps, not drawn across. */
+function wrapped(trace) {
+  const y = trace.y.map((phase, n) => (n > 0 && Math.abs(phase - trace.y[n - 1]) > Math.PI ? null : phase));
+  return { ...trace, y };
+}
+
+function bandShapes(bands) {
+  return (bands ?? []).map((band, n) => ({
+    type: "rect",
+    yref: "paper",
+    x0: band.centre_hz - Math.max(band.width_hz, 0.06) / 2,
+    x1: band.centre_hz + Math.max(band.width_hz, 0.06) / 2,
+    y0: 0,
+    y1: 1,
+    line: { width: 0 },
+    fillcolor: colour("soft", 0.45),
+    label: { text: n === 0 ? "over" : "under", textposition: "top left", font: { size: 10, color: colour("soft") }, textangle: 0 },
+  }));
+}
+
+function drawPanels(told) {
+  for (const each of PANELS) {
+    const lines = [line(told.spectra, each.name, "accent", 1.8)];
+    if (told.model) lines.push(line(told.model, each.name, "model", 2.2));
+    plot(element(`spectra-${each.name}`), each.name === "phase_rad" ? lines.map(wrapped) : lines, {
+      xaxis: { title: { text: "Hz", standoff: 2 }, range: [0.5, 15] },
+      yaxis: each.range ? { range: each.range } : { type: "log", dtick: "D2", exponentformat: "none" },
+      shapes: bandShapes(told[each.bands]),
+    });
+  }
+}
+
+function caption(told) {
+  const batch = `Batch until ${clock(told.t_end)}`;
+  if (told.model) return `${batch}. Model: the calibrated vehicle with ${figure(told.payload_kg, 0, "kg")} aboard and ${figure(told.front_share_pct, 1, "%")} on its front axle.`;
+  if (told.rejected.length) return `${batch}, not weighed: ${told.rejected.map(words).join(", ")}. Without an answer there is no model.`;
+  return `${batch}. This estimator has no model of the spectra.`;
+}
+
+function drawTable(told) {
+  const kinds = told.model ? ["measured", "model"] : ["measured"];
+  const head = PANELS.flatMap(({ title }) => kinds.map((kind) => `${title}, ${kind}`));
+  const cells = ["Hz", ...head].map((text) => {
+    const cell = made("th", text);
+    cell.scope = "col";
+    return cell;
+  });
+  element("spectra-head").replaceChildren(made("tr", cells));
+  const inModel = new Map((told.model?.freq_hz ?? []).map((hz, n) => [hz, n]));
+  const short = (x) => (x == null ? "–" : Number(x.toPrecision(3)).toString());
+  element("spectra-rows").replaceChildren(...told.spectra.freq_hz.map((hz, n) => row([
+    number(hz, 2),
+    ...PANELS.flatMap(({ name }) => [
+      short(told.spectra[name][n]),
+      ...(told.model ? [short(told.model[name][inModel.get(hz)])] : []),
+    ]),
+  ])));
+}
+
+function drawLegend(told) {
+  element("spectra-legend").replaceChildren(
+    made("li", "measured", "estimate"),
+    ...(told.model ? [made("li", "fitted model", "model")] : []),
+    ...(told.acceleration_bands || told.pitch_rate_bands ? [made("li", "bands of the ratio index: over, under", "index-band band-key")] : []),
+  );
+}
+
+show(({ spectra: told }) => {
+  if (!told?.spectra) return;
+  if (!element("spectra-charts").children.length) element("spectra-charts").append(...PANELS.map(panel));
+  write("spectra-of", caption(told));
+  drawLegend(told);
+  drawPanels(told);
+  drawTable(told);
+}, "spectra", "palette");

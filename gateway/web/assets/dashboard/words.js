@@ -1,0 +1,35 @@
+// Numbers, times and names for people.
+
+export const UNKNOWN = "unknown";
+
+export function number(x, digits) {
+  const shown = Number(x.toFixed(digits)) || 0; // never a negative nought
+  return shown.toLocaleString(undefined, { minimumFractionDigits: digits, maximumFractionDigits: digits }).replace("-", "−");
+}
+
+export const figure = (x, digits, unit) => (x == null ? UNKNOWN : `${number(x, digits)} ${unit}`);
+
+export const between = (bounds, digits, unit) =>
+  bounds == null ? "" : `${number(bounds[0], digits)} to ${number(bounds[1], digits)} ${unit}`;
+
+export const withStd = (x, std, digits, unit) =>
+  x == null ? UNKNOWN : `${number(x, digits)}${std == null ? "" : ` ± ${number(1.96 * std, digits)}`} ${unit}`;
+
+export const kmh = (mps) => figure(mps == null ? null : mps * 3.6, 0, "km/h");
+
+export const clock = (iso) => new Date(iso).toLocaleString(undefined, { dateStyle: "short", timeStyle: "short" });
+
+export const words = (name) => name.replaceAll("_", " ");
+
+export function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+export function duration(seconds) {
+  if (seconds < 90) return `${Math.round(seconds)} s`;
+  if (seconds < 5400) return `${Math.round(seconds / 60)} min`;
+  if (seconds < 172800) return `${number(seconds / 3600, 1)} h`;
+  return `${Math.round(seconds / 86400)} days`;
+}
+
+export const ago = (seconds) => (seconds == null ? "never" : `${duration(seconds)} ago`);

@@ -1,0 +1,87 @@
+"""The pages' files: a policy that lets nothing foreign in, and a library that browsers fetch once."""
+
+import gzip
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support.web import Client, Gateway
+
+from gateway.web import KnownLoad
+from gateway.web.charting import LIBRARY, LIBRARY_URL
+
+TRUTH = (KnownLoad(0, 0.0, 50.0), KnownLoad(900 * 10**9, 270.0, 50.6))
+
+
+@pytest.fixture
+def client(tmp_path: Path) -> Iterator[Client]:
+    with Gateway(tmp_path) as gateway:
+        yield Client(gateway.app)
+
+
+def test_nothing_foreign_and_nothing_inline_is_allowed(client: Client) -> None:
+    for path in ("/", "/api/v1/status", "/assets/dashboard/main.js", "/nothing"):
+        policy = client.get(path).headers["content-security-policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert "http" not in policy
+
+
+def test_only_the_api_documentation_may_write_styles(client: Client) -> None:
+    answer = client.get("/docs")
+    policies = answer.headers.get_list("content-security-policy")
+    assert len(policies) == 1
+    assert "style-src 'self' 'unsafe-inline'" in policies[0]
+    assert "script-src 'self';" in policies[0]
+
+
+def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client) -> None:
+    page = client.get("/").text
+    assert re.findall(r"<script(?![^>]*\bsrc=)", page) == []
+    assert re.findall(r"<style|\sstyle=|\son[a-z]+=", page) == []
+    assert re.findall(r"(?:src|href)=\"(?!/|#)", page) == []
+
+
+def test_every_file_the_page_names_is_there(client: Client) -> None:
+    named = re.findall(r"(?:src|href|chart-library)=\"(/[^\"]*)\"", client.get("/").text)
+    assert LIBRARY_URL in named
+    assert [path for path in named if client.get(path).status_code != 200] == []
+
+
+def test_the_library_is_that_of_the_installed_package_packed_or_not(client: Client) -> None:
+    plain = client.get(LIBRARY_URL, headers={"accept-encoding": "identity"})
+    packed = client.get(LIBRARY_URL, headers={"accept-encoding": "gzip"})
+    assert plain.content == packed.content == LIBRARY.read_bytes()
+    assert packed.headers["content-encoding"] == "gzip"
+    assert "content-encoding" not in plain.headers
+    assert len(gzip.compress(plain.content, 6)) == pytest.approx(int(packed.headers["content-length"]), rel=0.01)
+
+
+def test_a_browser_keeps_the_library_and_asks_about_the_page(client: Client) -> None:
+    kept = client.get(LIBRARY_URL).headers
+    assert "immutable" in kept["cache-control"]
+    assert kept["vary"] == "accept-encoding"
+    assert client.get("/").headers["cache-control"] == "no-cache"
+    assert client.get("/assets/dashboard/main.js").headers["cache-control"] == "no-cache"
+
+
+def test_true_loads_are_told_where_they_are_known(tmp_path: Path) -> None:
+    with Gateway(tmp_path, known_loads=lambda: TRUTH) as gateway:
+        client = Client(gateway.app)
+        assert 'data-known-loads="/api/v1/known-loads"' in client.get("/").text
+        assert client.get("/api/v1/known-loads").json()["items"] == [
+            {"t_start": "1970-01-01T00:00:00.000000Z", "payload_kg": 0.0, "front_share_pct": 50.0},
+            {"t_start": "1970-01-01T00:15:00.000000Z", "payload_kg": 270.0, "front_share_pct": 50.6},
+        ]
+
+
+def test_a_service_on_the_road_has_no_true_loads(client: Client) -> None:
+    assert 'data-known-loads=""' in client.get("/").text
+    assert client.get("/api/v1/known-loads").status_code == 404
+
+
+def test_every_reason_is_told_in_words(client: Client) -> None:
+    items = client.get("/api/v1/reasons").json()["items"]
+    assert all(item["happened"] and item["advice"] for item in items)
+    assert len({item["reason"] for item in items}) == len(items)
