@@ -109,23 +109,57 @@ def _half_cars(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle, positions
     return expected_spectra(spectral_model(theta, payload_kg, share, ground, spectra.freq_hz), spectra)
 
 
-def axis_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Iterator[Finding]:
-    """What is wrong with the pitch rate beside a vertical acceleration that is right, and where the sensor sits."""
+@dataclass(frozen=True, slots=True)
+class Phases:
+    """How well the vehicle explains the phases with the pitch rate as it is, and with it turned over."""
+
+    upright: Agreement
+    turned: Agreement
+
+    @property
+    def best(self) -> float:
+        """The better of the two agreements."""
+        return max(self.upright.best, self.turned.best)
+
+    @property
+    def is_turned(self) -> bool:
+        """True where the pitch rate fits only when turned over."""
+        return self.turned.best > self.upright.best + REVERSED_BY
+
+
+def phases(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Phases:
+    """Both signs of the pitch rate beside the usual half-car."""
+    return Phases(agreement(spectra, run, vehicle), agreement(spectra.with_pitch_reversed(), run, vehicle))
+
+
+def likeliest_speed(as_read: Phases, misread: Mapping[str, Phases]) -> tuple[str | None, Phases]:
+    """The mistake of the speed's unit that explains the phases far better than none, if one does, and its phases."""
+    what = max(misread, key=lambda mistake: misread[mistake].best, default=None)
+    if what is not None and misread[what].best > as_read.best + UNIT_GAIN:
+        return what, misread[what]
+    return None, as_read
+
+
+def coherence_findings(spectra: CrossSpectra) -> Iterator[Finding]:
+    """Do the two sensors move together at all?"""
     coherence = mean_coherence(spectra)
     if coherence < LEAST_COHERENCE:
         text = f"coherence of pitch_rate and vertical_acceleration is {coherence:.2f}, usual is 0.75 and more"
         yield found(Kind.PITCH_RATE_AXIS, Severity.FAULT, text)
-        return
-    upright = agreement(spectra, run, vehicle)
-    turned = agreement(spectra.with_pitch_reversed(), run, vehicle)
-    is_turned = turned.best > upright.best + REVERSED_BY
-    yield from _scale_findings(turned if is_turned else upright, coherence)
-    if is_turned:
-        text = f"phases agree with the vehicle's by {turned.best:.2f} turned over, by {upright.best:.2f} as they are"
-        yield found(Kind.PITCH_RATE_SIGN, Severity.FAULT, text)
 
 
-def _scale_findings(seen: Agreement, coherence: float) -> Iterator[Finding]:
+def phase_findings(seen: Phases, speed_misread: str | None) -> Iterator[Finding]:
+    """Unit of the speed, unit and sign of the pitch rate beside a vertical acceleration that is right."""
+    if speed_misread is not None:
+        text = f"phases agree with the vehicle's by {seen.best:.2f} if {speed_misread}, by far less as it is"
+        yield found(Kind.SPEED_UNIT, Severity.FAULT, text)
+    yield from _scale_findings(seen.turned if seen.is_turned else seen.upright)
+    if seen.is_turned:
+        text = f"phases agree with the vehicle's by {seen.turned.best:.2f} turned over, "
+        yield found(Kind.PITCH_RATE_SIGN, Severity.FAULT, f"{text}by {seen.upright.best:.2f} as they are")
+
+
+def _scale_findings(seen: Agreement) -> Iterator[Finding]:
     if SCALE_RANGE[0] <= seen.scale <= SCALE_RANGE[1]:
         return
     text = f"pitch_rate is {seen.scale:.3g} times what a vehicle has beside this vertical acceleration"
@@ -134,7 +168,7 @@ def _scale_findings(seen: Agreement, coherence: float) -> Iterator[Finding]:
     elif UNIT_RANGE[0] <= seen.scale * DEGREES <= UNIT_RANGE[1]:
         yield found(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text}: rad/s taken for deg/s")
     else:
-        yield found(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text} (coherence {coherence:.2f})")
+        yield found(Kind.PITCH_RATE_UNIT, Severity.FAULT, text)
 
 
 def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Iterator[Finding]:
@@ -157,11 +191,3 @@ def fitted_position_m(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) ->
     at_rest = fit_half_car([KnownSpectra(run, vehicle, spectra)], loose, loose.start(0.0, 0.0))
     at = INDEX["sensor_position_m"]
     return float(at_rest.x[at]), float(np.sqrt(at_rest.covariance[at, at]))
-
-
-def speed_unit_finding(as_read: float, misread: Mapping[str, float]) -> Iterator[Finding]:
-    """Does the rear axle follow the front one at another speed? ``misread`` has the agreement for each mistake."""
-    what, best = max(misread.items(), key=lambda item: item[1], default=("", 0.0))
-    if best > as_read + UNIT_GAIN:
-        text = f"phases agree with the vehicle's by {best:.2f} if {what}, by {as_read:.2f} as it is"
-        yield found(Kind.SPEED_UNIT, Severity.FAULT, text)

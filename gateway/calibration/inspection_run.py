@@ -11,12 +11,14 @@ from gateway.calibration.inspection import Finding, RunVerdict, Severity
 from gateway.calibration.inspection_axes import (
     BELIEVED_AGREEMENT,
     SPEED_MISREAD,
-    agreement,
-    axis_findings,
+    Phases,
+    coherence_findings,
+    likeliest_speed,
     mended,
+    phase_findings,
+    phases,
     position_findings,
     reading_of,
-    speed_unit_finding,
 )
 from gateway.calibration.inspection_kinds import Kind, found
 from gateway.calibration.inspection_rows import (
@@ -67,16 +69,16 @@ def inspect_run(inspected: Inspected, vehicle: Vehicle, settings: BatchSettings)
     facts = inspected.facts
     acceleration, findings = gravity_findings(facts)
     findings.extend(rate_findings(facts, settings))
-    if not any(finding.kind is Kind.CHANNELS_SWAPPED for finding in findings):
-        findings.extend(bias_findings(facts))
     findings.extend(_speed_findings(inspected, settings))
     findings.extend(_gap_findings(inspected))
     spectra = cross_spectra_of(inspected.batches, reading_of(vehicle))
     if spectra is None:
         findings.extend(_unsteady_findings(inspected, settings))
-    else:
-        findings.extend(_excitation_findings(spectra, facts, acceleration))
+    elif acceleration.is_axis_sound:
         findings.extend(_motion_findings(spectra, inspected, vehicle, acceleration))
+        findings.extend(_excitation_findings(spectra, facts, acceleration))
+    if not {Kind.CHANNELS_SWAPPED, Kind.PITCH_RATE_UNIT} & {finding.kind for finding in findings}:
+        findings.extend(bias_findings(facts))
     findings.extend(_batch_findings(inspected, settings, has_fault=_has_fault(findings)))
     one = inspected.identification
     order = list(Severity)
@@ -90,34 +92,33 @@ def _has_fault(findings: Sequence[Finding]) -> bool:
 def _motion_findings(
     spectra: CrossSpectra, inspected: Inspected, vehicle: Vehicle, acceleration: Mended
 ) -> Iterator[Finding]:
-    """Axes, signs and units by the cross-spectra; then, if these are right, speed and place."""
-    if not acceleration.is_axis_sound:
-        return
+    """Axes, signs and units by the cross-spectra; then, if these are right, the sensor's place."""
     spectra = mended(spectra, 1.0 / acceleration.factor)
-    axes = list(axis_findings(spectra, inspected.run, vehicle))
-    yield from axes
-    if axes:
+    apart = list(coherence_findings(spectra))
+    if apart:
+        yield from apart
         return
-    as_read = agreement(spectra, inspected.run, vehicle).best
-    units = []
-    if as_read < BELIEVED_AGREEMENT:
-        units = list(speed_unit_finding(as_read, _if_speed_misread(inspected, vehicle, acceleration)))
-    yield from units or position_findings(spectra, inspected.run, vehicle)
+    as_read, misread = phases(spectra, inspected.run, vehicle), {}
+    if as_read.best < BELIEVED_AGREEMENT:
+        misread = _if_speed_misread(inspected, vehicle, acceleration)
+    speed_misread, seen = likeliest_speed(as_read, misread)
+    axes = list(phase_findings(seen, speed_misread))
+    yield from axes or position_findings(spectra, inspected.run, vehicle)
 
 
-def _if_speed_misread(inspected: Inspected, vehicle: Vehicle, acceleration: Mended) -> dict[str, float]:
-    """Agreement for each mistake of the speed's unit."""
-    best = {}
+def _if_speed_misread(inspected: Inspected, vehicle: Vehicle, acceleration: Mended) -> dict[str, Phases]:
+    """The phases for each mistake of the speed's unit."""
+    found_for = {}
     for what, factor in SPEED_MISREAD.items():
         spectra = cross_spectra_of(inspected.batches, reading_of(vehicle, factor))
         if spectra is not None:
-            best[what] = agreement(mended(spectra, 1.0 / acceleration.factor), inspected.run, vehicle).best
-    return best
+            found_for[what] = phases(mended(spectra, 1.0 / acceleration.factor), inspected.run, vehicle)
+    return found_for
 
 
 def _excitation_findings(spectra: CrossSpectra, facts: RowFacts, acceleration: Mended) -> Iterator[Finding]:
     rms_mps2 = spectra.acceleration_rms_mps2 * abs(acceleration.factor)
-    if acceleration.is_axis_sound and rms_mps2 < SMOOTH_MPS2:
+    if rms_mps2 < SMOOTH_MPS2:
         text = f"vertical acceleration is {rms_mps2:.2g} m/s2 (root mean square)"
         yield found(Kind.SMOOTH_ROAD, Severity.WARNING, text)
     low_hz, high_hz = spectra.freq_hz[1], spectra.freq_hz[-2]
@@ -136,20 +137,31 @@ def _excitation_findings(spectra: CrossSpectra, facts: RowFacts, acceleration: M
 
 
 def _speed_findings(inspected: Inspected, settings: BatchSettings) -> Iterator[Finding]:
-    """Speed missing, frozen or outside the gate: a fault where no batch is left, else a warning."""
+    """Speed missing, frozen or outside the gate: a fault where that alone leaves no batch, else a warning."""
+    if _is_too_short(inspected, settings):
+        return
     if stands_still_but_shakes(inspected.facts):
         text = "the speed reads 0 from beginning to end, the vehicle shakes as it does when driven"
         yield found(Kind.SPEED_FROZEN, Severity.FAULT, text)
         return
-    is_usable = _n_counted(inspected.identification) > 0
-    severity = Severity.WARNING if is_usable else Severity.FAULT
+    is_lost = all(batch.rejected for batch in inspected.identification.batches)
+    ruinous = 1.0 - settings.usable_share_min
     for kind, why in ((Kind.SPEED_MISSING, Why.SPEED_MISSING), (Kind.SPEED_FROZEN, Why.SPEED_FROZEN)):
         share = _share(inspected.batches, why)
         if share >= REASON_SHARE_MIN:
+            severity = Severity.FAULT if is_lost and share > ruinous else Severity.WARNING
             yield found(kind, severity, f"{share:.0%} of the drive")
     outside = _share(inspected.batches, Why.TOO_SLOW) + _share(inspected.batches, Why.TOO_FAST)
-    if not is_usable and outside >= REASON_SHARE_MIN:  # towns and stops cost time, no more
-        yield found(Kind.SPEED_OUTSIDE_GATE, severity, f"{outside:.0%} of the drive{_speeds(inspected, settings)}")
+    if is_lost and outside > ruinous:  # towns and stops cost time, no more
+        yield found(
+            Kind.SPEED_OUTSIDE_GATE, Severity.FAULT, f"{outside:.0%} of the drive{_speeds(inspected, settings)}"
+        )
+
+
+def _is_too_short(inspected: Inspected, settings: BatchSettings) -> bool:
+    """True where not even the longest stretch of the drive, or of the part that identifies, makes one batch."""
+    part = inspected.identification.batches if inspected.has_identification else inspected.batches
+    return all(batch.duration_s < settings.last_batch_share_min * settings.window_s for batch in part)
 
 
 def _speeds(inspected: Inspected, settings: BatchSettings) -> str:
@@ -183,35 +195,24 @@ def _unsteady_findings(inspected: Inspected, settings: BatchSettings) -> Iterato
 
 def _batch_findings(inspected: Inspected, settings: BatchSettings, *, has_fault: bool) -> Iterator[Finding]:
     """Whether anything is left to identify from; said in general only where nothing else says why not."""
+    batches = inspected.identification.batches
     if not inspected.has_identification:
         return
-    batches = inspected.identification.batches
-    rejected = [batch for batch in batches if batch.rejected]
-    if len(rejected) == len(batches):
-        if not has_fault:
-            yield _nothing_left(batches, settings)
-        return
-    lost = [batch for batch in rejected if Why.TOO_SHORT not in batch.rejected]  # ends of drives are no loss
-    if lost:
-        yield found(Kind.BATCHES_LOST, Severity.NOTE, f"{len(lost)} of {len(batches)} batches: {_reasons(lost)}")
-
-
-def _nothing_left(batches: Sequence[Batch], settings: BatchSettings) -> Finding:
-    if all(batch.rejected == (Why.TOO_SHORT,) for batch in batches):
+    if _is_too_short(inspected, settings):
         longest_s = max((batch.duration_s for batch in batches), default=0.0)
         needed_s = settings.last_batch_share_min * settings.window_s
         text = f"its longest unbroken stretch lasts {longest_s:.0f} s, a batch needs {needed_s:.0f} s"
-        return found(Kind.TOO_SHORT, Severity.FAULT, text)
-    return found(Kind.NO_USABLE_BATCH, Severity.FAULT, f"{len(batches)} batches: {_reasons(batches)}")
+        yield found(Kind.TOO_SHORT, Severity.FAULT, text)
+    elif all(batch.rejected for batch in batches):
+        if not has_fault:
+            yield found(Kind.NO_USABLE_BATCH, Severity.FAULT, f"{len(batches)} batches: {_reasons(batches)}")
+    elif lost := [one for one in batches if one.rejected and Why.TOO_SHORT not in one.rejected]:  # ends are no loss
+        yield found(Kind.BATCHES_LOST, Severity.NOTE, f"{len(lost)} of {len(batches)} batches: {_reasons(lost)}")
 
 
 def _reasons(batches: Sequence[Batch]) -> str:
     names = [str(why) for batch in batches for why in batch.rejected]
     return ", ".join(f"{name} ({names.count(name)})" for name in dict.fromkeys(names))
-
-
-def _n_counted(run: KnownRun) -> int:
-    return sum(not batch.rejected for batch in run.batches)
 
 
 def _share(batches: Sequence[Batch], why: Why) -> float:
