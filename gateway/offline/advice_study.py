@@ -18,7 +18,8 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
-from gateway.offline.known_runs import OnRun, SplitRun, split_runs
+from gateway.offline.inspect import inspect
+from gateway.offline.known_runs import OnRun, SplitRun
 from gateway.offline.plan import usual_drive
 from gateway.offline.trials import calibrated_on, judged_all
 
@@ -34,8 +35,11 @@ def advice_study(
     on_run: OnRun = lambda done, of: None,
     on_fit: OnFit = lambda done, of: None,
 ) -> AdviceStudy:
-    """Reads the campaign's logs, then tries. Raises CalibrationImpossibleError as :func:`advice_of`."""
-    split = split_runs(campaign, settings, on_run=on_run)
+    """Reads the logs, leaves out runs with a fault, then tries.
+
+    Raises CalibrationImpossibleError as :func:`advice_of`.
+    """
+    split = inspect(campaign, settings, on_run=on_run).usable
     return advice_of(split, campaign.vehicle, name=campaign.vehicle.name, on_fit=on_fit)
 
 

@@ -22,7 +22,8 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
-from gateway.offline.known_runs import OnRun, SplitRun, split_runs
+from gateway.offline.inspect import inspect
+from gateway.offline.known_runs import OnRun, SplitRun
 from gateway.offline.trials import calibrated_on, judged_all
 
 OnTrial = Callable[[int, int], None]  # (trials done, trials in all)
@@ -42,8 +43,11 @@ def learning_curve(
     on_run: OnRun = lambda done, of: None,
     on_trial: OnTrial = lambda done, of: None,
 ) -> LearningCurve:
-    """Reads the campaign's logs once, then tries. Raises CalibrationImpossibleError with fewer than three runs."""
-    split = split_runs(campaign, settings, on_run=on_run)
+    """Reads the logs, leaves out runs with a fault, then tries.
+
+    Raises CalibrationImpossibleError with fewer than three runs.
+    """
+    split = inspect(campaign, settings, on_run=on_run).usable
     return curve_of(
         split,
         campaign.vehicle,
