@@ -13,10 +13,10 @@ from gateway.calibration.file import CalibrationFile
 from gateway.cli.inspection_text import inspection_json, inspection_sentences
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
 from gateway.cli.plan_text import plan_sentences
-from gateway.cli.progress import bar
+from gateway.cli.progress import bar, counted
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError
-from gateway.offline.calibrate import calibrate_inspected
+from gateway.offline.calibrate import Outcome, calibrate_inspected
 from gateway.offline.inspect import Inspection, inspect
 from gateway.offline.plan import Plan, plan_first, plan_next
 from gateway.records import json_line
@@ -29,6 +29,7 @@ from gateway.records import json_line
 @click.option("--runs", "numbers", type=RunNumbers(), default=None, help="these runs only, counted from 1: 1,5,10")
 @click.option("--plan", "wants_plan", is_flag=True, help="advise which load to drive next; [vehicle] alone is enough")
 @click.option("--check", "only_checks", is_flag=True, help="inspect the drives and write nothing; exits 1 on a refusal")
+@click.option("--report", type=FILE, default=None, help="directory to write a report into: report.html, figures")
 @window
 @as_json
 def calibrate(
@@ -38,6 +39,7 @@ def calibrate(
     numbers: tuple[int, ...] | None,
     wants_plan: bool,
     only_checks: bool,
+    report: Path | None,
     window_s: float | None,
     as_json: bool,
 ) -> None:
@@ -61,6 +63,8 @@ def calibrate(
     found = outcome.file
     if output is not None:
         output.write_text(found.to_json(), encoding="utf-8")
+    if report is not None:
+        _report(report, loaded, outcome)
     next_runs = plan_next(outcome, loaded.vehicle) if wants_plan else None
     if as_json:
         summary = _summary(found, output, next_runs) | {"inspection": inspection_json(inspection)}
@@ -78,6 +82,14 @@ def _inspect(campaign: Campaign, numbers: Sequence[int] | None, window_s: float 
             numbers=numbers,
             on_run=lambda done, of: progress.update(done - progress.pos),
         )
+
+
+def _report(directory: Path, campaign: Campaign, outcome: Outcome) -> None:
+    from gateway.reports.calibration_report import write_calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
+
+    with counted("judging and drawing") as on_chart:
+        written = write_calibration_report(directory, campaign, outcome, on_chart)
+    click.echo(str(written), err=True)
 
 
 def _summary(found: CalibrationFile, output: Path | None, plan: Plan | None) -> dict[str, object]:

@@ -5,13 +5,13 @@ from typing import Any
 
 import click
 
-from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file import load_calibration
+from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.evaluation import Judged, error_table
+from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
-from gateway.cli.progress import bar
+from gateway.cli.progress import bar, counted
 from gateway.errors import ConfigurationError
-from gateway.offline.calibrate import Split
-from gateway.offline.calibrate import evaluate as judge_campaign
+from gateway.offline.calibrate import Split, judge_campaign
 from gateway.records import json_line
 
 
@@ -20,10 +20,17 @@ from gateway.records import json_line
 @click.option("--calibration", type=FILE, required=True, help="calibration file")
 @one_estimator
 @click.option("--split", type=click.Choice(["identification", "validation", "all"]), default="validation")
+@click.option("--report", type=FILE, default=None, help="directory to write a report into: report.html, figures")
 @window
 @as_json
 def evaluate(
-    campaign: Path, calibration: Path, estimator: str | None, split: Split, window_s: float | None, as_json: bool
+    campaign: Path,
+    calibration: Path,
+    estimator: str | None,
+    split: Split,
+    report: Path | None,
+    window_s: float | None,
+    as_json: bool,
 ) -> None:
     """Hold estimates against the known loads of CAMPAIGN."""
     loaded, held = load_campaign(campaign), load_calibration(calibration)
@@ -31,7 +38,7 @@ def evaluate(
     if chosen not in held.estimators:
         raise ConfigurationError(f"{calibration}: holds no calibration for {chosen}, only {', '.join(held.estimators)}")
     with bar(len(loaded.runs), "reading drives") as progress:
-        table = judge_campaign(
+        judged = judge_campaign(
             loaded,
             held.for_core(),
             batch_settings(window_s),
@@ -39,7 +46,22 @@ def evaluate(
             split=split,
             on_run=lambda done, of: progress.update(done - progress.pos),
         )
+    table = error_table(judged, loaded.vehicle, chosen)
     click.echo(json_line(table) if as_json else _table(table))
+    if report is not None:
+        _report(report, loaded, held, chosen, split, judged)
+
+
+def _report(
+    directory: Path, campaign: Campaign, held: CalibrationFile, estimator: str, split: Split, judged: list[Judged]
+) -> None:
+    from gateway.reports import calibration_evidence, calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
+
+    part = calibration_evidence.Part(split)
+    evidence = calibration_evidence.evidence_of_evaluation(campaign, held, estimator, part, judged)
+    with counted("drawing") as on_chart:
+        written = calibration_report.write_evaluation_report(directory, evidence, on_chart)
+    click.echo(str(written), err=True)
 
 
 def _table(table: dict[str, Any]) -> str:

@@ -2,7 +2,8 @@
 
 import sys
 import time
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
 from typing import Any, Final
 
@@ -35,3 +36,15 @@ class StatusLine(AbstractContextManager["StatusLine"]):
         """Leave an empty line for what comes next."""
         if self._is_shown:
             click.echo("\r\x1b[K", err=True, nl=False)
+
+
+@contextmanager
+def counted(label: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar for work that tells its own length: call it with (steps done, steps in all)."""
+    with bar(1, label) as progress:
+
+        def on_step(done: int, of: int) -> None:
+            progress.length = of
+            progress.update(done - progress.pos)
+
+        yield on_step

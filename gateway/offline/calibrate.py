@@ -200,6 +200,23 @@ def evaluate(
 ) -> dict[str, Any]:
     """The error table of (12) over one part of every run, normalised by the campaign's ranges.
 
+    Raises as :func:`judge_campaign` does.
+    """
+    judged = judge_campaign(campaign, calibrated, settings, estimator=estimator, split=split, on_run=on_run)
+    return error_table(judged, campaign.vehicle, estimator)
+
+
+def judge_campaign(
+    campaign: Campaign,
+    calibrated: CalibratedVehicle,
+    settings: BatchSettings,
+    *,
+    estimator: str,
+    split: Split = "validation",
+    on_run: OnRun = lambda done, of: None,
+) -> list[Judged]:
+    """Every batch of one part of every run with its estimate.
+
     Raises CalibrationImpossibleError where that part holds no batch, for then there is nothing to judge.
     """
     runs = split_runs(campaign, settings, on_run=on_run)
@@ -209,7 +226,7 @@ def evaluate(
             f"{campaign.path}: the {split} part of its runs holds no batch: identification_fraction "
             f"{campaign.identification_fraction:g} and the runs' split leave nothing to evaluate"
         )
-    return error_table(judged, campaign.vehicle, estimator)
+    return judged
 
 
 def _parts(run: SplitRun, split: Split) -> list[KnownRun]:

@@ -12,7 +12,7 @@ from gateway.core.likelihood import Point, Whittle
 from gateway.core.modelled_spectra import Fitted, modelled_spectra
 from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Vehicle
-from gateway.records import C128, F64, Batch, Spectra
+from gateway.records import C128, F64, Spectra
 from gateway.reports.calibration_knowledge import knowledge_chart, knowledge_of, knowledge_table, told
 from gateway.reports.chart import Axis, Chart, Line, Panel, Section, Table
 
@@ -41,7 +41,7 @@ def fits_of(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration) -> 
         measured = _joined([spectra for batch in batches if (spectra := spectra_of(batch)) is not None])
         if cross is None or measured is None:
             continue
-        at_truth = Fitted(run.payload_kg, run.front_share_pct, *_delay_s(batches, calibration.wheelbase_m))
+        at_truth = Fitted(run.payload_kg, run.front_share_pct, cross.delay_mean_s, cross.delay_std_s)
         point = Point(calibration.parameters, run.payload_kg, run.front_share_pct / 100.0)
         misfit = Whittle(cross, calibration.ground).misfit(point)
         fits.append(Fit(run, measured, modelled_spectra(measured, calibration, at_truth), misfit))
@@ -71,12 +71,6 @@ def _cross(part: Spectra) -> C128:
     magnitude = part.vertical_acceleration * part.pitch_rate * np.sqrt(part.coherence)
     cross: C128 = magnitude * np.exp(1j * part.phase_rad)
     return cross
-
-
-def _delay_s(batches: Sequence[Batch], wheelbase_m: float) -> tuple[float, float]:
-    """Mean time from axle to axle and its standard deviation, over all usable samples."""
-    delays_s = wheelbase_m / np.concatenate([batch.speed_mps[batch.usable] for batch in batches])
-    return float(delays_s.mean()), float(delays_s.std())
 
 
 def half_car_section(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration, vehicle: Vehicle) -> Section:

@@ -65,7 +65,8 @@ def knowledge_chart(known: Sequence[Known]) -> Chart:
     return Chart(
         "identifiability",
         "Standard deviation of every parameter after calibration, in percent of what it was before. Left: the data "
-        "told it; at 100 % they said nothing and the prior stands.",
+        "told it; at 100 % they said nothing and the prior stands. Slack: power of a "
+        "sensor (acceleration a, pitch rate g) that does not come through the modelled path.",
         "Identifiability: share of the prior standard deviation left over after calibration, parameter by parameter.",
         panels,
         n_columns=3,
@@ -82,7 +83,8 @@ def _panel(title: str, members: Sequence[Known]) -> Panel:
 
 def _short(name: str) -> str:
     stem, _, unit = name.rpartition("_")
-    return (stem if unit in _UNITS else name).replace("spring_bend_", "").replace("_per", "").replace("slack_", "")
+    plain = (stem if unit in _UNITS else name).replace("spring_bend_", "").replace("_per", "").replace("slack_", "")
+    return plain.replace("acceleration_", "a ").replace("pitch_rate_", "g ").replace("_", " ")
 
 
 _UNITS: Final = {"npm", "nspm", "kg", "kgm2", "m2", "m", "kn", "s"}

@@ -25,6 +25,7 @@ class Page:
     title: str
     subtitle: str
     verdicts: tuple[Verdict, ...]
+    in_short: str
     next_run: str | None
     sections: tuple[Section, ...]
     live: dict[str, str]
@@ -52,22 +53,27 @@ def _asset(name: str) -> str:
 
 def _verdict(page: Page) -> str:
     best = page.verdicts[0]
-    others = "".join(_reasons(verdict) for verdict in page.verdicts)
+    several = ", the better of two here" if len(page.verdicts) > 1 else ""
     next_run = f"<h3>What to drive next</h3><p>{escape(page.next_run)}</p>" if page.next_run else ""
     return (
-        f'<section id="verdict" class="{best.grade}"><h2><span aria-hidden="true">{_GRADE_MARK[best.grade]}</span> '
-        f"{GRADE_TEXT[best.grade]}</h2><p>By the {escape(estimator_name(best.estimator))}, the better one here.</p>"
-        f"{next_run}{others}</section>"
+        f'<section id="verdict" class="{best.grade}"><h2>{_mark(best.grade)} {GRADE_TEXT[best.grade]}</h2>'
+        f"<p>By the {escape(estimator_name(best.estimator))}{several}. {escape(page.in_short)}</p>{next_run}"
+        f"{''.join(_reasons(verdict) for verdict in page.verdicts)}</section>"
     )
 
 
 def _reasons(verdict: Verdict) -> str:
     rows = "".join(
-        f'<li class="{reason.grade}"><strong>{GRADE_TEXT[reason.grade]}:</strong> {escape(reason.text)}</li>'
+        f'<li class="{reason.grade}">{_mark(reason.grade)} <span class="unseen">{GRADE_TEXT[reason.grade]}: </span>'
+        f"{escape(reason.text)}</li>"
         for reason in verdict.reasons
     )
     name = estimator_name(verdict.estimator)
     return f'<h3>{escape(name.capitalize())}: {GRADE_TEXT[verdict.grade].lower()}</h3><ul class="reasons">{rows}</ul>'
+
+
+def _mark(grade: Grade) -> str:
+    return f'<span class="mark" aria-hidden="true">{_GRADE_MARK[grade]}</span>'
 
 
 def _section(section: Section, live: dict[str, str]) -> str:

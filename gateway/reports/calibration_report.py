@@ -7,7 +7,7 @@ The directory is whole: the page fetches nothing from elsewhere, and reads witho
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,30 +15,34 @@ from gateway.calibration.campaign import Campaign
 from gateway.offline.calibrate import Outcome
 from gateway.offline.plan import Plan, plan_next
 from gateway.reports.calibration_accuracy import accuracy_section
-from gateway.reports.calibration_evidence import Evidence, evidence_of_calibration
+from gateway.reports.calibration_evidence import PART_NAMES, Evidence, evidence_of_calibration
 from gateway.reports.calibration_half_car import half_car_section
 from gateway.reports.calibration_page import Page, page_html
 from gateway.reports.calibration_ratio_index import ratio_index_section
 from gateway.reports.calibration_runs import best_next, plan_section, provenance_section, runs_section
 from gateway.reports.calibration_spectra import spectra_section
-from gateway.reports.calibration_text import span
+from gateway.reports.calibration_text import shown, span
 from gateway.reports.calibration_verdict import Verdict, verdicts_of
 from gateway.reports.chart import Chart, Section
 from gateway.reports.chart_live import plotly_json, plotly_script
 from gateway.reports.chart_still import save_still
 
+OnChart = Callable[[int, int], None]  # (charts drawn, charts in all)
 
-def write_calibration_report(directory: Path, campaign: Campaign, outcome: Outcome) -> Path:
+
+def write_calibration_report(
+    directory: Path, campaign: Campaign, outcome: Outcome, on_chart: OnChart = lambda done, of: None
+) -> Path:
     """Everything known of a calibration; the path of report.html."""
     evidence = evidence_of_calibration(campaign, outcome)
     plan = plan_next(outcome, campaign.vehicle) if outcome.cross_spectrum else None
     sections = [*_calibration_sections(outcome, campaign, plan), *_evaluation_sections(evidence)]
-    return _write(directory, evidence, sections, plan)
+    return _write(directory, evidence, sections, plan, on_chart)
 
 
-def write_evaluation_report(directory: Path, evidence: Evidence) -> Path:
+def write_evaluation_report(directory: Path, evidence: Evidence, on_chart: OnChart = lambda done, of: None) -> Path:
     """How a calibration did on a campaign; the path of report.html."""
-    return _write(directory, evidence, _evaluation_sections(evidence), None)
+    return _write(directory, evidence, _evaluation_sections(evidence), None, on_chart)
 
 
 def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: Plan | None) -> Iterator[Section]:
@@ -60,15 +64,18 @@ def _evaluation_sections(evidence: Evidence) -> list[Section]:
     return [*(accuracy_section(judgement) for judgement in evidence.judgements), provenance_section(evidence)]
 
 
-def _write(directory: Path, evidence: Evidence, sections: list[Section], plan: Plan | None) -> Path:
+def _write(directory: Path, evidence: Evidence, sections: list[Section], plan: Plan | None, on_chart: OnChart) -> Path:
+    directory.mkdir(parents=True, exist_ok=True)
     charts = list(_charts(sections))
-    for chart in charts:
+    for done, chart in enumerate(charts, 1):
         save_still(chart, directory / "figures")
+        on_chart(done, len(charts))
     verdicts = verdicts_of(evidence)
     page = Page(
         evidence.title,
         _subtitle(evidence),
         verdicts,
+        _in_short(evidence, verdicts[0]),
         best_next(plan) if plan else None,
         tuple(sections),
         {chart.name: plotly_json(chart) for chart in charts},
@@ -93,6 +100,20 @@ def _subtitle(evidence: Evidence) -> str:
     return (
         f"Calibrated on {len(evidence.file.provenance.runs)} runs: payloads of {span(*seen.payload_kg, 'kg')}, front "
         f"shares of {span(*seen.front_share_pct, '%', 1)}, {speeds}. {evidence.file.id}"
+    )
+
+
+def _in_short(evidence: Evidence, best: Verdict) -> str:
+    """What a fitter wants to know in a sentence."""
+    judgement = next(one for one in evidence.judgements if one.estimator == best.estimator)
+    if judgement.unseen is None:
+        return "How well it weighs is not known: nothing was held back to judge by."
+    table = judgement.tables[judgement.unseen]
+    payload, share = table["payload"], table["front_share"]
+    return (
+        f"Over the {PART_NAMES[judgement.unseen]} it weighs payloads to {shown(payload['mean_abs_kg'], ' kg', 1)} on "
+        f"average and {shown(payload['max_abs_kg'], ' kg', 1)} at worst, front shares to "
+        f"{shown(share['mean_abs_pp'], ' pp')} and {shown(share['max_abs_pp'], ' pp')}."
     )
 
 

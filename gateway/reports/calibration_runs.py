@@ -1,53 +1,57 @@
 """What was driven and whether it was sound, what to drive next, and where every number comes from."""
 
-from gateway.calibration.inspection import RunVerdict
+from gateway.calibration.inspection import Finding, RunVerdict
 from gateway.offline.calibrate import Outcome
 from gateway.offline.known_runs import SplitRun
 from gateway.offline.plan import Advice, Expected, Plan
+from gateway.records import Why
 from gateway.reports.calibration_evidence import Evidence
 from gateway.reports.calibration_text import NONE, percent, shown, span
 from gateway.reports.chart import Section, Table
 
 
 def runs_section(outcome: Outcome) -> Section:
-    """Every run with its verdict; what was found of it, and what to do."""
-    verdicts = {verdict.number: verdict for verdict in outcome.verdicts}
-    rows = tuple(_run_row(one, verdicts.get(one.identification.number)) for one in outcome.split)
-    columns = ("Run", "log", "payload", "front share", "identify", "validate", "refused", "verdict")
-    tables = (Table("Runs: batches that identify, that validate, and that no estimator can use", columns, rows),)
-    findings = _findings_table(outcome.verdicts)
-    return Section("runs", "Runs", (), (), (*tables, *((findings,) if findings else ())))
+    """Every run with its verdict; what was found of it, of all of them, and what to do."""
+    driven = {one.identification.number: one for one in outcome.split}
+    rows = tuple(_run_row(verdict, driven.get(verdict.number)) for verdict in outcome.verdicts)
+    columns = ("Run", "log", "verdict", "payload", "front share", "identify", "validate", "refused")
+    caption = "Runs: batches that identify, that validate, and that no estimator can use"
+    findings = _findings_table(outcome)
+    return Section("runs", "Runs", (), (), (Table(caption, columns, rows), *((findings,) if findings else ())))
 
 
-def _run_row(one: SplitRun, verdict: RunVerdict | None) -> tuple[str, ...]:
-    run, batches = one.identification, [*one.identification.batches, *one.validation.batches]
+def _run_row(verdict: RunVerdict, driven: SplitRun | None) -> tuple[str, ...]:
+    if driven is None:
+        return (str(verdict.number), verdict.name, _verdict(verdict), *(NONE,) * 5)
+    run, batches = driven.identification, [*driven.identification.batches, *driven.validation.batches]
+    refused = [b for b in batches if b.rejected and Why.TOO_SHORT not in b.rejected]  # a run's last piece is no batch
     return (
         str(run.number),
         run.name,
+        _verdict(verdict),
         f"{run.payload_kg:g} kg",
         f"{run.front_share_pct:.1f} %",
-        *(str(sum(not batch.rejected for batch in part.batches)) for part in (one.identification, one.validation)),
-        str(sum(bool(batch.rejected) for batch in batches)),
-        _verdict(verdict),
+        *(str(sum(not batch.rejected for batch in part.batches)) for part in (run, driven.validation)),
+        str(len(refused)),
     )
 
 
-def _verdict(verdict: RunVerdict | None) -> str:
-    if verdict is None:
-        return NONE
+def _verdict(verdict: RunVerdict) -> str:
     if not verdict.findings:
         return "sound"
-    worst = "cannot be used" if not verdict.is_usable else "usable"
-    return f"{worst}: {', '.join(finding.kind.replace('_', ' ') for finding in verdict.findings)}"
+    judged = "usable" if verdict.is_usable else "cannot be used"
+    return f"{judged}: {', '.join(_spoken(finding) for finding in verdict.findings)}"
 
 
-def _findings_table(verdicts: tuple[RunVerdict, ...]) -> Table | None:
-    rows = tuple(
-        (str(verdict.number), str(finding.severity), finding.text, finding.advice)
-        for verdict in verdicts
-        for finding in verdict.findings
-    )
-    columns = ("Run", "weight", "what was found", "what to do")
+def _spoken(finding: Finding) -> str:
+    return finding.kind.replace("_", " ")
+
+
+def _findings_table(outcome: Outcome) -> Table | None:
+    found = [("all", finding) for finding in outcome.campaign_findings]
+    found += [(str(verdict.number), finding) for verdict in outcome.verdicts for finding in verdict.findings]
+    rows = tuple((run, str(one.severity), _spoken(one), one.text, one.advice) for run, one in found)
+    columns = ("Run", "weight", "what", "as found", "what to do")
     return Table("What was found of the runs", columns, rows) if rows else None
 
 

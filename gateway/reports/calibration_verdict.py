@@ -12,6 +12,7 @@ from gateway.calibration.coverage import PROMISED, coverage_of
 from gateway.calibration.evaluation import Judged
 from gateway.calibration.inspection import RunVerdict, Severity
 from gateway.config import ESTIMATOR_NAMES
+from gateway.offline.calibrate import Outcome
 from gateway.reports.calibration_evidence import PART_NAMES, Evidence, Judgement, Part
 
 FIT_ERROR_PCT: Final = 10.0  # of the range (12)
@@ -70,8 +71,8 @@ def _unseen_error_pct(judgement: Judgement) -> float:
 
 
 def _verdict(evidence: Evidence, judgement: Judgement) -> Verdict:
-    of_runs = _runs(evidence.outcome.verdicts) if evidence.outcome else None
-    reasons = [*_errors_and_intervals(judgement), of_runs, *_warnings(evidence.file.warnings, judgement.estimator)]
+    driven = [_runs(evidence.outcome.verdicts), *_campaign(evidence.outcome)] if evidence.outcome else []
+    reasons = [*_errors_and_intervals(judgement), *driven, *_warnings(evidence, judgement.estimator)]
     return Verdict(judgement.estimator, tuple(reason for reason in reasons if reason is not None))
 
 
@@ -169,11 +170,21 @@ _WARNING_TEXT: Final[Mapping[str, str]] = {
 }
 
 
-def _warnings(warnings: Sequence[str], estimator: str) -> list[Reason]:
-    """Those of the file, but for what was said of another estimator ("name: why it could not be calibrated")."""
+def _warnings(evidence: Evidence, estimator: str) -> list[Reason]:
+    """Those of the file, but for what was said of another estimator or is told from the drives themselves."""
     others = tuple(f"{name}: " for name in ESTIMATOR_NAMES if name != estimator)
-    concerning = [one for one in warnings if not one.startswith(others)]
-    return [Reason("warning", Grade.RESERVED, _WARNING_TEXT.get(one, one)) for one in concerning]
+    findings = evidence.outcome.campaign_findings if evidence.outcome else ()
+    told = tuple(f"{finding.kind}: " for finding in findings) + (("run ",) if evidence.outcome else ())
+    left_over = [one for one in evidence.file.warnings if not one.startswith((*others, *told))]
+    return [Reason("warning", Grade.RESERVED, _WARNING_TEXT.get(one, one)) for one in left_over]
+
+
+def _campaign(outcome: Outcome) -> list[Reason]:
+    return [
+        Reason(str(finding.kind), Grade.RESERVED, f"{finding.kind.replace('_', ' ').capitalize()}: {finding.text}.")
+        for finding in outcome.campaign_findings
+        if finding.severity is not Severity.NOTE
+    ]
 
 
 def _runs(verdicts: Sequence[RunVerdict]) -> Reason | None:

@@ -34,7 +34,7 @@ def live(chart: Chart) -> go.Figure:
         rows=chart.n_rows,
         cols=chart.n_columns,
         subplot_titles=[panel.title for panel in chart.panels],
-        horizontal_spacing=0.24 / chart.n_columns if chart.n_columns > 1 else 0.0,
+        horizontal_spacing=0.27 / chart.n_columns if chart.n_columns > 1 else 0.0,
         vertical_spacing=_GAP_PX / height_px if chart.n_rows > 1 else 0.0,
     )
     seen: set[str] = set()
@@ -83,6 +83,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
         "range": limits,
         "automargin": True,
         "zeroline": False,
+        **({"dtick": "D2"} if axis.is_log else {}),  # labels at 1, 2 and 5
         **(places if axis.places else {}),
     }
 
@@ -95,11 +96,11 @@ def _add_shape(figure: go.Figure, mark: Rule | Span, named: dict[str, Any], plac
     colour = COLOURS[mark.colour]
     if isinstance(mark, Span):
         filled = {"fillcolor": colour, "opacity": 0.3, "line_width": 0, "layer": "below"}
-        figure.add_vrect(x0=mark.low, x1=mark.high, **filled, **named, **place)
+        figure.add_vrect(x0=mark.low, x1=mark.high, exclude_empty_subplots=False, **filled, **named, **place)
     else:
         drawn = {"line_color": colour, "line_dash": mark.dash, "line_width": 1.2}
         add = figure.add_vline if mark.is_vertical else figure.add_hline
-        add(mark.at, **drawn, **named, **place)
+        add(mark.at, exclude_empty_subplots=False, **drawn, **named, **place)
 
 
 def _place_colour_bar(figure: go.Figure, mark: Mark, number: int) -> None:

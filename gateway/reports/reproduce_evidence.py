@@ -10,7 +10,8 @@ import numpy as np
 
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.evaluation import Judged, error_table
-from gateway.calibration.ratio_index_fit import N_SEGMENT, fit_regression
+from gateway.calibration.ratio_index_fit import N_SEGMENT
+from gateway.calibration.regression_fit import fit_regression
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import ESTIMATORS
 from gateway.core.known_run import KnownRun

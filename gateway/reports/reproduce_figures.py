@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gateway.calibration.evaluation import Judged
-from gateway.calibration.ratio_index_fit import N_SEGMENT, fit_regression
+from gateway.calibration.ratio_index_fit import N_SEGMENT
+from gateway.calibration.regression_fit import fit_regression
 from gateway.core.known_run import KnownRun
 from gateway.core.ratio_index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum
 from gateway.core.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
