@@ -196,7 +196,7 @@ def test_the_pages_load_nothing_from_elsewhere(client: Client) -> None:
     for page in ("/", "/docs"):
         answer = client.get(page)
         assert answer.headers["content-type"].startswith("text/html")
-        loaded = re.findall(r'(?:src|href)="([^"]+)"', answer.text)
+        loaded = re.findall(r'(?:src|href)="([^"#]+)"', answer.text)
         assert loaded
         for address in loaded:
             assert address.startswith("/")
