@@ -19,6 +19,8 @@ from gateway.records import json_line
 
 PATH: Final = "/api/v1/calibration/tare"
 TIMEOUT_S: Final = 15.0
+CLEAR_STDS: Final = 2.0  # an offset of more standard deviations than this speaks for a drift
+QUANTITIES: Final = (("payload", "kg"), ("front_share", "pct"))
 EVERYWHERE: Final = frozenset({"0.0.0.0", "::"})
 
 Command = Callable[..., None]
@@ -154,11 +156,17 @@ def _state_text(state: dict[str, Any]) -> str:
     if offer["is_possible"]:
         zero = offer["zero"]
         span = f"{zero['t_start'][:19]}Z to {zero['t_end'][:19]}Z"
-        lines.append(f"a tare now would take off {_zero_text(zero)}, weighed {span}")
+        lines.append(f"a tare now would take off {_zero_text(zero)}, weighed {span}{_advice(zero)}")
     else:
         lines.append(f"no tare now ({offer['reason']}): {offer['detail']}")
     lines += [f"  {_tare_text(entry)}{_end_text(entry['ended'])}" for entry in state["history"]]
     return "\n".join(lines)
+
+
+def _advice(zero: dict[str, Any]) -> str:
+    """A zero that is not clearly away from none corrects nothing, and its uncertainty stays in every answer."""
+    is_clear = any(abs(zero[f"{what}_{unit}"]) > CLEAR_STDS * zero[f"{what}_std_{unit}"] for what, unit in QUANTITIES)
+    return "" if is_clear else "; that is within its own uncertainty: nothing speaks for a drift"
 
 
 def _tare_text(entry: dict[str, Any]) -> str:

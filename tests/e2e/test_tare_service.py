@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -131,6 +132,15 @@ def stored(config: Path) -> list[str]:
         store.close()
 
 
+def events(config: Path) -> list[str]:
+    """What happened to the service, newest first."""
+    store = Store.open(load_settings(config).store.directory)
+    try:
+        return [event.kind for event in store.reader().events()]
+    finally:
+        store.close()
+
+
 def counted(texts: list[str]) -> list[str]:
     return [text for text in texts if not json.loads(text)["rejected"]]
 
@@ -163,6 +173,7 @@ def test_a_tare_counts_from_the_next_batch_survives_a_restart_and_is_undone(conf
         assert (offer["zero"]["payload_kg"], offer["zero"]["n_batches"]) == (12.0, 2)
         made.update(service.told("set", "--empty", "--note", "yard"))
         assert "+12.0" in service.tare("show").output
+        assert httpx.get(f"{service.gateway.url}/api/v1/status").json()["tare_id"] == made["id"]
         service.play(logs[1])
 
     def second_run(service: Running) -> None:
@@ -190,6 +201,7 @@ def test_a_tare_counts_from_the_next_batch_survives_a_restart_and_is_undone(conf
         )
         assert record["tare_id"] == made["id"]
     assert [json.loads(text)["id"] for text in found[:2]] == made["batch_ids"]
+    assert [kind for kind in events(config) if kind.startswith("tare")] == ["tare_undone", "tare_set"]
     assert estimated(config, *logs) == raw  # undone: the factory zero again, byte for byte
 
 

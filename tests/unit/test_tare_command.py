@@ -40,7 +40,9 @@ def url(tmp_path: Path, tokens: TokenFile, pipeline: FakePipeline) -> Iterator[s
         yield server.url
 
 
-def test_set_show_and_undo_with_a_token_from_the_environment(url: str, tokens: TokenFile) -> None:
+def test_set_show_and_undo_with_a_token_from_the_environment(
+    url: str, tokens: TokenFile, pipeline: FakePipeline
+) -> None:
     token = tokens.create("workshop", Scope.OPERATE)
     made = run("set", "--empty", "--note", "yard", "--url", url, SPRINGSCALE_TOKEN=token)
     assert made.exit_code == 0, made.exception
@@ -49,6 +51,9 @@ def test_set_show_and_undo_with_a_token_from_the_environment(url: str, tokens: T
     shown = run("show", "--url", url + "/", "--token", token)
     assert shown.output.splitlines()[0] == "in use: " + made.output.strip()
     assert "a tare now would take off +12.0 ± 5.0 kg" in shown.output
+    assert "nothing speaks for a drift" not in shown.output
+    pipeline.weigh(9.0, share_pct=50.5)
+    assert "nothing speaks for a drift" in run("show", "--url", url, "--token", token).output
     undone = run("undo", "--url", url, "--token", token, "--json")
     assert json.loads(undone.output)["active"] is None
     assert "undone" in run("show", "--url", url, "--token", token).output
