@@ -1,6 +1,6 @@
 """Many batches of many vehicles in one table: errors (12), refusals and coverage, a line for each kind of drive."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
@@ -12,6 +12,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.records import Why
 
 ALL_KINDS: Final = "all"
+HALF_AN_ANSWER: Final = "no_front_share"  # where an estimator is calibrated for the payload alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +26,16 @@ class JudgedBatch:
     run: str
     kind: str
     estimator: str
-    is_rejected: bool
+    rejected: tuple[str, ...]
     payload_error_pct: float
     front_share_error_pct: float
     is_payload_covered: bool
     is_front_share_covered: bool
+
+    @property
+    def is_rejected(self) -> bool:
+        """Whether it gave no answer."""
+        return bool(self.rejected)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +51,7 @@ class Line:
     n_runs: int
     n_batches: int
     n_rejected: int
+    rejected_by_reason: Mapping[str, int]
     payload_mean_abs_pct: float | None
     payload_mean_abs_pct_with_misses: float
     payload_coverage: Coverage | None
@@ -90,15 +97,17 @@ def coverage_table(batches: Sequence[JudgedBatch], seed: int, refused: Sequence[
 def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str) -> JudgedBatch:
     found = one.estimate
     payload_kg, share_pct = found.payload_kg, found.front_share_pct
-    is_rejected = not np.isfinite(payload_kg) or not np.isfinite(share_pct)
+    rejected = tuple(str(why) for why in found.rejected)
+    if not rejected and not (np.isfinite(payload_kg) and np.isfinite(share_pct)):
+        rejected = (HALF_AN_ANSWER,)
     return JudgedBatch(
         van=vehicle.name,
         run=f"{vehicle.name} {one.run}",
         kind=kind,
         estimator=estimator,
-        is_rejected=is_rejected,
-        payload_error_pct=_percent(payload_kg, one.payload_kg, vehicle.payload_range_kg, is_rejected),
-        front_share_error_pct=_percent(share_pct, one.front_share_pct, vehicle.front_share_range_pct, is_rejected),
+        rejected=rejected,
+        payload_error_pct=_percent(payload_kg, one.payload_kg, vehicle.payload_range_kg, bool(rejected)),
+        front_share_error_pct=_percent(share_pct, one.front_share_pct, vehicle.front_share_range_pct, bool(rejected)),
         is_payload_covered=_holds(found.payload_interval95_kg, one.payload_kg),
         is_front_share_covered=_holds(found.front_share_interval95_pct, one.front_share_pct),
     )
@@ -124,6 +133,7 @@ def _line(kind: str, estimator: str, batches: Sequence[JudgedBatch]) -> Line:
         n_runs=len({batch.run for batch in batches}),
         n_batches=len(batches),
         n_rejected=len(batches) - len(answered),
+        rejected_by_reason=_counted([why for batch in batches for why in batch.rejected]),
         payload_mean_abs_pct=_mean_abs([batch.payload_error_pct for batch in answered]),
         payload_mean_abs_pct_with_misses=float(np.mean(np.abs([batch.payload_error_pct for batch in batches]))),
         payload_coverage=_coverage(answered, payload, lambda b: b.run),
@@ -133,6 +143,10 @@ def _line(kind: str, estimator: str, batches: Sequence[JudgedBatch]) -> Line:
         front_share_coverage=_coverage(answered, share, lambda b: b.run),
         front_share_coverage_by_van=_coverage(answered, share, lambda b: b.van),
     )
+
+
+def _counted(reasons: Sequence[str]) -> dict[str, int]:
+    return {why: reasons.count(why) for why in sorted({*reasons})}
 
 
 def _mean_abs(errors_pct: Sequence[float]) -> float | None:

@@ -61,9 +61,9 @@ def test_one_run_tells_nothing_of_how_runs_scatter() -> None:
 
 
 def batch(
-    van: str, run: str, kind: str, error_pct: float, *, is_covered: bool, is_rejected: bool = False
+    van: str, run: str, kind: str, error_pct: float, *, is_covered: bool, rejected: tuple[str, ...] = ()
 ) -> JudgedBatch:
-    return JudgedBatch(van, run, kind, "cross_spectrum", is_rejected, error_pct, -error_pct, is_covered, is_covered)
+    return JudgedBatch(van, run, kind, "cross_spectrum", rejected, error_pct, -error_pct, is_covered, is_covered)
 
 
 def test_a_line_for_every_kind_and_one_for_all() -> None:
@@ -71,7 +71,7 @@ def test_a_line_for_every_kind_and_one_for_all() -> None:
         [
             batch("a", "a 1", "town", 2.0, is_covered=True),
             batch("a", "a 2", "town", -4.0, is_covered=False),
-            batch("b", "b 1", "town", 30.0, is_covered=False, is_rejected=True),
+            batch("b", "b 1", "town", 30.0, is_covered=False, rejected=("gap",)),
             batch("b", "b 2", "country", 6.0, is_covered=True),
         ],
         seed=3,
@@ -80,6 +80,7 @@ def test_a_line_for_every_kind_and_one_for_all() -> None:
     town, country, everything = table.lines
     assert [line.kind for line in table.lines] == ["town", "country", ALL_KINDS]
     assert (town.n_batches, town.n_rejected, town.n_vans, town.n_runs) == (3, 1, 2, 3)
+    assert town.rejected_by_reason == {"gap": 1}
     assert town.payload_mean_abs_pct == pytest.approx(3.0)  # the rejected batch gave no answer
     assert town.payload_mean_abs_pct_with_misses == pytest.approx(12.0)
     assert town.payload_coverage is not None

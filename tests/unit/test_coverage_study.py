@@ -95,7 +95,7 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
     assert {line.kind for line in table.lines} == {*TRIPS, "all"}
     assert {line.estimator for line in table.lines} == {"ratio_index"}
     assert all(line.n_batches == 6 and line.n_vans == 2 for line in table.lines[:-1])
-    assert table.lines[-1].n_runs == 24
-    assert len(set(seeds)) == len(seeds) == 2 * (4 + 12)  # no drive is driven twice
+    assert table.lines[-1].n_runs == 30
+    assert len(set(seeds)) == len(seeds) == 2 * (4 + 15)  # no drive is driven twice
     assert [text.split(": ")[1:] for text in table.refused] == [["cross_spectrum", "not today"]] * 2
     assert done == [(0, 2), (1, 2), (2, 2)]
