@@ -76,3 +76,18 @@ def test_a_real_drive_gives_one_line_per_batch_and_says_why_not(trip: str) -> No
     assert all("no_calibration" in record["rejected"] and record["payload_kg"] is None for record in records)
     driven = [record for record in whole if record["rejected"] == ["no_calibration"]]
     assert all(5.0 < record["mean_speed_mps"] < 40.0 and record["spectra"] for record in driven)
+
+
+def test_the_file_says_what_to_expect_and_can_be_held_against_its_logs(calibration: Path) -> None:
+    """Errors on runs left out of the fit, of both estimators, and the roads they were made over."""
+    shown = json.loads(run("calibration", "show", calibration, "--json"))
+    assert set(shown["expected_errors"]) == {"cross_spectrum", "ratio_index"}
+    for errors in shown["expected_errors"].values():
+        assert 0.0 < errors["payload_rms_kg"] < 100.0
+        assert 0.0 < errors["front_share_rms_pct"] < 5.0
+    smooth, rough = shown["seen"]["roughness_mps2"]
+    assert 0.0 < smooth < rough
+    verified = run("calibration", "verify", calibration, "--logs", recordings() / "known_loads/campaign.toml", "--json")
+    checks = json.loads(verified)["checks"]
+    assert {check["verdict"] for check in checks} == {"good"}
+    assert len(checks) == 3 + 1 + 10
