@@ -35,7 +35,7 @@ OTHER_SPEEDS_KMH: Final = (30.0, 110.0)
 class Scope:
     """How much is driven: per van so many known loads and, of each kind, so many drives put to the test."""
 
-    n_vans: int = 16
+    n_vans: int = 12
     n_known_loads: int = 6
     n_tests: int = 2
     steady_s: float = 620.0
