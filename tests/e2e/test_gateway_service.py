@@ -12,38 +12,18 @@ import time
 from pathlib import Path
 
 import httpx
-import numpy as np
 import pytest
+from support.bus_drive import bus_drive
 
 from gateway.bus.candump_write import write_candump
-from gateway.bus.encode import Encoder
-from gateway.bus.signal_map import load_signal_map
 from gateway.bus.sink import replay
 from gateway.config import load_settings
 from gateway.offline.estimates import estimates_of_logs, setup_of
-from gateway.records import Frames, Motion, Signal, estimate_to_json, json_line
+from gateway.records import Motion, estimate_to_json, json_line
 from gateway.service.gateway import Gateway, GatewayFailedError
 from gateway.store import Store
 
-START_NS = 1_790_000_000_000_000_000
 WINDOW_S = 20.0
-
-
-def drive(duration_s: float, seed: int) -> Frames:
-    """A van at 50 km/h as its two sensors hear it: coloured noise, one source and its delayed echo."""
-    rng = np.random.default_rng(seed)
-    n = round(100 * duration_s)
-    road = np.convolve(rng.standard_normal(n + 40), np.hanning(12), mode="same")
-    t_ns = START_NS + np.arange(n) * 10_000_000
-    gps_ns = START_NS + np.arange(round(5 * duration_s)) * 200_000_000
-    return Encoder(load_signal_map("springscale:reference")).encode_signals(
-        {Signal.VERTICAL_ACCELERATION: t_ns, Signal.PITCH_RATE: t_ns, Signal.SPEED: gps_ns},
-        {
-            Signal.VERTICAL_ACCELERATION: 9.81 + 0.3 * road[20 : n + 20],
-            Signal.PITCH_RATE: 0.03 * (road[20 : n + 20] - road[:n]),
-            Signal.SPEED: 13.9 + 0.1 * rng.standard_normal(len(gps_ns)),
-        },
-    )
 
 
 @pytest.fixture
@@ -103,7 +83,7 @@ def run_with_log(config: Path, log: Path, speed: float | str) -> list[str]:
 @pytest.mark.parametrize("speed", [40.0, "max"])
 def test_a_replayed_log_gives_byte_identical_batches_to_estimate(config: Path, speed: float | str) -> None:
     log = config.parent / "drive.log"
-    write_candump(drive(70.0, seed=5), "can0", log)
+    write_candump(bus_drive(70.0, seed=5), "can0", log)
     settings = load_settings(config)
     expected = [
         json_line(estimate_to_json(found))
@@ -217,7 +197,7 @@ def test_a_dead_pipeline_ends_the_service_with_its_reason(config: Path, monkeypa
 
     monkeypatch.setattr("gateway.core.flow.Flow.feed", broken)
     log = config.parent / "drive.log"
-    write_candump(drive(5.0, seed=1), "can0", log)
+    write_candump(bus_drive(5.0, seed=1), "can0", log)
 
     def on_started(_gateway: Gateway) -> None:
         threading.Thread(

@@ -1,0 +1,26 @@
+"""Made-up drives as frames on a bus, for whatever signal map."""
+
+import numpy as np
+
+from gateway.bus.encode import Encoder
+from gateway.bus.signal_map import load_signal_map
+from gateway.records import Frames, Signal
+
+START_NS = 1_790_000_000_000_000_000
+
+
+def bus_drive(duration_s: float, seed: int, signals: str = "springscale:reference", start_ns: int = START_NS) -> Frames:
+    """A van at 50 km/h as its two sensors hear it: coloured noise, one source and its delayed echo."""
+    rng = np.random.default_rng(seed)
+    n = round(100 * duration_s)
+    road = np.convolve(rng.standard_normal(n + 40), np.hanning(12), mode="same")
+    t_ns = start_ns + np.arange(n) * 10_000_000
+    gps_ns = start_ns + np.arange(round(5 * duration_s)) * 200_000_000
+    return Encoder(load_signal_map(signals)).encode_signals(
+        {Signal.VERTICAL_ACCELERATION: t_ns, Signal.PITCH_RATE: t_ns, Signal.SPEED: gps_ns},
+        {
+            Signal.VERTICAL_ACCELERATION: 9.81 + 0.3 * road[20 : n + 20],
+            Signal.PITCH_RATE: 0.03 * (road[20 : n + 20] - road[:n]),
+            Signal.SPEED: 13.9 + 0.1 * rng.standard_normal(len(gps_ns)),
+        },
+    )
