@@ -28,7 +28,9 @@ from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import Vehicle
 from gateway.records import C128, F64
 
-LEAST_COHERENCE: Final = 0.4  # right axes have 0.75 and more, roll or yaw for pitch below 0.3
+LEAST_COHERENCE: Final = 0.4  # behind the axles right axes have 0.45 and more, roll or yaw for pitch below 0.35
+LEAST_AGREEMENT: Final = 0.62  # right axes amidships have 0.65 and more however the speed varies
+USUAL_SCALE: Final = (0.5, 1.6)  # right axes are within 0.6 to 1.15, roll above 2.3
 SCALE_RANGE: Final = (0.4, 2.5)  # no road vehicle's pitch rate is further from the usual half-car's
 UNIT_RANGE: Final = (0.5, 2.0)
 DEGREES: Final = 180.0 / np.pi
@@ -122,6 +124,11 @@ class Phases:
         return max(self.upright.best, self.turned.best)
 
     @property
+    def likely(self) -> Agreement:
+        """With the sign that the data speak for."""
+        return self.turned if self.is_turned else self.upright
+
+    @property
     def is_turned(self) -> bool:
         """True where the pitch rate fits only when turned over."""
         return self.turned.best > self.upright.best + REVERSED_BY
@@ -140,12 +147,17 @@ def likeliest_speed(as_read: Phases, misread: Mapping[str, Phases]) -> tuple[str
     return None, as_read
 
 
-def coherence_findings(spectra: CrossSpectra) -> Iterator[Finding]:
-    """Do the two sensors move together at all?"""
-    coherence = mean_coherence(spectra)
-    if coherence < LEAST_COHERENCE:
-        text = f"coherence of pitch_rate and vertical_acceleration is {coherence:.2f}, usual is 0.75 and more"
-        yield found(Kind.PITCH_RATE_AXIS, Severity.FAULT, text)
+def apart_findings(spectra: CrossSpectra, seen: Phases) -> Iterator[Finding]:
+    """Do the two sensors move together as one body does?
+
+    Amidships heave and pitch are nearly independent where the speed varies, so a low coherence alone proves
+    nothing: there the phases and the size must at least be a vehicle's.
+    """
+    coherence, likely = mean_coherence(spectra), seen.likely
+    is_vehicle = likely.best >= LEAST_AGREEMENT and USUAL_SCALE[0] <= likely.scale <= USUAL_SCALE[1]
+    if coherence < LEAST_COHERENCE and not is_vehicle:
+        text = f"coherence of pitch_rate and vertical_acceleration is {coherence:.2f}, their phases agree with a "
+        yield found(Kind.PITCH_RATE_AXIS, Severity.FAULT, f"{text}vehicle's by {likely.best:.2f}")
 
 
 def phase_findings(seen: Phases, speed_misread: str | None) -> Iterator[Finding]:
@@ -153,7 +165,7 @@ def phase_findings(seen: Phases, speed_misread: str | None) -> Iterator[Finding]
     if speed_misread is not None:
         text = f"phases agree with the vehicle's by {seen.best:.2f} if {speed_misread}, by far less as it is"
         yield found(Kind.SPEED_UNIT, Severity.FAULT, text)
-    yield from _scale_findings(seen.turned if seen.is_turned else seen.upright)
+    yield from _scale_findings(seen.likely)
     if seen.is_turned:
         text = f"phases agree with the vehicle's by {seen.turned.best:.2f} turned over, "
         yield found(Kind.PITCH_RATE_SIGN, Severity.FAULT, f"{text}by {seen.upright.best:.2f} as they are")

@@ -12,7 +12,7 @@ from gateway.calibration.inspection_axes import (
     BELIEVED_AGREEMENT,
     SPEED_MISREAD,
     Phases,
-    coherence_findings,
+    apart_findings,
     likeliest_speed,
     mended,
     phase_findings,
@@ -94,11 +94,11 @@ def _motion_findings(
 ) -> Iterator[Finding]:
     """Axes, signs and units by the cross-spectra; then, if these are right, the sensor's place."""
     spectra = mended(spectra, 1.0 / acceleration.factor)
-    apart = list(coherence_findings(spectra))
+    as_read, misread = phases(spectra, inspected.run, vehicle), {}
+    apart = list(apart_findings(spectra, as_read))
     if apart:
         yield from apart
         return
-    as_read, misread = phases(spectra, inspected.run, vehicle), {}
     if as_read.best < BELIEVED_AGREEMENT:
         misread = _if_speed_misread(inspected, vehicle, acceleration)
     speed_misread, seen = likeliest_speed(as_read, misread)
