@@ -34,7 +34,7 @@ class Figure:
 
 
 def figures_of(file: CalibrationFile) -> dict[str, tuple[Figure, ...]]:
-    """By part of the file: half-car parameters of cross_spectrum, coefficients of ratio_index (constant first)."""
+    """By part of the file: half-car parameters of cross_spectrum, regressions of ratio_index (constant first)."""
     found = {}
     if file.cross_spectrum is not None:
         found["cross_spectrum"] = _half_car(file.cross_spectrum)
@@ -57,8 +57,16 @@ def _half_car(part: CrossSpectrumPart) -> tuple[Figure, ...]:
 
 
 def _regression(part: RegressionPart) -> tuple[Figure, ...]:
-    """Coefficients of the columns scaled to [-1, 1], in the unit of the target; Var = s^2 (X'X)^-1."""
-    stds = part.residual_std * np.sqrt(np.diag(part.gram_inverse))
-    names = ("constant", *part.terms)
-    rows = zip(names, part.coefficients.tolist(), stds.tolist(), strict=True)
+    """Constant and coefficients of the terms as they are, in the target's unit: comparable whatever the scaling.
+
+    The file has them of columns scaled to [-1, 1] by lows l and highs h:
+    b_0 + sum b_i (2 x_i - h_i - l_i) / (h_i - l_i). With T for the step from these b to those of x,
+    Var = s^2 T (X'X)^-1 T'.
+    """
+    span = part.highs - part.lows
+    to_raw = np.diag(np.r_[1.0, 2.0 / span])
+    to_raw[0, 1:] = -(part.highs + part.lows) / span
+    centres = to_raw @ part.coefficients
+    stds = part.residual_std * np.sqrt(np.diag(to_raw @ part.gram_inverse @ to_raw.T))
+    rows = zip(("constant", *part.terms), centres.tolist(), stds.tolist(), strict=True)
     return tuple(Figure(name, centre, std) for name, centre, std in rows)

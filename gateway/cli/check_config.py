@@ -1,9 +1,11 @@
 """springscale check-config: everything that can be checked without the bus."""
 
+import os
 from pathlib import Path
 
 import click
 
+from gateway.calibration.tare_file import FILE_NAME
 from gateway.cli.options import FILE, as_json
 from gateway.config import load_settings
 from gateway.offline.estimates import setup_of
@@ -15,14 +17,18 @@ from gateway.uplink import uplink_settings
 @click.argument("config", type=FILE)
 @as_json
 def check_config(config: Path, as_json: bool) -> None:
-    """Check CONFIG, its signal map, its DBC files and its calibration; name every fault."""
+    """Check CONFIG, its signal map, its DBC files, its calibration and its tare; name every fault."""
     settings = load_settings(config)
     setup = setup_of(settings)
+    tares = settings.store.directory / FILE_NAME
+    if os.access(tares, os.R_OK):  # the service's own; others may not be allowed to see it
+        setup = setup.with_tare_of(tares)
     forwarding = uplink_settings(settings.uplink, settings.vehicle)
     found = {
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
         "calibration_id": setup.calibration.id if setup.calibration else None,
+        "tare_id": setup.tare.id if setup.tare else None,
         "estimator": setup.estimator,
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,

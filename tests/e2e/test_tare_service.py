@@ -224,6 +224,22 @@ def test_a_copied_tare_file_gives_the_same_numbers_elsewhere(config: Path, logs:
     assert other.exception.exit_code == 2
 
 
+def test_check_config_looks_at_the_tare_too(config: Path, logs: list[Path], tmp_path: Path) -> None:
+    def meet(service: Running) -> None:
+        service.play(logs[0])
+        service.told("set", "--empty")
+
+    serve(config, meet)
+    good = CliRunner().invoke(springscale, ["check-config", str(config), "--json"], catch_exceptions=False)
+    (entry,) = json.loads((tmp_path / "state" / "tare.json").read_text())["entries"]
+    assert json.loads(good.output)["tare_id"] == entry["id"]
+    (tmp_path / "state" / "tare.json").write_text("{")
+    fault = CliRunner().invoke(springscale, ["check-config", str(config)]).exception
+    assert isinstance(fault, SpringscaleError)
+    assert "tare.json" in str(fault)
+    assert fault.exit_code == 2
+
+
 def test_a_drive_that_has_begun_since_is_refused(config: Path, logs: list[Path], tmp_path: Path) -> None:
     short = tmp_path / "short.log"
     write_candump(drive(5.0, START_NS + HOUR_NS, seed=9), "can0", short)

@@ -5,15 +5,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from hypothesis import given
+from hypothesis import strategies as st
 from support.calibrated import calibration_file
 
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file import CalibrationFile, content_id
+from gateway.calibration.file import CalibrationFile, content_id, load_calibration
 from gateway.calibration.file_comparison import differences
 from gateway.calibration.file_figures import Figure, figures_of
 from gateway.cli.calibration import calibration_commands
+from gateway.core.regression import term_columns
 from gateway.errors import CalibrationFileError
 from gateway.offline.calibration_check import check_against_campaign
 from gateway.offline.known_runs import file_sha256
@@ -85,13 +89,25 @@ def with_gram(payload_kg: float, gram: float) -> CalibrationFile:
 
 
 def test_diff_tells_figures_in_combined_standard_deviations() -> None:
-    """Each constant is known to 10 kg times the root of its gram entry, here a quarter: 30 kg apart is 4.2."""
+    """The term is scaled from 0..1 to -1..1, so the constant is b_0 - b_1: its variance is 10^2 (1/4 + 1/4) kg^2."""
     one, other = with_gram(200.0, 0.25), with_gram(230.0, 0.25)
     (found,) = differences(one, other)
     assert (found.where, found.one, found.other) == ("ratio_index.payload.constant", 200.0, 230.0)
     (mine,) = [figure for figure in figures_of(one)["ratio_index.payload"] if figure.name == "constant"]
-    assert mine.std == pytest.approx(5.0)
-    assert found.n_std == pytest.approx(30.0 / 50.0**0.5)
+    assert mine.std == pytest.approx(50.0**0.5)
+    assert found.n_std == pytest.approx(30.0 / 100.0**0.5)
+
+
+@given(st.floats(0.3, 3.0), st.floats(0.3, 3.0))
+def test_the_figures_of_a_regression_predict_what_it_predicts(ra: float, rg: float) -> None:
+    """Constant plus coefficients times the terms as they are: the model's own answer, whatever its scaling."""
+    file = load_calibration(SHIPPED)
+    assert file.ratio_index is not None
+    assert file.ratio_index.payload is not None
+    model = file.ratio_index.payload.for_core()
+    constant, *slopes = (figure.centre for figure in figures_of(file)["ratio_index.payload"])
+    terms = term_columns(model.terms, np.array([ra]), np.array([rg]))[0]
+    assert constant + float(np.dot(slopes, terms)) == pytest.approx(model.predict(ra, rg)[0], rel=1e-9, abs=1e-6)
 
 
 def test_diff_tells_ranges_vehicle_and_warnings(tmp_path: Path) -> None:
