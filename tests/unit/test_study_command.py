@@ -1,0 +1,91 @@
+"""springscale study: what is printed and written, with stand-ins for the minutes of work."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from gateway.calibration.advice_study import AdviceStudy, Choice, compared
+from gateway.calibration.coverage_table import JudgedBatch, coverage_table
+from gateway.calibration.learning_curve import LearningCurve, Score, Trial
+from gateway.cli import springscale, study
+
+SCORE = Score(3, 1, 2.5, 1.0, 1.25, 0.5)
+CURVE = LearningCurve(
+    "van",
+    1,
+    trials=(
+        Trial((1, 2), "ratio_index", refused="needs three runs"),
+        Trial((1, 2), "cross_spectrum", left_out=SCORE, validation=SCORE),
+    ),
+    triples=(Trial((1, 2, 3), "cross_spectrum", left_out=SCORE, validation=SCORE),),
+)
+COMPARISON = compared([Choice((1, 2, 3), 4, 5, (9.0, 8.0), {4: (2.0, 3.0), 5: (8.0, 6.0)})])
+CAMPAIGN = """
+signals = "springscale:reference"
+[vehicle]
+name = "van"
+empty_mass_kg = 1240.0
+wheelbase_m = 2.8
+sensor_position_m = 3.1
+[[runs]]
+log = "can.log"
+payload_kg = 0.0
+"""
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> str:
+    (tmp_path / "can.log").touch()
+    (tmp_path / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+    return str(tmp_path / "campaign.toml")
+
+
+def run(*arguments: str) -> str:
+    found = CliRunner().invoke(springscale, ["study", *arguments], catch_exceptions=False)
+    assert found.exit_code == 0, found.output
+    return found.stdout
+
+
+def test_a_learning_curve_is_told_and_written(campaign: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "study_learning_curve", lambda *_, **__: CURVE)
+    told = run("learning-curve", campaign, "--output", str(tmp_path / "out"))
+    assert "no calibration" in told
+    assert "2.5 +- 0.0 %" in told
+    written = json.loads((tmp_path / "out/learning_curve.json").read_text(encoding="utf-8"))
+    assert json.loads(run("learning-curve", campaign, "--json")) == written
+    page = (tmp_path / "out/learning_curve.md").read_text(encoding="utf-8")
+    assert "| 2 | ratio index | 1 | 1 | no calibration |" in page
+    assert (
+        "| 2 | cross spectrum | 1 | 0 | left out | 2.5 +- 0.0 | 2.5 | 100 % | 1.2 +- 0.0 | 1.2 | 50 % | 33 % |" in page
+    )
+
+
+def test_the_advice_is_told_and_written(campaign: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "advice_study", lambda *_, **__: AdviceStudy("van", COMPARISON, COMPARISON))
+    assert "8.00 %  6.00 %" in run("advice", campaign, "--output", str(tmp_path / "out"))
+    page = (tmp_path / "out/advice.md").read_text(encoding="utf-8")
+    assert "| and the fourth that the plan advises | 2.00 | 3.00 | 2.00 | 3.00 |" in page
+    assert "From each of 1 triples" in page
+
+
+@pytest.mark.parametrize(
+    ("n_missed", "verdict"), [(0, "agrees with 90 to 99 %"), (100, "too narrow, the limits lie below 90 to 99 %")]
+)
+def test_coverage_says_whether_it_falls_short(
+    n_missed: int, verdict: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    batches = [
+        JudgedBatch("a", f"a {i}", "mixed", "cross_spectrum", (), 1.0, 1.0, i >= n_missed, i % 20 > 0)
+        for i in range(200)
+    ]
+    refused = JudgedBatch("b", "b 1", "mixed", "cross_spectrum", ("gap",), 9.0, 9.0, False, False)
+    table = coverage_table([*batches, refused], seed=4, refused=["b: ratio_index: too few"])
+    monkeypatch.setattr(study.coverage_study, "coverage", lambda *_, **__: table)
+    page = run("coverage", "--output", str(tmp_path / "out"))
+    assert f"cross spectrum, all drives, payload: {100 - n_missed // 2} %" in page
+    assert verdict in page
+    assert "| 201 | 201 | 1: 1 gap |" in page
+    assert "- b: ratio_index: too few" in page
+    assert (tmp_path / "out/coverage.md").read_text(encoding="utf-8") + "\n" == page
