@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check bench deb lock docs clean
+.PHONY: demo test check bench deb lock docs screenshots clean
 .DEFAULT_GOAL := demo
 
 .venv/bin/python:
@@ -41,6 +41,10 @@ bench: .venv/.development
 # Debian packages in build/, for this machine's architecture; dpkg-deb must be there, root need not.
 deb: .venv/.package
 	$(BIN)/python deploy/deb/build.py
+
+# The pictures in README.md; needs chromium.
+screenshots: .venv/.development
+	$(BIN)/python docs/make_screenshots.py
 
 docs: .venv/.development
 	$(BIN)/python docs/make_settings.py

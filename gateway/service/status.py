@@ -53,7 +53,7 @@ class StatusReport:
 
     def __call__(self) -> Status:
         """The status as of now."""
-        state = self._state()
+        state = self.state()
         not_ready = self._source.reason if state is State.READER_FAULT else None
         return Status(
             version=version("springscale"),
@@ -79,7 +79,7 @@ class StatusReport:
             not_ready_reason=not_ready,
         )
 
-    def _state(self) -> State:
+    def state(self) -> State:
         """The first that holds, worst first."""
         speed_age_s = self._age_s(Signal.SPEED)
         claims: tuple[tuple[State, Callable[[], bool]], ...] = (

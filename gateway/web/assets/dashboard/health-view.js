@@ -45,7 +45,7 @@ show(({ vehicle }) => {
       pair("Calibrated with payloads of", between(calibration.payload_seen_kg, 0, "kg")),
       pair("with front shares of", between(calibration.front_share_seen_pct, 1, "%")),
       pair("at mean speeds of", calibration.speed_seen_mps ? `${kmh(calibration.speed_seen_mps[0])} to ${kmh(calibration.speed_seen_mps[1])}` : "unknown"),
-      pair("Calibration", calibration.id.slice(0, 19)),
+      pair("Calibration", calibration.id.replace("sha256:", "").slice(0, 12)),
     );
   }
   element("calibrated").replaceChildren(...pairs);

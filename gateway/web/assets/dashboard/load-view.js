@@ -2,7 +2,7 @@
 
 import { ageNow, known, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { ago, between, clock, figure, kmh, number, withStd, words } from "/assets/dashboard/words.js";
+import { ago, between, clock, figure, kmh, withStd, words } from "/assets/dashboard/words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : `95 %: ${between(bounds, digits, unit)}`);
 
@@ -14,25 +14,27 @@ function notes(latest) {
   return said.join(" ");
 }
 
-/** A bar over the range that calibration saw, with the interval and the value on it. */
+/** A bar over the range that calibration saw, with the interval and the value on it; an interval beyond it sticks out. */
 function gauge(id, value, bounds, seen, unit) {
   const place = element(id);
   if (value == null || bounds == null || seen == null) return place.replaceChildren();
   const from = Math.min(seen[0], bounds[0]), to = Math.max(seen[1], bounds[1]);
-  const at = (x) => `${(100 * (x - from)) / (to - from)}%`;
-  const band = made("span", "", "band"), mark = made("span", "", "mark");
-  band.style.setProperty("--low", at(bounds[0]));
-  band.style.setProperty("--wide", `${(100 * (bounds[1] - bounds[0])) / (to - from)}%`);
-  mark.style.setProperty("--at", at(value));
+  const percent = (x) => `${(100 * x) / (to - from)}%`;
+  const bar = (name, [low, high]) => {
+    const built = made("span", "", name);
+    built.style.setProperty("--low", percent(low - from));
+    built.style.setProperty("--wide", percent(high - low));
+    return built;
+  };
   return place.replaceChildren(
-    made("span", "", "track"), band, mark,
-    made("span", `${number(from, 0)} ${unit}`, "from"), made("span", `${number(to, 0)} ${unit}`, "to"),
+    bar("track", seen), bar("band", bounds), bar("mark", [value, value]),
+    made("span", `calibrated: ${between(seen, 0, unit)}`, "scale"),
   );
 }
 
 function epoch(latest) {
   const n = latest.epoch_n_batches;
-  if (!(n > 1)) return "one batch or none";
+  if (!(n > 1)) return n === 1 ? "one batch" : "unknown";
   return `${withStd(latest.epoch_payload_kg, latest.epoch_payload_std_kg, 0, "kg")} over ${n} batches`;
 }
 

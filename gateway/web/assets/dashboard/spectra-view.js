@@ -12,6 +12,8 @@ const PANELS = [
   { name: "phase_rad", title: "Phase of pitch rate against acceleration [rad]", range: [-Math.PI, Math.PI] },
 ];
 
+const RESONANCE_BELOW_HZ = 4; // spectra are high there: names of bands stand at the foot, elsewhere at the head
+
 function panel({ name, title }) {
   const place = made("div", "", "chart");
   place.id = `spectra-${name}`;
@@ -47,7 +49,12 @@ function bandShapes(bands) {
     y1: 1,
     line: { width: 0 },
     fillcolor: colour("soft", 0.45),
-    label: { text: n === 0 ? "over" : "under", textposition: "top left", font: { size: 10, color: colour("soft") }, textangle: 0 },
+    label: {
+      text: n === 0 ? "over" : "under",
+      textposition: band.centre_hz < RESONANCE_BELOW_HZ ? "bottom left" : "top left",
+      font: { size: 10, color: colour("soft") },
+      textangle: 0,
+    },
   }));
 }
 

@@ -17,7 +17,7 @@
   document.addEventListener("DOMContentLoaded", () => {
     const button = document.getElementById("theme");
     const name = () => { 
-      button.textContent = `◐ ${chosen()}`;
+      button.lastElementChild.textContent = ` ${chosen()}`;
       button.setAttribute("aria-label", `Theme: ${chosen()}`);
     };
     name();

@@ -1,7 +1,7 @@
 // The van from above: axle loads, and where the load's centre of gravity lies. Drawn to scale along its length.
 
 import { show } from "/assets/dashboard/known.js";
-import { element, pair, say } from "/assets/dashboard/page.js";
+import { element, pair, say, write } from "/assets/dashboard/page.js";
 import { figure, number, withStd } from "/assets/dashboard/words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -36,7 +36,7 @@ function axleLabel(x, name, weight) {
   ];
 }
 
-/** The load as a disc whose area is its mass, with a bar for the 95 % interval of its place. */
+/** The load as a disc whose area is its mass, with the 95 % interval of its place across it. */
 function load(place, payloadKg, fullKg, toX) {
   if (!place) return [];
   const x = toX(place.position_m), reach = Math.min(toX(1.96 * place.std_m) - toX(0), 200);
@@ -44,7 +44,8 @@ function load(place, payloadKg, fullKg, toX) {
   return [
     shape("rect", { class: "spread", x: x - reach, y: MIDDLE_Y - radius, width: 2 * reach, height: 2 * radius, rx: 6 }),
     shape("circle", { class: "load", cx: x, cy: MIDDLE_Y, r: radius }),
-    shape("line", { class: "about", x1: x - reach, x2: x + reach, y1: MIDDLE_Y, y2: MIDDLE_Y }),
+    shape("path", { class: "about", d: `M${x - reach} ${MIDDLE_Y - 5} v10 m0 -5 H${x + reach} m0 -5 v10` }),
+    shape("circle", { class: "centre", cx: x, cy: MIDDLE_Y, r: 3.5 }),
   ];
 }
 
@@ -78,10 +79,12 @@ function draw(vehicle, weights, latest) {
   return drawing;
 }
 
-function weightPair(name, weight) {
+function weightInWords(weight) {
   const limit = weight.limit_kg == null ? "" : ` (limit ${figure(weight.limit_kg, 0, "kg")})`;
-  return pair(name, `${withStd(weight.kg, weight.std_kg, 0, "kg")}${limit}`, weight.is_over_limit ? "over" : "");
+  return `${withStd(weight.kg, weight.std_kg, 0, "kg")}${limit}`;
 }
+
+const weightPair = (name, weight) => pair(name, weightInWords(weight), weight.is_over_limit ? "over" : "");
 
 function overloads(weights) {
   const named = [["The gross weight", weights.gross], ["The front axle", weights.front_axle], ["The rear axle", weights.rear_axle]];
@@ -94,10 +97,11 @@ show(({ vehicle, weights, latest }) => {
   if (!weights) return;
   const place = weights.load;
   element("weights").replaceChildren(
-    weightPair("Gross weight", weights.gross),
     weightPair("Front axle", weights.front_axle),
     weightPair("Rear axle", weights.rear_axle),
     pair("Load's centre", place ? `${withStd(place.position_m, place.std_m, 2, "m")} behind the front axle` : "no load that is surely there"),
   );
+  write("gross", weightInWords(weights.gross));
+  element("gross").classList.toggle("over", weights.gross.is_over_limit);
   say("overload", overloads(weights));
 }, "vehicle", "weights", "latest");

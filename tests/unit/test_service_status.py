@@ -1,0 +1,80 @@
+"""Which state the service tells, of several that hold at once."""
+
+import time
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from gateway.bus.source import SourceState
+from gateway.records import Signal
+from gateway.service.status import SENSOR_LOST_S, StatusReport
+from gateway.web import State
+
+SIGNALS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
+ALL_HEARD: Mapping[Signal, float | None] = dict.fromkeys(SIGNALS, 0.0)
+LONG_S = SENSOR_LOST_S + 5.0
+
+
+def report(
+    ages_s: Mapping[Signal, float | None],
+    source: SourceState = SourceState.RECEIVING,
+    *,
+    is_parked: bool = False,
+    estimate_age_s: float | None = 20.0,
+    is_stale: bool = False,
+) -> State:
+    """The state of a service that has run for a minute and heard each signal so long ago (None: never)."""
+    now = time.monotonic()
+    heard = {signal: now - age_s for signal, age_s in ages_s.items() if age_s is not None}
+    scheduler = SimpleNamespace(is_parked=is_parked)
+    parts: dict[str, Any] = {
+        "settings": None,
+        "setup": SimpleNamespace(signal_map=SimpleNamespace(signals=dict.fromkeys(SIGNALS))),
+        "source": SimpleNamespace(state=source),
+        "pipeline": SimpleNamespace(watch=SimpleNamespace(last_heard=heard), flow=SimpleNamespace(scheduler=scheduler)),
+        "store": None,
+        "board": SimpleNamespace(age_s=lambda: estimate_age_s, is_stale=lambda: is_stale),
+    }
+    told = StatusReport(**cast(Any, parts))
+    told._started = now - 60.0  # instead of waiting for a minute
+    return told.state()
+
+
+def test_all_is_well() -> None:
+    assert report(ALL_HEARD) is State.ESTIMATING
+
+
+@pytest.mark.parametrize("silent", [Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE])
+@pytest.mark.parametrize("age_s", [LONG_S, None])
+def test_a_silent_sensor_on_a_living_bus_is_a_fault(silent: Signal, age_s: float | None) -> None:
+    assert report({**ALL_HEARD, silent: age_s}) is State.SENSOR_FAULT
+    assert report({**ALL_HEARD, silent: age_s}, is_stale=True, is_parked=True) is State.SENSOR_FAULT
+
+
+def test_a_pause_is_no_fault() -> None:
+    assert report({**ALL_HEARD, Signal.PITCH_RATE: 0.5 * SENSOR_LOST_S}) is State.ESTIMATING
+
+
+def test_a_lost_speed_is_waited_for() -> None:
+    assert report({**ALL_HEARD, Signal.SPEED: LONG_S}) is State.WAITING_FOR_SPEED
+    assert report({**ALL_HEARD, Signal.SPEED: None}) is State.WAITING_FOR_SPEED
+    assert report(ALL_HEARD, is_parked=True) is State.WAITING_FOR_SPEED
+
+
+@pytest.mark.parametrize(
+    ("source", "state"),
+    [
+        (SourceState.READER_FAULT, State.READER_FAULT),
+        (SourceState.STARTING, State.STARTING),
+        (SourceState.BUS_SILENT, State.WAITING_FOR_BUS),
+    ],
+)
+def test_a_silent_bus_is_not_the_sensors_fault(source: SourceState, state: State) -> None:
+    assert report(dict.fromkeys(SIGNALS, LONG_S), source) is state
+
+
+def test_an_estimate_is_collected_shown_and_grows_old() -> None:
+    assert report(ALL_HEARD, estimate_age_s=None) is State.COLLECTING
+    assert report(ALL_HEARD, is_stale=True) is State.STALE
