@@ -108,11 +108,18 @@ def _fit_chart(fit: Fit) -> Chart:
         (
             panel("acceleration [m/s²/√Hz]", m.vertical_acceleration, s.vertical_acceleration, is_log=True),
             panel("pitch rate [rad/s/√Hz]", m.pitch_rate, s.pitch_rate, is_log=True),
-            panel("phase of pitch rate [°]", np.degrees(m.phase_rad), np.degrees(s.phase_rad)),
+            panel("phase of pitch rate [°]", _unbroken_deg(m.phase_rad), _unbroken_deg(s.phase_rad)),
             panel("coherence", m.coherence, s.coherence),
         ),
         row_height_px=250,
     )
+
+
+def _unbroken_deg(phase_rad: F64) -> F64:
+    """In degrees, with a gap where it leaps from one end of the circle to the other."""
+    degrees = np.degrees(phase_rad)
+    leaps = np.abs(np.diff(degrees, append=degrees[-1])) > 180.0
+    return np.where(leaps, np.nan, degrees)
 
 
 def _misfit_table(fits: Sequence[Fit], calibration: CrossSpectrumCalibration) -> Table:

@@ -1,5 +1,6 @@
 """The report as one page: the verdict first, then the sections. It reads without scripts; plotly replaces pictures."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -41,10 +42,15 @@ def page_html(page: Page) -> str:
         '<meta name="color-scheme" content="light dark">'
         f"<title>{escape(page.title)}</title><style>{_asset('report.css')}</style></head><body>"
         f'<a class="skip" href="#verdict">Skip to the verdict</a>'
-        f"<header><h1>{escape(page.title)}</h1><p>{escape(page.subtitle)}</p></header>"
+        f"<header><h1>{escape(page.title)}</h1><p>{prose(page.subtitle)}</p></header>"
         f'<main>{_verdict(page)}<nav aria-label="Contents"><ul>{contents}</ul></nav>'
         f"{''.join(_section(one, page.live) for one in page.sections)}</main>{scripts}</body></html>\n"
     )
+
+
+def prose(text: str) -> str:
+    """Escaped, with a number and its unit kept on one line."""
+    return re.sub(r"(?<=\d) (?=(?:%|kg|pp|Hz|m|km/h|m/s²)(?:\W|$))", "\u00a0", escape(text)).replace("± ", "±\u00a0")
 
 
 def _asset(name: str) -> str:
@@ -54,10 +60,10 @@ def _asset(name: str) -> str:
 def _verdict(page: Page) -> str:
     best = page.verdicts[0]
     several = ", the better of two here" if len(page.verdicts) > 1 else ""
-    next_run = f"<h3>What to drive next</h3><p>{escape(page.next_run)}</p>" if page.next_run else ""
+    next_run = f"<h3>What to drive next</h3><p>{prose(page.next_run)}</p>" if page.next_run else ""
     return (
         f'<section id="verdict" class="{best.grade}"><h2>{_mark(best.grade)} {GRADE_TEXT[best.grade]}</h2>'
-        f"<p>By the {escape(estimator_name(best.estimator))}{several}. {escape(page.in_short)}</p>{next_run}"
+        f"<p>By the {escape(estimator_name(best.estimator))}{several}. {prose(page.in_short)}</p>{next_run}"
         f"{''.join(_reasons(verdict) for verdict in page.verdicts)}</section>"
     )
 
@@ -65,7 +71,7 @@ def _verdict(page: Page) -> str:
 def _reasons(verdict: Verdict) -> str:
     rows = "".join(
         f'<li class="{reason.grade}">{_mark(reason.grade)} <span class="unseen">{GRADE_TEXT[reason.grade]}: </span>'
-        f"{escape(reason.text)}</li>"
+        f"{prose(reason.text)}</li>"
         for reason in verdict.reasons
     )
     name = estimator_name(verdict.estimator)
@@ -77,7 +83,7 @@ def _mark(grade: Grade) -> str:
 
 
 def _section(section: Section, live: dict[str, str]) -> str:
-    paragraphs = "".join(f"<p>{escape(text)}</p>" for text in section.paragraphs)
+    paragraphs = "".join(f"<p>{prose(text)}</p>" for text in section.paragraphs)
     shown: list[Chart | Table] = [*section.charts, *section.tables]
     items = "".join(_item(item, live) for item in shown)
     folded = "".join(
@@ -99,7 +105,7 @@ def _figure(chart: Chart, live: dict[str, str]) -> str:
         f'<figure id="{chart.name}"><img src="figures/{chart.name}.svg" alt="{escape(chart.alt)}">'
         f'<div class="wide live" role="img" aria-label="{escape(chart.alt)}" hidden></div>'
         f'<script type="application/json">{spec}</script>'
-        f'<figcaption>{escape(chart.caption)} <a href="figures/{chart.name}.svg">SVG</a> '
+        f'<figcaption>{prose(chart.caption)} <a href="figures/{chart.name}.svg">SVG</a> '
         f'<a href="figures/{chart.name}.png">PNG</a></figcaption></figure>'
     )
 
@@ -116,5 +122,5 @@ def table_html(table: Table) -> str:
 
 
 def _row(cells: Sequence[str], n_heads: int) -> str:
-    heads = "".join(f'<th scope="row">{escape(cell)}</th>' for cell in cells[:n_heads])
-    return f"<tr>{heads}{''.join(f'<td>{escape(cell)}</td>' for cell in cells[n_heads:])}</tr>"
+    heads = "".join(f'<th scope="row">{prose(cell)}</th>' for cell in cells[:n_heads])
+    return f"<tr>{heads}{''.join(f'<td>{prose(cell)}</td>' for cell in cells[n_heads:])}</tr>"

@@ -21,7 +21,7 @@ from gateway.reports.calibration_page import Page, page_html
 from gateway.reports.calibration_ratio_index import ratio_index_section
 from gateway.reports.calibration_runs import best_next, plan_section, provenance_section, runs_section
 from gateway.reports.calibration_spectra import spectra_section
-from gateway.reports.calibration_text import shown, span
+from gateway.reports.calibration_text import counted, shown, span
 from gateway.reports.calibration_verdict import Verdict, verdicts_of
 from gateway.reports.chart import Chart, Section
 from gateway.reports.chart_live import plotly_json, plotly_script
@@ -70,7 +70,7 @@ def _write(directory: Path, evidence: Evidence, sections: list[Section], plan: P
     for done, chart in enumerate(charts, 1):
         save_still(chart, directory / "figures")
         on_chart(done, len(charts))
-    verdicts = verdicts_of(evidence)
+    verdicts = verdicts_of(evidence, plan.now if plan else None)
     page = Page(
         evidence.title,
         _subtitle(evidence),
@@ -98,8 +98,9 @@ def _subtitle(evidence: Evidence) -> str:
     seen = evidence.file.seen
     speeds = span(3.6 * seen.speed_mps[0], 3.6 * seen.speed_mps[1], "km/h")
     return (
-        f"Calibrated on {len(evidence.file.provenance.runs)} runs: payloads of {span(*seen.payload_kg, 'kg')}, front "
-        f"shares of {span(*seen.front_share_pct, '%', 1)}, {speeds}. {evidence.file.id}"
+        f"Calibrated on {counted(len(evidence.file.provenance.runs), 'run')}: payloads of "
+        f"{span(*seen.payload_kg, 'kg')}, front shares of {span(*seen.front_share_pct, '%', 1)}, {speeds}. "
+        f"{evidence.file.id}"
     )
 
 

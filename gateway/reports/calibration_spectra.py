@@ -70,8 +70,8 @@ def spectra_section(runs: Sequence[KnownRun], ratio_index: RatioIndexCalibration
     chart = Chart(
         "spectra",
         "Amplitude densities of the identification part: acceleration by payload, pitch rate by front share. The "
-        "ribbon is the 95 % scatter of the mean over that much driving on the same road; roads differ besides. Shaded "
-        "upright: the bands whose ratio is the index, solid over dashed.",
+        "ribbon is the 95 % scatter of the mean over that much driving on the same road; roads differ besides."
+        + (" Shaded upright: the bands whose ratio is the index." if ratio_index else ""),
         "Spectra of vertical acceleration for each payload and of pitch rate for front shares: more load lowers and "
         "moves the resonances of body and wheels.",
         panels,
@@ -101,7 +101,7 @@ def _panel(
 
 
 def _spans(bands: tuple[Band, Band] | None) -> tuple[Span, ...]:
-    names = ("band above the line of the ratio", "band below the line")
+    names = ("numerator of the index", "denominator")
     return tuple(
         Span(band.centre_hz - 0.5 * band.width_hz, band.centre_hz + 0.5 * band.width_hz, name, colour)
         for band, name, colour in zip(bands or (), names, (6, 7), strict=False)

@@ -16,11 +16,18 @@ def percent(share: float | None) -> str:
     return NONE if share is None else f"{100.0 * share:.0f} %"
 
 
+def counted(n: int, noun: str) -> str:
+    """ "1 run", "2 runs"."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
 def estimator_name(estimator: str) -> str:
     """As people call it."""
     return {"cross_spectrum": "cross-spectral estimator", "ratio_index": "ratio index"}.get(estimator, estimator)
 
 
 def span(low: float, high: float, unit: str, digits: int = 0) -> str:
-    """ "0 to 420 kg"."""
+    """ "0 to 420 kg", or "0 kg" where that is all."""
+    if f"{low:.{digits}f}" == f"{high:.{digits}f}":
+        return f"{low:.{digits}f} {unit}"
     return f"{low:.{digits}f} to {high:.{digits}f} {unit}"

@@ -3,6 +3,7 @@
 docs/calibration.md lists them. A calibration is as good as the worst rule says of it.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,8 +13,11 @@ from gateway.calibration.coverage import PROMISED, coverage_of
 from gateway.calibration.evaluation import Judged
 from gateway.calibration.inspection import RunVerdict, Severity
 from gateway.config import ESTIMATOR_NAMES
+from gateway.core.vehicle import Vehicle
 from gateway.offline.calibrate import Outcome
+from gateway.offline.plan import Expected
 from gateway.reports.calibration_evidence import PART_NAMES, Evidence, Judgement, Part
+from gateway.reports.calibration_text import counted
 
 FIT_ERROR_PCT: Final = 10.0  # of the range (12)
 MOST_ERROR_PCT: Final = 20.0  # a guess at mid-range errs by 25 % over evenly spread loads
@@ -59,9 +63,14 @@ class Verdict:
         return max((reason.grade for reason in self.reasons), key=lambda grade: grade.rank, default=Grade.RESERVED)
 
 
-def verdicts_of(evidence: Evidence) -> tuple[Verdict, ...]:
-    """A verdict for every estimator judged, the best first: by grade, then by payload error."""
-    found = [(_verdict(evidence, judgement), _unseen_error_pct(judgement)) for judgement in evidence.judgements]
+def verdicts_of(evidence: Evidence, expected: Expected | None = None) -> tuple[Verdict, ...]:
+    """A verdict for every estimator judged, the best first: by grade, then by payload error.
+
+    ``expected`` is what the half-car states of itself over all the loads that the vehicle carries.
+    """
+    found = [
+        (_verdict(evidence, judgement, expected), _unseen_error_pct(judgement)) for judgement in evidence.judgements
+    ]
     return tuple(verdict for verdict, _ in sorted(found, key=lambda each: (each[0].grade.rank, each[1])))
 
 
@@ -70,9 +79,10 @@ def _unseen_error_pct(judgement: Judgement) -> float:
     return float("inf") if error is None else float(error)
 
 
-def _verdict(evidence: Evidence, judgement: Judgement) -> Verdict:
+def _verdict(evidence: Evidence, judgement: Judgement, expected: Expected | None) -> Verdict:
     driven = [_runs(evidence.outcome.verdicts), *_campaign(evidence.outcome)] if evidence.outcome else []
-    reasons = [*_errors_and_intervals(judgement), *driven, *_warnings(evidence, judgement.estimator)]
+    stated = _stated(expected, evidence.vehicle) if expected and judgement.estimator == "cross_spectrum" else None
+    reasons = [*_errors_and_intervals(judgement), stated, *driven, *_warnings(evidence, judgement.estimator)]
     return Verdict(judgement.estimator, tuple(reason for reason in reasons if reason is not None))
 
 
@@ -141,6 +151,18 @@ def is_covered(one: Judged, quantity: str) -> bool | None:
     return low <= truth <= high if low <= high else None  # NaN is no interval
 
 
+def _stated(expected: Expected, vehicle: Vehicle) -> Reason:
+    """The loads driven may be few and near; this is of all. A normal error is sqrt(2 / pi) sigma on average."""
+    low_kg, high_kg = vehicle.payload_range_kg
+    percent = 100.0 * math.sqrt(2.0 / math.pi) * expected.payload_std_kg / (high_kg - low_kg)
+    return Reason(
+        "stated_spread",
+        _graded(percent, FIT_ERROR_PCT, MOST_ERROR_PCT),
+        f"Over all loads that the vehicle may carry it states ± {expected.payload_std_kg:.0f} kg (standard deviation), "
+        f"a mean error of {percent:.1f} % of the range.",
+    )
+
+
 def _answered(table: Mapping[str, Any], part: Part) -> Reason:
     share = table["n_rejected"] / table["n_batches"] if table["n_batches"] else 1.0
     return Reason(
@@ -194,10 +216,10 @@ def _runs(verdicts: Sequence[RunVerdict]) -> Reason | None:
     doubtful = [one.number for one in verdicts if one.is_usable and _has_warning(one)]
     if unusable:
         grade = Grade.UNFIT if 2 * len(unusable) > len(verdicts) else Grade.RESERVED
-        return Reason("runs", grade, f"Of {len(verdicts)} runs, {_listed(unusable)} cannot be used.")
+        return Reason("runs", grade, f"Of {counted(len(verdicts), 'run')} cannot be used: {_listed(unusable)}.")
     if doubtful:
-        return Reason("runs", Grade.RESERVED, f"Of {len(verdicts)} runs, {_listed(doubtful)} want a look.")
-    return Reason("runs", Grade.FIT, f"All {len(verdicts)} runs are sound.")
+        return Reason("runs", Grade.RESERVED, f"Of {counted(len(verdicts), 'run')} want a look: {_listed(doubtful)}.")
+    return Reason("runs", Grade.FIT, f"Without a fault: {counted(len(verdicts), 'run')}, all there are.")
 
 
 def _has_warning(verdict: RunVerdict) -> bool:
@@ -205,4 +227,4 @@ def _has_warning(verdict: RunVerdict) -> bool:
 
 
 def _listed(numbers: Sequence[int]) -> str:
-    return f"{len(numbers)} (number {', '.join(map(str, numbers))})"
+    return ", ".join(f"run {number}" for number in numbers)

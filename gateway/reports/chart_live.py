@@ -13,6 +13,8 @@ from gateway.reports.chart import COLOURS, Axis, Cells, Chart, Line, Mark, Panel
 _LEGEND_PX: Final = 90
 _GAP_PX: Final = 95
 _OPACITY: Final = 0.18
+_TICKS: Final = [digit * 10.0**decade for decade in range(-5, 4) for digit in (1, 2, 5)]
+_LOG_TICKS: Final = {"tickmode": "array", "tickvals": _TICKS, "ticktext": [f"{tick:g}" for tick in _TICKS]}
 
 
 def plotly_script() -> str:
@@ -83,7 +85,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
         "range": limits,
         "automargin": True,
         "zeroline": False,
-        **({"dtick": "D2"} if axis.is_log else {}),  # labels at 1, 2 and 5
+        **(_LOG_TICKS if axis.is_log else {}),
         **(places if axis.places else {}),
     }
 
