@@ -20,6 +20,8 @@ class Kind(StrEnum):
     RATE_LOW = "rate_low"
     JITTER = "jitter"
     GAPS = "gaps"
+    SENSOR_STUCK = "sensor_stuck"
+    SENSOR_SATURATED = "sensor_saturated"
     CHANNELS_SWAPPED = "channels_swapped"
     ACCELERATION_SIGN = "acceleration_sign"
     ACCELERATION_UNIT = "acceleration_unit"
@@ -103,6 +105,12 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             "let the interface stamp frames as they arrive, not the program that stores them",
         ),
         Kind.GAPS: Explained(Topic.SENSORS, "frames are missing", "check wiring, bus load and what the logger drops"),
+        Kind.SENSOR_STUCK: Explained(
+            Topic.SENSORS, "a sensor repeated one number for seconds", "power-cycle or replace the device"
+        ),
+        Kind.SENSOR_SATURATED: Explained(
+            Topic.SENSORS, "a sensor sat at the end of its range", "choose a larger range in the device"
+        ),
         Kind.CHANNELS_SWAPPED: Explained(
             Topic.SENSORS,
             "what is mapped as pitch rate carries gravity, and what is mapped as acceleration does not",

@@ -30,16 +30,15 @@ from gateway.calibration.inspection_rows import (
     stands_still_but_shakes,
 )
 from gateway.core.batch import REASON_SHARE_MIN
-from gateway.core.cross_spectra import CrossSpectra, cross_spectra_of
+from gateway.core.cross_spectra import LEAST_SEGMENTS, CrossSpectra, cross_spectra_of
 from gateway.core.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.records import Batch, Signal, Why
 
-GAP_SHARE_NOTED: Final = 0.02
+MASKED_SHARE_NOTED: Final = 0.02
 SMOOTH_MPS2: Final = 0.08  # the quietest ordinary road shakes a vehicle more, in the estimators' band
 STEPS_SHARE_MAX: Final = 0.1  # of a signal's power in that band
-TOO_FEW_SEGMENTS: Final = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +69,10 @@ def inspect_run(inspected: Inspected, vehicle: Vehicle, settings: BatchSettings)
     acceleration, findings = gravity_findings(facts)
     findings.extend(rate_findings(facts, settings))
     findings.extend(_speed_findings(inspected, settings))
-    findings.extend(_gap_findings(inspected))
+    findings.extend(_masked_findings(inspected))
     spectra = cross_spectra_of(inspected.batches, reading_of(vehicle))
     if spectra is None:
-        findings.extend(_unsteady_findings(inspected, settings))
+        findings.extend(_unsteady_findings(inspected))
     elif acceleration.is_axis_sound:
         findings.extend(_motion_findings(spectra, inspected, vehicle, acceleration))
         findings.extend(_excitation_findings(spectra, facts, acceleration))
@@ -138,11 +137,10 @@ def _excitation_findings(spectra: CrossSpectra, facts: RowFacts, acceleration: M
 
 def _speed_findings(inspected: Inspected, settings: BatchSettings) -> Iterator[Finding]:
     """Speed missing, frozen or outside the gate: a fault where that alone leaves no batch, else a warning."""
-    if _is_too_short(inspected, settings):
-        return
-    if stands_still_but_shakes(inspected.facts):
+    if _is_standing(inspected, settings):
         text = "the speed reads 0 from beginning to end, the vehicle shakes as it does when driven"
         yield found(Kind.SPEED_FROZEN, Severity.FAULT, text)
+    if _is_too_short(inspected, settings):
         return
     is_lost = all(batch.rejected for batch in inspected.identification.batches)
     ruinous = 1.0 - settings.usable_share_min
@@ -158,10 +156,19 @@ def _speed_findings(inspected: Inspected, settings: BatchSettings) -> Iterator[F
         )
 
 
+def _needed_s(settings: BatchSettings) -> float:
+    return settings.last_batch_share_min * settings.window_s
+
+
+def _is_standing(inspected: Inspected, settings: BatchSettings) -> bool:
+    """True where a whole batch could have been driven, and was to all appearance, but the speed stays at 0."""
+    return inspected.facts.duration_s >= _needed_s(settings) and stands_still_but_shakes(inspected.facts)
+
+
 def _is_too_short(inspected: Inspected, settings: BatchSettings) -> bool:
     """True where not even the longest stretch of the drive, or of the part that identifies, makes one batch."""
     part = inspected.identification.batches if inspected.has_identification else inspected.batches
-    return all(batch.duration_s < settings.last_batch_share_min * settings.window_s for batch in part)
+    return all(batch.duration_s < _needed_s(settings) for batch in part)
 
 
 def _speeds(inspected: Inspected, settings: BatchSettings) -> str:
@@ -177,19 +184,24 @@ def _speeds(inspected: Inspected, settings: BatchSettings) -> str:
     return text
 
 
-def _gap_findings(inspected: Inspected) -> Iterator[Finding]:
-    silent = [Why.GAP, Why.ACCELERATION_MISSING, Why.PITCH_RATE_MISSING]
+def _masked_findings(inspected: Inspected) -> Iterator[Finding]:
+    """Time lost to gaps, and to sensors that stuck or sat at the end of their range."""
     if any(stream.n < 2 for stream in inspected.facts.streams.values()):
         return
-    share = sum(_share(inspected.batches, why) for why in silent)
-    if share > GAP_SHARE_NOTED:
-        yield found(Kind.GAPS, Severity.WARNING, f"{share:.1%} of the drive")
+    for kind, whys in (
+        (Kind.GAPS, (Why.GAP, Why.ACCELERATION_MISSING, Why.PITCH_RATE_MISSING)),
+        (Kind.SENSOR_STUCK, (Why.ACCELERATION_STUCK, Why.PITCH_RATE_STUCK)),
+        (Kind.SENSOR_SATURATED, (Why.ACCELERATION_SATURATED, Why.PITCH_RATE_SATURATED)),
+    ):
+        shares = {why: _share(inspected.batches, why) for why in whys}
+        if sum(shares.values()) > MASKED_SHARE_NOTED:
+            text = ", ".join(f"{why} {share:.1%} of the drive" for why, share in shares.items() if share > 0.0)
+            yield found(kind, Severity.WARNING, text)
 
 
-def _unsteady_findings(inspected: Inspected, settings: BatchSettings) -> Iterator[Finding]:
-    usable_s = sum(batch.usable_share * batch.duration_s for batch in inspected.batches)
-    if usable_s >= settings.last_batch_share_min * settings.window_s:
-        text = f"{usable_s:.0f} s can be used, fewer than {TOO_FEW_SEGMENTS} stretches of 5 s are at even speed"
+def _unsteady_findings(inspected: Inspected) -> Iterator[Finding]:
+    if any(not batch.rejected for batch in inspected.identification.batches):
+        text = f"fewer than {LEAST_SEGMENTS} unbroken stretches of 5 s at even speed"
         yield found(Kind.UNSTEADY, Severity.WARNING, text)
 
 
@@ -199,9 +211,10 @@ def _batch_findings(inspected: Inspected, settings: BatchSettings, *, has_fault:
     if not inspected.has_identification:
         return
     if _is_too_short(inspected, settings):
+        if _is_standing(inspected, settings):
+            return
         longest_s = max((batch.duration_s for batch in batches), default=0.0)
-        needed_s = settings.last_batch_share_min * settings.window_s
-        text = f"its longest unbroken stretch lasts {longest_s:.0f} s, a batch needs {needed_s:.0f} s"
+        text = f"its longest unbroken stretch lasts {longest_s:.0f} s, a batch needs {_needed_s(settings):.0f} s"
         yield found(Kind.TOO_SHORT, Severity.FAULT, text)
     elif all(batch.rejected for batch in batches):
         if not has_fault:

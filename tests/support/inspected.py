@@ -1,0 +1,100 @@
+"""A simulated drive as decoded rows, what a wrong signal map would make of them, and the verdict on it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gateway.bus.decode import Decoder
+from gateway.bus.signal_map import SignalMap, load_signal_map
+from gateway.calibration.inspection import RunVerdict
+from gateway.calibration.inspection_rows import row_facts
+from gateway.calibration.inspection_run import Inspected, inspect_run
+from gateway.core.batch import Traits
+from gateway.core.known_run import KnownRun
+from gateway.core.scheduler import Scheduler
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle, front_share_pct
+from gateway.offline.wiring import Wiring
+from gateway.records import Motion, Signal
+from gateway.sim.drive import Drive
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import simulate_drive
+from gateway.sim.sensors import REFERENCE
+from gateway.sim.vehicle import Load
+from gateway.sim.vehicle import Vehicle as SimulatedVehicle
+
+ACCELERATION, PITCH_RATE = Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE
+
+
+def reference_map() -> SignalMap:
+    return load_signal_map("springscale:reference")
+
+
+def driven(
+    van: SimulatedVehicle, drive: Drive, position_m: float, load: Load | None = None, gyro_axis: int = 1
+) -> Motion:
+    """The van over an ordinary road, its sensors this far behind the front axle; gyro_axis 0 is roll, 2 yaw."""
+    sensors = replace(REFERENCE, mount=replace(REFERENCE.mount, position_m=position_m))
+    loads = (load,) if load else ()
+    recording = simulate_drive(van, loads, iso_road("B"), drive, sensors, 3).recording
+    gyro = recording.gyro_radps.copy()
+    gyro[:, 1] = gyro[:, gyro_axis]
+    return Decoder(reference_map()).decode(Wiring("reference").frames_of(replace(recording, gyro_radps=gyro)))
+
+
+def stated(van: SimulatedVehicle, position_m: float) -> Vehicle:
+    """The van as a campaign file states it."""
+    return Vehicle(van.name, van.sprung_kg, van.wheelbase_m, van.empty_front_share_pct, position_m)
+
+
+def scaled(motion: Motion, **factors: float) -> Motion:
+    """As if the map gave these signals in other units or with other signs: pitch_rate=-1.0."""
+    columns = motion.columns.copy()
+    for name, factor in factors.items():
+        columns[:, motion.signals.index(Signal(name))] *= factor
+    return replace(motion, columns=columns)
+
+
+def exchanged(motion: Motion, one: Signal, other: Signal, factor: float = 1.0) -> Motion:
+    """As if the map gave each of two signals where the other belongs; the second then times ``factor``."""
+    i, j = motion.signals.index(one), motion.signals.index(other)
+    columns = motion.columns.copy()
+    columns[:, [i, j]] = columns[:, [j, i]]
+    columns[:, j] *= factor
+    return replace(motion, columns=columns)
+
+
+def without(motion: Motion, signal: Signal) -> Motion:
+    """As if the signal had never been valid."""
+    return scaled(motion, **{signal: np.nan})
+
+
+def traits_of_reference() -> Traits:
+    """Latency and resolution of the reference map; its ranges are left aside, for a wrong unit scales them too."""
+    traits = reference_map().traits
+    return {signal: replace(trait, minimum=np.nan, maximum=np.nan) for signal, trait in traits.items()}
+
+
+def with_resolution(traits: Traits, signal: Signal, resolution: float) -> Traits:
+    """The same, one signal in steps of ``resolution`` (SI)."""
+    return {**traits, signal: replace(traits[signal], resolution=resolution)}
+
+
+def verdict_on(
+    motion: Motion,
+    vehicle: Vehicle,
+    traits: Traits,
+    load: tuple[float, float | None] = (0.0, None),
+    window_s: float = 120.0,
+) -> RunVerdict:
+    """All of the drive identifies; ``load`` is payload and its position."""
+    settings = BatchSettings(window_s=window_s)
+    scheduler = Scheduler(settings, traits)
+    batches = (*scheduler.feed(motion), *scheduler.flush())
+    run = KnownRun(1, "a.log", load[0], front_share_pct(vehicle, *load), batches)
+    return inspect_run(Inspected(run, replace(run, batches=()), row_facts(motion, traits)), vehicle, settings)
+
+
+def kinds(verdict: RunVerdict) -> list[str]:
+    """fault:pitch_rate_sign and so on."""
+    return [f"{finding.severity}:{finding.kind}" for finding in verdict.findings]
