@@ -14,12 +14,14 @@ class Choice:
     """One set of runs driven so far and every run that could follow it.
 
     ``before`` and ``after`` (by the run's number) are errors over one and the same set of batches;
-    ``advised`` and ``least`` are the runs that the plan expects most and least of.
+    ``advised`` and ``least`` are the runs that the plan expects most and least of. ``expected`` is what it
+    expects of the loads the vehicle carries before any of them.
     """
 
     numbers: tuple[int, ...]
     advised: int
     least: int
+    expected: Errors
     before: Errors
     after: Mapping[int, Errors]
 
@@ -34,6 +36,7 @@ class Comparison:
     """
 
     n_choices: int
+    expected: Errors
     before: Errors
     advised: Errors
     others: Errors
@@ -66,6 +69,7 @@ def compared(choices: Sequence[Choice]) -> Comparison:
     by_hindsight = [sorted(choice.after.values(), key=_both) for choice in choices]
     return Comparison(
         n_choices=len(choices),
+        expected=_mean([choice.expected for choice in choices]),
         before=_mean([choice.before for choice in choices]),
         advised=_mean(advised),
         others=_mean(others),

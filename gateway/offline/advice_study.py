@@ -5,16 +5,18 @@ taken as the fourth; the plan chooses among them knowing the triple alone. Judge
 of all runs, the same batches for every choice.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Final
 
 from gateway.calibration.advice_study import AdviceStudy, Choice, Errors, compared
 from gateway.calibration.campaign import Campaign
-from gateway.calibration.design import Design
+from gateway.calibration.design import Design, Spread
 from gateway.calibration.design_loads import PlacedLoad, weighed_loads
 from gateway.calibration.evaluation import error_table
 from gateway.calibration.learning_curve import triples_at_different_positions
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cross_spectrum import CrossSpectrumCalibration
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
@@ -80,16 +82,23 @@ class _Tried:
     def choice(self, numbers: tuple[int, ...]) -> tuple[Choice, Choice]:
         """What could follow these runs, once with misses and once of what was answered."""
         calibrated, before = self._calibrated(numbers)
-        advised, least = self._advice(numbers, calibrated)
+        advised, least, expected = self._advice(numbers, calibrated)
         after = {number: self._calibrated((*numbers, number))[1] for number in self._split if number not in numbers}
         both = [
-            Choice(numbers, advised, least, before[which], {number: errors[which] for number, errors in after.items()})
+            Choice(
+                numbers,
+                advised,
+                least,
+                expected,
+                before[which],
+                {number: errors[which] for number, errors in after.items()},
+            )
             for which in (0, 1)
         ]
         return both[0], both[1]
 
-    def _advice(self, numbers: tuple[int, ...], calibrated: CalibratedVehicle) -> tuple[int, int]:
-        """The runs not driven yet that the plan expects most and least of."""
+    def _advice(self, numbers: tuple[int, ...], calibrated: CalibratedVehicle) -> tuple[int, int, Errors]:
+        """The runs not driven yet that the plan expects most and least of, and the errors it expects so far."""
         found = calibrated.cross_spectrum
         if found is None:
             raise ValueError("a study of the advice needs the cross-spectral calibration")
@@ -104,6 +113,7 @@ class _Tried:
         return (
             number_of[design.best(found.covariance, loads)],
             number_of[design.worst(found.covariance, loads)],
+            _expected(design.spread(found.covariance), found, self._vehicle),
         )
 
     def _calibrated(self, numbers: tuple[int, ...]) -> tuple[CalibratedVehicle, Scored]:
@@ -123,6 +133,16 @@ class _Tried:
             (payload["mean_abs_pct_with_misses"], share["mean_abs_pct_with_misses"]),
             (_or_nan(payload["mean_abs_pct"]), _or_nan(share["mean_abs_pct"])),
         )
+
+
+def _expected(spread: Spread, found: CrossSpectrumCalibration, vehicle: Vehicle) -> Errors:
+    """Mean |error| (12) of Gaussian errors with the standard deviations that the service would state."""
+    (low_kg, high_kg), (low_pct, high_pct) = vehicle.payload_range_kg, vehicle.front_share_range_pct
+    mean_of_std = 100.0 * math.sqrt(2.0 / math.pi)
+    return (
+        mean_of_std * found.payload_inflation * spread.payload_std_kg / (high_kg - low_kg),
+        mean_of_std * found.front_share_inflation * spread.front_share_std_pct / (high_pct - low_pct),
+    )
 
 
 def _or_nan(x: float | None) -> float:

@@ -59,7 +59,9 @@ def advice_page(found: Mapping[str, Any]) -> str:
             "which it would drive. Judged on the validation part of all runs, the same batches for every choice. Mean "
             "|error| (12) of payload and of share, cross spectrum: once with every rejected batch counted as a "
             "mid-range answer, once over answered batches only. The second flatters whoever refuses the hard ones, so "
-            "the first decides.",
+            "the first decides. What the plan itself expects after three runs, of the loads the vehicle may carry, "
+            f"is a mean |error| of {_number(answered['expected'][0], 2)} and {_number(answered['expected'][1], 2)} %: "
+            "cautious where it lies above what was found.",
             "",
             "| Calibrated on | Payload % | Share % | Payload %, answered | Share %, answered |",
             "|---|---|---|---|---|",

@@ -21,14 +21,29 @@ from gateway.offline.known_runs import SplitRun
 from gateway.records import Why
 
 CHOICES = [
-    Choice((1, 2, 3), advised=4, least=5, before=(9.0, 8.0), after={4: (2.0, 3.0), 5: (8.0, 6.0), 6: (4.0, 2.0)}),
-    Choice((1, 2, 5), advised=3, least=6, before=(7.0, 6.0), after={3: (5.0, 5.0), 4: (1.0, 1.0), 6: (6.0, 9.0)}),
+    Choice(
+        (1, 2, 3),
+        advised=4,
+        least=5,
+        expected=(7.0, 5.0),
+        before=(9.0, 8.0),
+        after={4: (2.0, 3.0), 5: (8.0, 6.0), 6: (4.0, 2.0)},
+    ),
+    Choice(
+        (1, 2, 5),
+        advised=3,
+        least=6,
+        expected=(9.0, 7.0),
+        before=(7.0, 6.0),
+        after={3: (5.0, 5.0), 4: (1.0, 1.0), 6: (6.0, 9.0)},
+    ),
 ]
 
 
 def test_the_comparison_by_hand() -> None:
     found = compared(CHOICES)
     assert found.n_choices == 2
+    assert found.expected == (8.0, 6.0)
     assert found.before == (8.0, 7.0)
     assert found.advised == (3.5, 4.0)
     assert found.others == pytest.approx(((6.0 + 3.5) / 2, (4.0 + 5.0) / 2))
@@ -41,7 +56,7 @@ def test_the_comparison_by_hand() -> None:
 
 def test_a_choice_that_answered_nothing_is_worst_by_hindsight_and_in_no_mean() -> None:
     silent = (math.nan, math.nan)
-    found = compared([Choice((1, 2), 3, 4, (5.0, 5.0), {3: (2.0, 2.0), 4: silent, 5: (6.0, 4.0)})])
+    found = compared([Choice((1, 2), 3, 4, (1.0, 1.0), (5.0, 5.0), {3: (2.0, 2.0), 4: silent, 5: (6.0, 4.0)})])
     assert found.best == (2.0, 2.0)
     assert found.others == (6.0, 4.0)
 
@@ -80,6 +95,8 @@ def test_every_set_of_runs_is_calibrated_once_and_from_identification_parts(monk
     assert found.with_misses.before[0] == pytest.approx(
         100.0 * (225 + 25 + 75 + 25 + 175) / 5 / 450
     )  # mid-range answers
+    assert found.answered.expected == found.with_misses.expected
+    assert 0.0 < found.answered.expected[0] < 100.0
     assert math.isnan(found.answered.before[0])
     assert found.to_json()["answered"]["before"] == [None, None]
     assert found.to_json()["with_misses"]["n_choices"] == 3
