@@ -1,0 +1,115 @@
+"""One machine for the whole run: booted once, the package under test installed in it. Files run in their order."""
+
+import json
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from vm.harness.backend import best_backend
+from vm.harness.machine import Machine
+from vm.harness.vehicle import NO_START_LIMIT, SETTINGS, Vehicle
+
+BUILD = Path(__file__).parents[2] / "build"
+RESULTS = BUILD / "vm-results.json"
+_BEGUN_S = time.monotonic()
+_RECOVERY = pytest.StashKey[float]()
+_FINDINGS = pytest.StashKey[dict[str, dict[str, object]]]()
+
+
+def _package() -> Path:
+    """The package under test: what `make deb` left, unless SPRINGSCALE_DEB names another."""
+    found = list(BUILD.glob("springscale_*.deb"))
+    named = os.environ.get("SPRINGSCALE_DEB")
+    if named is None and not found:
+        pytest.skip("no package to test: make deb")
+    return Path(named) if named else max(found, key=lambda path: path.stat().st_mtime)
+
+
+@pytest.fixture(scope="session")
+def package() -> Path:
+    """The .deb under test."""
+    return _package()
+
+
+@pytest.fixture(scope="session")
+def machine(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Iterator[Machine]:
+    """A booted machine without our package."""
+    backend = best_backend()
+    if isinstance(backend, str):
+        pytest.skip(backend)
+    made = Machine(backend, tmp_path_factory.mktemp("machine"))
+    try:
+        made.boot()
+        request.config.stash.setdefault(_FINDINGS, {})["machine"] = {
+            "backend": backend.name,
+            "kernel": made.run("uname -r").strip(),
+            "systemd": made.run("systemctl --version").split("\n")[0],
+            "boot_s": round(made.boot_s, 1),
+        }
+        yield made
+    finally:
+        made.close()
+
+
+@pytest.fixture(scope="session")
+def installed(machine: Machine, package: Path) -> Vehicle:
+    """The machine with the package, vcan0 and a running service."""
+    vehicle = Vehicle(machine)
+    vehicle.install(package)
+    vehicle.wait_until(lambda status: True)
+    return vehicle
+
+
+@pytest.fixture
+def vehicle(installed: Vehicle) -> Iterator[Vehicle]:
+    """The service as a test finds it: settings as shipped for tests, bus up, nothing playing, running."""
+    yield installed
+    installed.stop_playing()
+    installed.run("ip link set vcan0 up 2>/dev/null || networkctl reload")
+    installed.configure(SETTINGS)
+    installed.drop_in("no-start-limit", NO_START_LIMIT)
+    installed.restart()
+    installed.wait_until(lambda status: True)
+
+
+@pytest.fixture
+def recovered(request: pytest.FixtureRequest) -> Callable[[float], None]:
+    """Called with the measured recovery time in seconds: it goes into docs/faults.md."""
+
+    def note(seconds: float) -> None:
+        request.node.stash[_RECOVERY] = seconds
+
+    return note
+
+
+@pytest.fixture
+def measured(request: pytest.FixtureRequest) -> Callable[..., None]:
+    """Called with figures, name=number: they go into docs/deployment.md."""
+
+    def note(**figures: float) -> None:
+        request.config.stash.setdefault(_FINDINGS, {}).setdefault("figures", {}).update(figures)
+
+    return note
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Keep each test's outcome and recovery time."""
+    outcome = yield
+    report = outcome.get_result()  # type: ignore[attr-defined]
+    if report.when == "call":
+        findings = item.config.stash.setdefault(_FINDINGS, {}).setdefault("tests", {})
+        findings[item.name] = {"outcome": report.outcome, "recovery_s": item.stash.get(_RECOVERY, None)}
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Write what was found and how long it took."""
+    findings = session.config.stash.get(_FINDINGS, {})
+    if findings:
+        BUILD.mkdir(exist_ok=True)
+        RESULTS.write_text(json.dumps(findings, indent=1) + "\n")
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if reporter is not None:
+        reporter.write_line(f"\nthe machine's tests took {time.monotonic() - _BEGUN_S:.0f} s")

@@ -1,0 +1,77 @@
+"""How the test machine is run: User Mode Linux, or QEMU. Both need root, /dev/net/tun and the tools named here."""
+
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from vm.harness.image import TOOLS
+
+UML: Final = "linux.uml"
+QEMU: Final = "qemu-system-x86_64"
+MEMORY_MB: Final = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """What a start needs to know: the kept image, this run's own disk, its network."""
+
+    image: Path
+    disk: Path
+    tap: str
+    guest_address: str  # with its prefix length
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """A name, and the command that runs the machine in the foreground, its console on standard output."""
+
+    name: str
+    command: Callable[[Wiring], list[str]]
+
+
+def best_backend() -> Backend | str:
+    """User Mode Linux before QEMU; SPRINGSCALE_VM names one. Where none can run: why, in one line."""
+    missing = [tool for tool in (*TOOLS, "ip", "setpriv", "unshare", "taskset") if shutil.which(tool) is None]
+    if os.geteuid() != 0:
+        return "a test machine needs root"
+    if not os.access("/dev/net/tun", os.R_OK | os.W_OK):
+        return "a test machine needs /dev/net/tun"
+    if missing:
+        return f"a test machine needs {', '.join(missing)}: see the packages in .ci/run"
+    present = [name for name, (program, _) in _BACKENDS.items() if shutil.which(program)]
+    wanted = os.environ.get("SPRINGSCALE_VM", present[0] if present else "")
+    if wanted not in present:
+        return f"a test machine needs {UML} (package user-mode-linux) or {QEMU} (package qemu-system-x86)"
+    return Backend(wanted, _BACKENDS[wanted][1])
+
+
+def _uml(wiring: Wiring) -> list[str]:
+    # One CPU: User Mode Linux switches between its kernel and its user process at every system call, and across
+    # CPUs that costs many times more.
+    return ["taskset", "--cpu-list", str(max(os.sched_getaffinity(0))), UML, "seccomp=on", f"mem={MEMORY_MB}M",
+            f"ubd0={wiring.disk}", "root=/dev/ubda", "rw", "rootfstype=ext4",
+            f"vec0:transport=tap,ifname={wiring.tap},depth=64,gro=1", "con0=null,fd:1", "con=null",
+            *_common("vec0", wiring)]  # fmt: skip
+
+
+def _qemu(wiring: Wiring) -> list[str]:
+    # kvm_pvm runs patched guests only: /dev/kvm counts where a processor's own module stands behind it.
+    has_kvm = any(Path("/sys/module", module).exists() for module in ("kvm_amd", "kvm_intel"))
+    accelerator = ["-accel", "kvm", "-cpu", "host"] if has_kvm else ["-accel", "tcg,thread=multi", "-cpu", "max"]
+    return [QEMU, *accelerator, "-smp", "2", "-m", str(MEMORY_MB), "-display", "none", "-nodefaults", "-no-reboot",
+            "-serial", "stdio", "-kernel", str(wiring.image / "vmlinuz"), "-initrd", str(wiring.image / "initrd.img"),
+            "-drive", f"file={wiring.disk},if=virtio,format=raw,cache=writeback",
+            "-netdev", f"tap,id=net,ifname={wiring.tap},script=no,downscript=no",
+            "-device", "virtio-net-pci,netdev=net,romfile=", "-device", "virtio-rng-pci",
+            "-append", " ".join(["root=/dev/vda rw console=ttyS0 net.ifnames=0 panic=-1", *_common("eth0", wiring)])
+            ]  # fmt: skip
+
+
+def _common(interface: str, wiring: Wiring) -> list[str]:
+    return ["quiet", "systemd.show_status=0", f"springscale.network={interface},{wiring.guest_address}"]
+
+
+_BACKENDS: Final[Mapping[str, tuple[str, Callable[[Wiring], list[str]]]]] = {"uml": (UML, _uml), "qemu": (QEMU, _qemu)}

@@ -1,0 +1,39 @@
+"""Short simulated drives as candump logs: a loaded van that the shipped calibration can weigh in 20 s batches."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from gateway.bus.candump_write import write_candump
+from gateway.offline.plans import PAPER_SPEED_MPS
+from gateway.offline.wiring import Wiring
+from gateway.records import Frames
+from gateway.sim.drive import constant
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import START_NS, LoadStep, simulate_drive
+from gateway.sim.sensors import REFERENCE
+from gateway.sim.vans import PAPER_VAN
+from gateway.sim.vehicle import Load
+
+LOAD = Load(270.0, 1.3)
+
+
+@cache
+def loaded_drive(duration_s: float, seed: int, map_name: str = "reference") -> Frames:
+    """The paper's van with 270 kg at about 50 km/h on an ISO 8608 class B road, as frames of a shipped map."""
+    speed = constant(PAPER_SPEED_MPS, duration_s, np.random.default_rng(seed), 0.4)
+    driven = simulate_drive(PAPER_VAN, [LoadStep(0.0, (LOAD,))], iso_road("B"), speed, REFERENCE, seed, START_NS)
+    return Wiring(map_name).frames_of(driven.recording)
+
+
+def faster(frames: Frames, times: float) -> Frames:
+    """The same frames with their stamps closer together."""
+    t_ns = START_NS + ((frames.t_ns - START_NS) / times).astype(np.int64)
+    return Frames(t_ns, frames.can_id, frames.length, frames.payload)
+
+
+def log_of(frames: Frames, path: Path) -> Path:
+    """A candump log for vcan0."""
+    write_candump(frames, "vcan0", path)
+    return path

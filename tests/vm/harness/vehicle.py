@@ -1,0 +1,162 @@
+"""The box in the vehicle: the machine with the package under test installed, seen as its owner and as a client."""
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import httpx
+from vm.harness.machine import Machine
+
+CONFIG: Final = "/etc/springscale/springscale.toml"
+STATE: Final = "/var/lib/springscale"
+SETTINGS: Final = """\
+signals = "springscale:reference"
+calibration = "vehicle.json"
+[vehicle]
+id = "van-17"
+[bus]
+channel = "vcan0"
+[batch]
+window_s = 20.0
+silence_s = 3.0
+provisional_every_s = 5.0
+[web]
+host = "0.0.0.0"
+"""
+# What docs/deployment.md tells whoever opens the API to a network of his
+FIREWALL: Final = "[Service]\nIPAddressAllow=198.18.0.0/16\n"
+NO_START_LIMIT: Final = "[Unit]\nStartLimitIntervalSec=0\n"
+WAIT_S: Final = 90.0
+HEARD: Final = "/root/heard.log"  # in the guest
+
+Answer = dict[str, Any]
+
+
+class Vehicle:
+    """One springscale service on one machine, asked over HTTP from outside it."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.run = machine.run
+        self._token = ""
+
+    def install(self, package: Path) -> None:
+        """As docs/deployment.md tells: package, virtual bus, configuration, token, start."""
+        self.machine.write(f"/root/{package.name}", package.read_bytes())
+        self.run(f"dpkg --install /root/{package.name}", timeout_s=300.0)
+        self.run("cp /usr/share/springscale/network/vcan0.* /etc/systemd/network/ && networkctl reload")
+        self.drop_in("firewall", FIREWALL)
+        self.drop_in("no-start-limit", NO_START_LIMIT)
+        self.run("cp /usr/lib/springscale/gateway/demo/paper_van.json /etc/springscale/vehicle.json")
+        self.configure(SETTINGS)
+        self._token = self.run(f"springscale token create test --config {CONFIG}").strip()
+        self.run("systemctl enable --now springscale", timeout_s=90.0)
+
+    def configure(self, settings: str) -> None:
+        """Write springscale.toml; a restart or reload applies it."""
+        self.machine.write(CONFIG, settings)
+
+    def drop_in(self, name: str, content: str | None) -> None:
+        """Add a drop-in of the unit, or remove it."""
+        folder = "/etc/systemd/system/springscale.service.d"
+        self.run(f"mkdir -p {folder}; rm -f {folder}/{name}.conf")
+        if content is not None:
+            self.machine.write(f"{folder}/{name}.conf", content)
+        self.run("systemctl daemon-reload")
+
+    def restart(self) -> None:
+        """Restart the service; returns once it is ready."""
+        self.run("systemctl reset-failed springscale; systemctl restart springscale", timeout_s=90.0)
+
+    def get(self, path: str, **query: Any) -> Answer:
+        """An answer of the API as an outside client gets it. Raises httpx.TransportError where nobody answers."""
+        response = httpx.get(
+            f"http://{self.machine.address}:8000/api/v1/{path}",
+            params=query,
+            headers={"authorization": f"Bearer {self._token}"},
+            timeout=10.0,
+        )
+        response.raise_for_status()
+        answer: Answer = response.json()
+        return answer
+
+    def status(self) -> Answer:
+        """GET status."""
+        return self.get("status")
+
+    def records(self) -> list[Answer]:
+        """Every estimate and rejection, oldest first, from the API's pages."""
+        items: list[Answer] = []
+        page = self.get("estimates", limit=1000)
+        while True:
+            items += page["items"]
+            if page["next_cursor"] is None or not page["items"]:
+                return items
+            page = self.get("estimates", limit=1000, cursor=page["next_cursor"])
+
+    def wait_until(self, is_so: Callable[[Answer], bool], timeout_s: float = WAIT_S) -> float:
+        """Seconds until the status satisfied ``is_so``; an unanswered request counts as not yet."""
+        return self.wait_for(lambda: is_so(self.status()), timeout_s)
+
+    def wait_for(self, is_so: Callable[[], bool], timeout_s: float = WAIT_S) -> float:
+        """Seconds until ``is_so`` held. Raises TimeoutError with what the service said last."""
+        begun_s = time.monotonic()
+        while time.monotonic() - begun_s < timeout_s:
+            try:
+                if is_so():
+                    return time.monotonic() - begun_s
+            except (httpx.HTTPError, OSError):
+                pass
+            time.sleep(0.1)
+        raise TimeoutError(f"not within {timeout_s} s; the journal ends with\n{self.journal(15)}")
+
+    def journal(self, n_lines: int = 50) -> str:
+        """The newest lines of the service's log."""
+        return self.run(f"journalctl --unit springscale --no-pager --output cat --lines {n_lines}")
+
+    def pid(self) -> int:
+        """The service's main process."""
+        return int(self.run("systemctl show --property MainPID --value springscale"))
+
+    def n_restarts(self) -> int:
+        """How often systemd had to start it again."""
+        return int(self.run("systemctl show --property NRestarts --value springscale"))
+
+    def put_log(self, log: Path) -> str:
+        """A log of the host in the guest; its path there."""
+        path = f"/root/{log.name}"
+        self.machine.write(path, log.read_bytes())
+        return path
+
+    def play(self, log: str, *, loops: int = 1) -> None:
+        """Begin to send a log onto vcan0 in real time; returns at once."""
+        times = "-l i" if loops == 0 else f"-l {loops}"
+        self.run(f"systemd-run --quiet --collect --unit player canplayer {times} -I {log}")
+
+    def listen(self) -> None:
+        """Begin to record vcan0 with candump, without a trace of what was there before."""
+        self.run(f"rm -f {HEARD}; systemd-run --quiet --collect --unit witness sh -c 'exec candump -L any > {HEARD}'")
+        self.wait_for(lambda: self.machine.succeeds(f"test -e {HEARD}"))
+        self.run("sleep 0.5")
+
+    def stop_listening(self) -> None:
+        """End the recording in HEARD."""
+        self.run("systemctl stop witness")
+
+    def stop_playing(self) -> None:
+        """End what :meth:`play` began, if it is not over."""
+        self.run("systemctl stop player 2>/dev/null || true")
+
+    def stored(self) -> list[Answer]:
+        """Every record in the database file itself, oldest first, after SQLite's own check of it."""
+        script = (
+            f"import json, sqlite3; c = sqlite3.connect('file:{STATE}/springscale.db?mode=ro', uri=True);"
+            "print(c.execute('PRAGMA integrity_check').fetchone()[0]);"
+            "print(json.dumps([json.loads(t) for t, in c.execute('SELECT text FROM estimates ORDER BY seq')]))"
+        )
+        verdict, records = self.run(f'python3 -c "{script}"').strip().split("\n")
+        assert verdict == "ok"
+        found: list[Answer] = json.loads(records)
+        return found

@@ -1,0 +1,86 @@
+"""The installed service under real systemd: ready, confined, reloadable, passive."""
+
+import re
+import time
+from collections.abc import Callable
+
+import httpx
+import pytest
+from vm.harness.vehicle import CONFIG, HEARD, SETTINGS, Vehicle
+
+
+def test_it_is_ready_and_answers_who_shows_a_token(vehicle: Vehicle) -> None:
+    assert vehicle.status()["vehicle_id"] == "van-17"
+    anonymous = httpx.get(f"http://{vehicle.machine.address}:8000/api/v1/status", timeout=10.0)
+    assert anonymous.status_code == 401
+    assert vehicle.run("systemctl show --property ActiveState --value springscale").strip() == "active"
+    assert "StatusText=" in vehicle.run("systemctl show --property StatusText springscale")
+
+
+def test_the_sandbox_scores_as_documented(vehicle: Vehicle, measured: Callable[..., None]) -> None:
+    report = vehicle.run("systemd-analyze security springscale --no-pager")
+    score = float(re.findall(r"exposure level for springscale.service: ([\d.]+)", report)[0])
+    measured(security_score=score)
+    assert score <= 1.5
+
+
+def test_it_runs_as_its_own_user_and_writes_to_its_state_only(vehicle: Vehicle) -> None:
+    assert vehicle.run(f"stat -c %U /proc/{vehicle.pid()}").strip() == "springscale"
+    assert vehicle.run("stat -c '%U %a' /var/lib/springscale").strip() == "springscale 750"
+    assert vehicle.run("stat -c '%U %a' /var/lib/springscale/tokens.json").strip() == "springscale 600"
+    mounts = vehicle.run(f"grep ' / ' /proc/{vehicle.pid()}/mountinfo")
+    assert " ro," in mounts
+    assert vehicle.run(f"grep CapEff /proc/{vehicle.pid()}/status").split()[1].strip("0") == ""
+
+
+def test_the_receive_buffer_is_as_large_as_asked(vehicle: Vehicle) -> None:
+    assert int(vehicle.run("cat /proc/sys/net/core/rmem_max")) == 4 << 20
+
+
+@pytest.mark.parametrize("variant", ["can0", "can0-active", "can0-fd", "can0-j1939", "vcan0"])
+def test_systemd_networkd_understands_the_network_files(variant: str, vehicle: Vehicle) -> None:
+    path = f"/etc/systemd/network/50-{variant}.network"
+    begun = vehicle.run("date +%s.%N").strip()
+    try:
+        vehicle.run(f"cp /usr/share/springscale/network/{variant}.network {path}; systemctl restart systemd-networkd")
+        said = vehicle.run(f"journalctl --unit systemd-networkd --since @{begun} --no-pager --output cat")
+    finally:
+        vehicle.run(f"rm {path}; systemctl restart systemd-networkd")
+    assert not re.search("Unknown|Failed to parse|Invalid|ignoring", said), said
+
+
+def test_a_reload_changes_the_log_level_and_says_what_waits(vehicle: Vehicle) -> None:
+    pid = vehicle.pid()
+    vehicle.configure(SETTINGS.replace("window_s = 20.0", "window_s = 25.0") + '[log]\nlevel = "warning"\n')
+    vehicle.run("systemctl reload springscale")
+    vehicle.wait_for(lambda: '"waits_for_restart": ["batch.window_s"]' in vehicle.journal())
+    assert vehicle.run("systemctl is-active springscale").strip() == "active"
+    vehicle.configure("signals = 7")
+    vehicle.run("systemctl reload springscale")
+    vehicle.wait_for(lambda: "reload refused" in vehicle.journal())
+    assert vehicle.pid() == pid
+    vehicle.status()
+
+
+def test_a_token_revoked_by_root_is_refused_at_once(vehicle: Vehicle) -> None:
+    token = vehicle.run(f"springscale token create other --config {CONFIG}").strip()
+    url, header = f"http://{vehicle.machine.address}:8000/api/v1/status", {"authorization": f"Bearer {token}"}
+    assert httpx.get(url, headers=header, timeout=10.0).status_code == 200
+    vehicle.run(f"springscale token revoke other --config {CONFIG}")
+    assert httpx.get(url, headers=header, timeout=10.0).status_code == 401
+
+
+def test_it_sends_nothing_and_its_socket_takes_nothing_it_did_not_ask_for(vehicle: Vehicle) -> None:
+    """A whole life of the service, from start to stop, while candump looks on: no frame but the tester's own."""
+    vehicle.run("systemctl stop springscale")
+    vehicle.listen()
+    vehicle.run("systemctl start springscale", timeout_s=90.0)
+    n_before = int(vehicle.run("cat /sys/class/net/vcan0/statistics/tx_packets"))
+    vehicle.run("cansend vcan0 7AB#0102")
+    time.sleep(3.0)
+    vehicle.restart()
+    vehicle.stop_listening()
+    assert int(vehicle.run("cat /sys/class/net/vcan0/statistics/tx_packets")) == n_before + 1
+    assert re.findall(r" vcan0 (\S+)", vehicle.run(f"cat {HEARD}")) == ["7AB#0102"]
+    filters = vehicle.run("cat /proc/net/can/rcvlist_sff /proc/net/can/rcvlist_fil")
+    assert {"120", "121", "130"} <= set(re.findall(r"^\s*vcan0\s+([0-9a-f]+)", filters, re.MULTILINE)), filters
