@@ -1,230 +1,218 @@
-"""Calibrates the ratio index: bands found on the campaign, then the static regression (9), (10), (11)."""
+"""Calibrates the ratio index: bands found on the campaign, then the static regression (9), (10), (11).
+
+Bands and terms are chosen by errors on runs left out. The least of many such errors flatters, for the runs
+left out took part in the choice. The nested error does not: there the whole choice is made anew without
+the run that is then judged. By it the families of structures are compared, and the spread of an answer
+is widened where it demands so.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
+from scipy.special import stdtrit
 
-from gateway.calibration.bands import WIDTHS_HZ, BandPair, IndexTable, band_amplitudes, candidate_pairs
-from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import Band, RatioIndexCalibration, SpectrumKind, mean_spectrum
-from gateway.core.regression import (
-    MODEL_9_PAYLOAD,
-    MODEL_10_FRONT_SHARE,
-    MODEL_11_FRONT_SHARE,
-    MODEL_11_PAYLOAD,
-    RegressionModel,
-    scaled_columns,
-    term_columns,
+from gateway.calibration.index_choice import (
+    TARGETS,
+    BandChoice,
+    Choice,
+    Pairs,
+    candidates,
+    choose,
+    indexes,
+    n_answered,
+    truth,
 )
+from gateway.calibration.index_table import IndexTable, index_table
+from gateway.calibration.structures import FAMILIES, Family, StructureChoice
+from gateway.core.known_run import KnownRun
+from gateway.core.ratio_index import RatioIndexCalibration, SpectrumKind
+from gateway.core.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
-from gateway.records import F64, I64, Batch
+from gateway.records import F64, Batch
 
-N_SEGMENT = 1024  # 20.5 s at 50 Hz: resolves 0.05 Hz and still fits between two traffic lights
-N_CANDIDATES = 12
-SPEED_STD_FACTOR = 2.0  # a batch's speed may spread this many times as much as the widest calibrated
+N_SEGMENT: Final = 1024  # 20.5 s at 50 Hz: resolves 0.05 Hz and still fits between two traffic lights
+SPEED_STD_FACTOR: Final = 2.0  # a batch's speed may spread this many times as much as the widest calibrated
+MOST: Final = 0.8  # quantile of nested errors that a spread must allow for; the rest may lie far outside the loads seen
+
+
+@dataclass(frozen=True, slots=True)
+class NestedErrors:
+    """Of batches of runs that took no part in any choice, (2, n), payload and front share; NaN where none is told.
+
+    error is estimate less truth, in kg and percentage points; std is what the fold's own model stated.
+    """
+
+    error: F64
+    std: F64
+
+    @property
+    def rms(self) -> tuple[float, float]:
+        """Root mean square of either target; NaN where one batch or more got no answer."""
+        found = np.sqrt(np.mean(self.error**2, axis=1))
+        return float(found[0]), float(found[1])
+
+
+@dataclass(frozen=True, slots=True)
+class FamilyTrial:
+    """The best bands for one family of structures, and how such a choice fares on runs unseen."""
+
+    family: Family
+    choice: Choice
+    nested: NestedErrors
 
 
 @dataclass(frozen=True, slots=True)
 class RatioIndexFit:
-    """The calibration and what stands behind it: leave-one-run-out errors in kg and percentage points."""
+    """The calibration and what stands behind it.
+
+    payload_errors_kg and front_share_errors_pct (n,) are the nested errors of the family chosen, batches in
+    the order of ``table``; where so few runs allow none, those of the regression alone, bands given
+    (``is_nested`` tells). ``trials`` are all families, the chosen one first.
+    """
 
     calibration: RatioIndexCalibration
     payload_errors_kg: F64 | None
     front_share_errors_pct: F64 | None
     n_runs: int
     n_batches: int
+    table: IndexTable
+    trials: tuple[FamilyTrial, ...]
+
+    @property
+    def chosen(self) -> FamilyTrial:
+        """The family whose choice errs least on runs unseen."""
+        return self.trials[0]
 
 
-def fit_ratio_index(runs: Sequence[KnownRun], vehicle: Vehicle, kind: SpectrumKind = "amplitude") -> RatioIndexFit:
+def fit_ratio_index(
+    runs: Sequence[KnownRun],
+    vehicle: Vehicle,
+    kind: SpectrumKind = "amplitude",
+    *,
+    bands: BandChoice = "campaign",
+    structure: StructureChoice = "auto",
+) -> RatioIndexFit:
     """Identification runs -> calibration. Raises CalibrationImpossibleError where they cannot carry one."""
-    batches = [(run, batch) for run in runs for batch in run.batches if not batch.rejected]
-    table = _table(batches, kind)
-    structures = _structures(table)
-    chosen = min(
-        (_evaluate(pair_a, pair_g, table, structures, vehicle) for pair_a, pair_g in _candidates(table)),
-        key=lambda trial: trial.score,
-        default=None,
-    )
-    if chosen is None or not np.isfinite(chosen.score):
-        raise CalibrationImpossibleError(
-            "no pair of bands follows the load over these runs: drive more different loads"
-        )
-    speeds = [batch.mean_speed_mps for _, batch in batches]
-    calibration = RatioIndexCalibration(
-        spectrum=kind,
-        n_segment=N_SEGMENT,
-        acceleration_bands=chosen.acceleration_bands,
-        pitch_rate_bands=chosen.pitch_rate_bands,
-        payload=chosen.payload.model if chosen.payload else None,
-        front_share=chosen.front_share.model if chosen.front_share else None,
-        speed_range_mps=(min(speeds), max(speeds)),
-        speed_std_max_mps=SPEED_STD_FACTOR * max(_speed_std_mps(batch) for _, batch in batches),
-    )
+    table = index_table(runs, kind, N_SEGMENT)
+    families = FAMILIES if structure == "auto" else (structure,)
+    trials = _family_trials(table, vehicle, bands, families)
+    chosen = trials[0]
+    models = [
+        _widened(tried.fitted.model, chosen.nested, row) if tried else None
+        for row, tried in enumerate(chosen.choice.tried)
+    ]
+    errors = [_errors(chosen, row) for row in range(2)]
+    batches = [batch for run in runs for batch in run.batches if not batch.rejected]
+    speeds = [batch.mean_speed_mps for batch in batches]
+    of_a, of_g = chosen.choice.pairs
     return RatioIndexFit(
-        calibration,
-        chosen.payload.held_out_errors if chosen.payload else None,
-        chosen.front_share.held_out_errors if chosen.front_share else None,
-        n_runs=len(np.unique(table.run)),
+        RatioIndexCalibration(
+            spectrum=kind,
+            n_segment=N_SEGMENT,
+            acceleration_bands=of_a.bands if of_a else None,
+            pitch_rate_bands=of_g.bands if of_g else None,
+            payload=models[0],
+            front_share=models[1],
+            speed_range_mps=(min(speeds), max(speeds)),
+            speed_std_max_mps=SPEED_STD_FACTOR * max(_speed_std_mps(batch) for batch in batches),
+        ),
+        payload_errors_kg=errors[0],
+        front_share_errors_pct=errors[1],
+        n_runs=table.n_runs,
         n_batches=len(table.run),
+        table=table,
+        trials=trials,
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Fitted:
-    """A regression and its errors (n,) on runs left out."""
-
-    model: RegressionModel
-    held_out_errors: F64
-
-
-@dataclass(frozen=True, slots=True)
-class _Trial:
-    acceleration_bands: tuple[Band, Band] | None
-    pitch_rate_bands: tuple[Band, Band] | None
-    payload: Fitted | None
-    front_share: Fitted | None
-    score: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Structures:
-    payload: tuple[str, ...] | None
-    front_share: tuple[str, ...] | None
+def _family_trials(
+    table: IndexTable, vehicle: Vehicle, bands: BandChoice, families: Sequence[Family]
+) -> tuple[FamilyTrial, ...]:
+    """Every family these runs can carry, the best first: most targets told, then least nested error."""
+    _check(table)
+    found = candidates(table, bands)
+    choices = {family: choose(table, found, family, vehicle) for family in families}
+    carried = {family: choice for family, choice in choices.items() if choice is not None}
+    if not carried:
+        raise CalibrationImpossibleError(
+            f"no regression ({', '.join(families)}) can be made of {table.n_runs} runs with {table.n_loads} payloads "
+            f"and {table.n_shares} front shares: drive another known load"
+        )
+    nested = _nested(table, vehicle, bands, tuple(carried))
+    trials = [FamilyTrial(family, choice, nested[family]) for family, choice in carried.items()]
+    return tuple(sorted(trials, key=lambda trial: _rank(trial, vehicle)))
 
 
-def _speed_std_mps(batch: Batch) -> float:
-    return float(np.std(batch.speed_mps[batch.usable]))
+def _rank(trial: FamilyTrial, vehicle: Vehicle) -> tuple[int, bool, float]:
+    spans = [high - low for low, high in (vehicle.payload_range_kg, vehicle.front_share_range_pct)]
+    told = [tried is not None for tried in trial.choice.tried]
+    score = sum((rms / span) ** 2 for rms, span, is_told in zip(trial.nested.rms, spans, told, strict=True) if is_told)
+    is_nested = bool(np.isfinite(score))
+    return -n_answered(trial.choice), not is_nested, score if is_nested else trial.choice.score
 
 
-def _table(batches: list[tuple[KnownRun, Batch]], kind: SpectrumKind) -> IndexTable:
-    """Spectra of every batch of which both mapped sensors give one."""
-    rows = [(run, *_spectra(batch, kind)) for run, batch in batches]
-    has_a = any(a is not None for _, a, _ in rows)
-    has_g = any(g is not None for _, _, g in rows)
-    whole = [(run, a, g) for run, a, g in rows if (a is not None or not has_a) and (g is not None or not has_g)]
-    if not whole or not (has_a or has_g):
-        raise CalibrationImpossibleError("no identification batch has enough unbroken driving for a spectrum")
-    freq_hz = next(spectrum[0] for _, a, g in whole for spectrum in (a, g) if spectrum is not None)
-    return IndexTable(
-        run=np.array([run.number for run, _, _ in whole]),
-        payload_kg=np.array([run.payload_kg for run, _, _ in whole]),
-        front_share_pct=np.array([run.front_share_pct for run, _, _ in whole]),
-        freq_hz=freq_hz,
-        acceleration=np.array([a[1] for _, a, _ in whole if a is not None]) if has_a else None,
-        pitch_rate=np.array([g[1] for _, _, g in whole if g is not None]) if has_g else None,
-        kind=kind,
-    )
-
-
-def _spectra(batch: Batch, kind: SpectrumKind) -> tuple[tuple[F64, F64] | None, tuple[F64, F64] | None]:
-    a, g = (
-        mean_spectrum(x, batch.usable, N_SEGMENT, batch.rate_hz, kind)
-        for x in (batch.vertical_acceleration_mps2, batch.pitch_rate_radps)
-    )
-    return a, g
-
-
-def _structures(table: IndexTable) -> _Structures:
-    """(11) where both sensors and enough different runs are there, (9) and (10) where not.
-
-    Raises CalibrationImpossibleError where not even those could be told from chance.
-    """
-    n_runs = len(np.unique(table.run))
-    n_loads, n_shares = len(np.unique(table.payload_kg)), len(np.unique(table.front_share_pct.round(2)))
-    if n_loads < 2:
+def _check(table: IndexTable) -> None:
+    if table.n_loads < 2:
         raise CalibrationImpossibleError(
             "the ratio index needs runs with at least two different payloads; all of these carry "
             f"{table.payload_kg[0]:g} kg: drive the vehicle empty and loaded"
         )
-    both = table.acceleration is not None and table.pitch_rate is not None
-    if both and n_runs >= len(MODEL_11_PAYLOAD) + 2 and n_shares >= 3:
-        return _Structures(MODEL_11_PAYLOAD, MODEL_11_FRONT_SHARE)
-    payload = MODEL_9_PAYLOAD if table.acceleration is not None and n_runs >= 3 else None
-    front_share = MODEL_10_FRONT_SHARE if table.pitch_rate is not None and n_runs >= 4 and n_shares >= 3 else None
-    if payload is None and front_share is None:
+    if table.n_runs < 3:
         raise CalibrationImpossibleError(
-            f"the ratio index needs at least three runs, there are {n_runs}: drive another known load"
+            f"the ratio index needs at least three runs, there are {table.n_runs}: drive another known load"
         )
-    return _Structures(payload, front_share)
 
 
-def _candidates(table: IndexTable) -> list[tuple[BandPair | None, BandPair | None]]:
-    """Pairs of band pairs worth a regression: the most significant of each width."""
-    found: list[tuple[BandPair | None, BandPair | None]] = []
-    for width_hz in WIDTHS_HZ:
-        of_a = _pairs_of(table, table.acceleration, table.payload_kg, table.front_share_pct, width_hz)
-        of_g = _pairs_of(table, table.pitch_rate, table.front_share_pct, table.payload_kg, width_hz)
-        found.extend((a, g) for a in of_a for g in of_g)
-    return found
+def _nested(
+    table: IndexTable, vehicle: Vehicle, bands: BandChoice, families: Sequence[Family]
+) -> dict[Family, NestedErrors]:
+    """For each run, bands and terms of every family chosen and fitted on the others, then held against it."""
+    blank = np.full((2, len(table.run)), np.nan)
+    nested = {family: NestedErrors(blank.copy(), blank.copy()) for family in families}
+    for number in np.unique(table.run):
+        out = table.run == number
+        rest, left = table.rows(~out), table.rows(out)
+        if rest.n_loads < 2:
+            continue
+        try:
+            found = candidates(rest, bands)
+        except CalibrationImpossibleError:
+            continue
+        for family in families:
+            choice = choose(rest, found, family, vehicle)
+            for row, tried in enumerate(choice.tried if choice else ()):
+                if choice is not None and tried is not None:
+                    predicted, std = _predicted(tried.fitted.model, left, choice.pairs)
+                    nested[family].error[row, out] = predicted - truth(left, TARGETS[row])
+                    nested[family].std[row, out] = std
+    return nested
 
 
-def _pairs_of(
-    table: IndexTable, spectra: F64 | None, target: F64, other: F64, width_hz: float
-) -> list[BandPair | None]:
-    if spectra is None:
-        return [None]
-    return [*candidate_pairs(table, spectra, target, other, width_hz, N_CANDIDATES)]
+def _predicted(model: RegressionModel, table: IndexTable, pairs: Pairs) -> tuple[F64, F64]:
+    told = [model.predict(float(ra), float(rg))[:2] for ra, rg in zip(*indexes(table, pairs), strict=True)]
+    centre, std = np.array(told).T
+    return centre, std
 
 
-def _evaluate(
-    pair_a: BandPair | None, pair_g: BandPair | None, table: IndexTable, structures: _Structures, vehicle: Vehicle
-) -> _Trial:
-    """Regressions with these bands, scored by their errors on runs left out, as shares of the ranges (12)."""
-    ra, rg = _ratios(pair_a, table.acceleration, table), _ratios(pair_g, table.pitch_rate, table)
-    payload = _fit(structures.payload, ra, rg, table.payload_kg, table.run)
-    front_share = _fit(structures.front_share, ra, rg, table.front_share_pct, table.run)
-    score = 0.0
-    for fitted, (low, high) in (
-        (payload, vehicle.payload_range_kg),
-        (front_share, vehicle.front_share_range_pct),
-    ):
-        score += float(np.mean((fitted.held_out_errors / (high - low)) ** 2)) if fitted else 0.0
-    return _Trial(pair_a.bands if pair_a else None, pair_g.bands if pair_g else None, payload, front_share, score)
+def _widened(model: RegressionModel, nested: NestedErrors, row: int) -> RegressionModel:
+    """The model with a spread that four fifths of the nested errors bear out; never a smaller one."""
+    z = np.abs(nested.error[row] / nested.std[row])
+    if not np.all(np.isfinite(z)):
+        return model
+    expected = float(stdtrit(model.dof, 0.5 + MOST / 2.0))
+    return replace(model, residual_std=model.residual_std * max(1.0, float(np.quantile(z, MOST)) / expected))
 
 
-def _ratios(pair: BandPair | None, spectra: F64 | None, table: IndexTable) -> F64:
-    if pair is None or spectra is None:
-        return np.full(len(table.run), np.nan)
-    passed = band_amplitudes(table.freq_hz, spectra, list(pair.bands), table.kind)
-    return np.asarray(passed[:, 0] / passed[:, 1])
+def _errors(trial: FamilyTrial, row: int) -> F64 | None:
+    tried = trial.choice.tried[row]
+    if tried is None:
+        return None
+    nested: F64 = trial.nested.error[row]
+    return nested if np.all(np.isfinite(nested)) else tried.fitted.held_out_errors
 
 
-def _fit(terms: tuple[str, ...] | None, ra: F64, rg: F64, target: F64, run: I64) -> Fitted | None:
-    return None if terms is None else fit_regression(terms, ra, rg, target, run)
-
-
-def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I64) -> Fitted:
-    """Least squares over batches, with its spread from whole runs left out.
-
-    Batches of one run share road and load and so are not independent: the residual spread is the root
-    mean square over runs held out, less what the held-out rows' own leverage adds, and its degrees of
-    freedom are the runs' less one.
-    """
-    raw = term_columns(terms, ra, rg)
-    lows, highs = raw.min(axis=0), raw.max(axis=0)
-    columns = scaled_columns(terms, ra, rg, lows, highs)
-    gram_inverse: F64 = np.linalg.pinv(columns.T @ columns).astype(float)
-    errors, leverage = _held_out(columns, target, run)
-    model = RegressionModel(
-        terms=terms,
-        lows=lows,
-        highs=highs,
-        coefficients=gram_inverse @ columns.T @ target,
-        gram_inverse=gram_inverse,
-        residual_std=float(np.sqrt(np.mean(errors**2) / (1.0 + np.mean(leverage)))),
-        dof=float(len(np.unique(run)) - 1),
-    )
-    return Fitted(model, errors)
-
-
-def _held_out(columns: F64, target: F64, run: I64) -> tuple[F64, F64]:
-    """Error (n,) of each batch when its whole run is left out of the fit, and its leverage there (n,)."""
-    errors, leverage = np.empty(len(target)), np.empty(len(target))
-    for number in np.unique(run):
-        out = run == number
-        inverse = np.linalg.pinv(columns[~out].T @ columns[~out])
-        errors[out] = columns[out] @ (inverse @ columns[~out].T @ target[~out]) - target[out]
-        leverage[out] = np.einsum("ij,jk,ik->i", columns[out], inverse, columns[out])
-    return errors, leverage
+def _speed_std_mps(batch: Batch) -> float:
+    return float(np.std(batch.speed_mps[batch.usable]))

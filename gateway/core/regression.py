@@ -11,7 +11,8 @@ from gateway.records import F64
 
 Term = Callable[[F64, F64], F64]
 
-# raw R > 0 goes in; the columns are scaled to [-1, 1] afterwards
+# Raw R > 0 goes in; the columns are scaled to [-1, 1] afterwards. A calibration file names its terms by
+# these names: one may be added, none may change its meaning.
 TERMS: Mapping[str, Term] = MappingProxyType(
     {
         "cbrt_ra": lambda ra, rg: np.cbrt(ra),
@@ -25,6 +26,8 @@ TERMS: Mapping[str, Term] = MappingProxyType(
         "rg2": lambda ra, rg: rg**2,
         "log_rg": lambda ra, rg: np.log(rg),
         "ra_rg": lambda ra, rg: ra * rg,
+        "sqrt_ra_rg": lambda ra, rg: np.sqrt(ra * rg),
+        "log_ra_log_rg": lambda ra, rg: np.log(ra) * np.log(rg),
     }
 )
 
@@ -62,11 +65,11 @@ class RegressionModel:
 
 
 def term_columns(terms: tuple[str, ...], ra: F64, rg: F64) -> F64:
-    """Raw columns (n, p) of the named terms for indexes (n,)."""
-    return np.column_stack([TERMS[name](ra, rg) for name in terms])
+    """Raw columns (..., n, p) of the named terms for indexes (..., n)."""
+    return np.stack([TERMS[name](ra, rg) for name in terms], axis=-1)
 
 
 def scaled_columns(terms: tuple[str, ...], ra: F64, rg: F64, lows: F64, highs: F64) -> F64:
-    """Design matrix (n, p + 1): a column of ones, then each term scaled so that lows..highs is -1..1."""
-    raw = term_columns(terms, ra, rg)
-    return np.column_stack([np.ones(len(raw)), 2.0 * (raw - lows) / (highs - lows) - 1.0])
+    """Design matrix (..., n, p + 1): a column of ones, then each term scaled so that lows..highs is -1..1."""
+    scaled = 2.0 * (term_columns(terms, ra, rg) - lows) / (highs - lows) - 1.0
+    return np.concatenate([np.ones((*scaled.shape[:-1], 1)), scaled], axis=-1)

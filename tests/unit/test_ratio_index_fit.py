@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from gateway.calibration.file_parts import RatioIndexPart
 from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
+from gateway.calibration.structures import StructureChoice
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import indexes_of
+from gateway.core.ratio_index import PAPER_BANDS, indexes_of
+from gateway.core.regression import (
+    MODEL_9_PAYLOAD,
+    MODEL_10_FRONT_SHARE,
+    MODEL_11_FRONT_SHARE,
+    MODEL_11_PAYLOAD,
+    TERMS,
+)
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch, Why
@@ -76,15 +85,15 @@ def test_unseen_loads_are_told_within_the_stated_spread(fit: RatioIndexFit) -> N
     assert n_covered >= 3
 
 
-def test_the_order_of_runs_and_rejected_batches_do_not_matter(fit: RatioIndexFit) -> None:
+def test_the_order_of_runs_and_rejected_batches_change_no_bit(fit: RatioIndexFit) -> None:
     spoiled = replace(RUNS[0].batches[0], rejected=(Why.TOO_SLOW,), vertical_acceleration_mps2=np.full(N, 1e3))
     more = [replace(RUNS[0], batches=(*RUNS[0].batches, spoiled)), *RUNS[1:]]
-    one, other = fit.calibration, fit_ratio_index(more[::-1], VAN).calibration
-    assert other.acceleration_bands == one.acceleration_bands
-    assert other.pitch_rate_bands == one.pitch_rate_bands
-    assert one.payload is not None
-    assert other.payload is not None
-    assert other.payload.predict(1.0, 1.0)[:2] == pytest.approx(one.payload.predict(1.0, 1.0)[:2], rel=1e-6)
+    renumbered = [replace(run, number=i) for i, run in enumerate(more[::-1], 1)]
+    other = fit_ratio_index(renumbered, VAN)
+    one_file, other_file = (RatioIndexPart.of(found.calibration).model_dump(mode="json") for found in (fit, other))
+    assert other_file == one_file
+    assert fit.payload_errors_kg is not None
+    np.testing.assert_array_equal(other.payload_errors_kg, fit.payload_errors_kg)
 
 
 def test_without_pitch_rate_the_payload_alone_is_told() -> None:
@@ -92,10 +101,58 @@ def test_without_pitch_rate_the_payload_alone_is_told() -> None:
         replace(run, batches=tuple(replace(b, pitch_rate_radps=np.full(N, np.nan)) for b in run.batches))
         for run in RUNS
     ]
-    calibration = fit_ratio_index(silent, VAN).calibration
-    assert calibration.payload is not None
-    assert calibration.payload.terms == ("cbrt_ra",)
-    assert (calibration.front_share, calibration.pitch_rate_bands) == (None, None)
+    for structure, terms in (("single", {"cbrt_ra"}), ("auto", {name for name in TERMS if "rg" not in name})):
+        calibration = fit_ratio_index(silent, VAN, structure=structure).calibration
+        assert calibration.payload is not None
+        assert set(calibration.payload.terms) <= terms
+        assert (calibration.front_share, calibration.pitch_rate_bands) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("family", "terms"),
+    [
+        ("single", (MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE)),
+        ("joint", (MODEL_11_PAYLOAD, MODEL_11_FRONT_SHARE)),
+    ],
+)
+def test_the_papers_bands_and_structures_can_be_asked_for(
+    family: StructureChoice, terms: tuple[tuple[str, ...], tuple[str, ...]]
+) -> None:
+    fit = fit_ratio_index(RUNS, VAN, bands="table2", structure=family)
+    assert fit.calibration.acceleration_bands == PAPER_BANDS["acceleration"]
+    assert fit.calibration.pitch_rate_bands == PAPER_BANDS["pitch_rate"]
+    models = fit.calibration.payload, fit.calibration.front_share
+    assert tuple(model.terms for model in models if model) == terms
+    assert [trial.family for trial in fit.trials] == [family]
+
+
+def test_the_family_that_errs_least_on_unseen_runs_is_taken(fit: RatioIndexFit) -> None:
+    assert {trial.family for trial in fit.trials} == {"single", "log", "joint", "stepwise"}
+    spans = np.array([450.0, 20.0])
+    scores = [float(np.sum((np.array(trial.nested.rms) / spans) ** 2)) for trial in fit.trials]
+    assert scores == sorted(scores)
+    assert fit.payload_errors_kg is not None
+    np.testing.assert_array_equal(fit.payload_errors_kg, fit.chosen.nested.error[0])
+
+
+def test_nested_errors_of_a_run_come_from_a_choice_made_without_it(fit: RatioIndexFit) -> None:
+    """The same by hand: calibrate on six runs, estimate the seventh."""
+    out = RUNS[2]
+    family = fit.chosen.family
+    without = fit_ratio_index([run for run in RUNS if run is not out], VAN, structure=family).calibration
+    assert without.payload is not None
+    found = [without.payload.predict(*indexes_of(batch, without))[0] - out.payload_kg for batch in out.batches]
+    assert fit.payload_errors_kg is not None
+    is_of_run = (fit.table.payload_kg == out.payload_kg) & np.isclose(fit.table.front_share_pct, out.front_share_pct)
+    np.testing.assert_allclose(fit.payload_errors_kg[is_of_run], found, rtol=1e-9, atol=1e-7)
+
+
+def test_too_few_runs_for_nesting_still_calibrate() -> None:
+    fit = fit_ratio_index(RUNS[:3], VAN)
+    assert fit.chosen.family == "single"
+    assert fit.payload_errors_kg is not None
+    assert np.all(np.isfinite(fit.payload_errors_kg))
+    assert fit.front_share_errors_pct is None
 
 
 def test_what_cannot_carry_a_calibration_is_refused() -> None:

@@ -1,0 +1,80 @@
+"""Least squares over the batches of known runs, judged by whole runs left out."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.core.regression import RegressionModel, scaled_columns, term_columns
+from gateway.records import F64, I64
+
+RIDGE: Final = 1e-12  # of the Gram matrix's mean diagonal: solves what a left-out run leaves without a solution
+
+
+@dataclass(frozen=True, slots=True)
+class FittedRegression:
+    """A regression and its errors (n,) on runs left out, estimate less truth.
+
+    residuals (n,) are of the fit itself, target less fit. covariance (p + 1, p + 1) is of the
+    coefficients, by jackknife over runs, so batches of a run may share whatever error they like
+    (Efron and Tibshirani, An Introduction to the Bootstrap, ch. 11).
+    """
+
+    model: RegressionModel
+    held_out_errors: F64
+    residuals: F64
+    covariance: F64
+
+
+def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I64) -> FittedRegression:
+    """target (n,) on the named terms of ra, rg (n,); run (n,) numbers.
+
+    Batches of one run share road and load and so are not independent: the residual spread is the root
+    mean square over runs held out, less what the held-out rows' own leverage adds, and its degrees of
+    freedom are the runs' less one.
+    """
+    raw = term_columns(terms, ra, rg)
+    lows, highs = raw.min(axis=0), raw.max(axis=0)
+    columns = scaled_columns(terms, ra, rg, lows, highs)
+    gram_inverse: F64 = np.linalg.pinv(columns.T @ columns).astype(float)
+    coefficients = gram_inverse @ columns.T @ target
+    without, inverse = without_each_run(columns, target, run)
+    place = np.unique(run, return_inverse=True)[1]
+    errors = held_out_errors(columns, without, target, run)
+    leverage = np.einsum("ni,nij,nj->n", columns, inverse[place], columns)
+    n_runs = len(without)
+    moved = without - without.mean(axis=0)
+    model = RegressionModel(
+        terms=terms,
+        lows=lows,
+        highs=highs,
+        coefficients=coefficients,
+        gram_inverse=gram_inverse,
+        residual_std=float(np.sqrt(np.mean(errors**2) / (1.0 + np.mean(leverage)))),
+        dof=float(n_runs - 1),
+    )
+    covariance = (n_runs - 1.0) / n_runs * moved.T @ moved
+    return FittedRegression(model, errors, target - columns @ coefficients, covariance)
+
+
+def without_each_run(columns: F64, target: F64, run: I64) -> tuple[F64, F64]:
+    """Coefficients (..., r, p) and inverse Gram matrices (..., r, p, p) of the fits without each run.
+
+    columns (..., n, p): as many design matrices as there are leading dimensions, for one target (n,).
+    """
+    is_of_run = (run == np.unique(run)[:, None]).astype(float)
+    grams = np.einsum("rn,...ni,...nj->...rij", is_of_run, columns, columns)
+    slopes = np.einsum("rn,...ni,n->...ri", is_of_run, columns, target)
+    rest = grams.sum(axis=-3, keepdims=True) - grams
+    p = columns.shape[-1]
+    ridge = RIDGE * np.trace(rest, axis1=-2, axis2=-1)[..., None, None] / p
+    inverse = np.linalg.inv(rest + ridge * np.eye(p))
+    without: F64 = np.einsum("...rij,...rj->...ri", inverse, slopes.sum(axis=-2, keepdims=True) - slopes)
+    return without, inverse
+
+
+def held_out_errors(columns: F64, without: F64, target: F64, run: I64) -> F64:
+    """Errors (..., n) of every batch by the fit that never saw its run; shapes as in :func:`without_each_run`."""
+    place = np.unique(run, return_inverse=True)[1]
+    errors: F64 = np.einsum("...ni,...ni->...n", columns, without[..., place, :]) - target
+    return errors
