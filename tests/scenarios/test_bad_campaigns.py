@@ -1,0 +1,212 @@
+"""Campaigns gone wrong, from log files through the command line: each is told what is wrong and how to mend it."""
+
+import gzip
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+from click.testing import CliRunner, Result
+
+from gateway.bus.logs import open_whole_log
+from gateway.bus.messages import message_of
+from gateway.calibration.campaign import load_campaign
+from gateway.calibration.file import load_calibration
+from gateway.cli import springscale
+from gateway.errors import CalibrationImpossibleError
+from gateway.offline.simulate import bench_of, write_campaign
+
+DRIVE_S = 165.0
+WINDOW = ("--window-s", "50")
+CHOSEN = (1, 4, 8, 10)  # of the paper's experiment: empty; 120 kg far back; 420 kg far forward and far back
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sound campaign of ten short drives: campaign.toml, signals.toml with its DBC, a log each."""
+    directory = tmp_path_factory.mktemp("campaign")
+    write_campaign(bench_of("experiment", longest_s=DRIVE_S), directory)
+    return directory
+
+
+def calibrate(campaign: Path, *options: str | Path) -> Result:
+    """What the command did; the message of a refusal is in ``exception``."""
+    done = CliRunner().invoke(springscale, ["calibrate", str(campaign), *WINDOW, *map(str, options)])
+    if done.exception is not None and not isinstance(done.exception, CalibrationImpossibleError):
+        raise done.exception
+    return done
+
+
+def check(campaign: Path, *options: str) -> tuple[int, dict[str, Any]]:
+    """The exit code of --check and what it found."""
+    done = calibrate(campaign, "--check", "--json", *options)
+    return done.exit_code, json.loads(done.stdout)
+
+
+def kinds(found: dict[str, Any]) -> dict[int, list[str]]:
+    """By run number the findings' severities and kinds; 0 is of all runs together."""
+    runs = {run["number"]: run["findings"] for run in found["runs"]} | {0: found["campaign_findings"]}
+    return {number: [f"{one['severity']}:{one['kind']}" for one in findings] for number, findings in runs.items()}
+
+
+def altered(folder: Path, name: str, runs: Sequence[int] = CHOSEN, **replaced: str) -> Path:
+    """A campaign file beside the sound one: these of its runs, and texts replaced (run3="..." within one run)."""
+    head, *tables = (folder / "campaign.toml").read_text(encoding="utf-8").split("[[runs]]")
+    head = replaced.pop("head", head)
+    chosen = [replaced.get(f"run{number}", tables[number - 1]) for number in runs]
+    path = folder / f"{name}.toml"
+    path.write_text("[[runs]]".join([head, *chosen]), encoding="utf-8")
+    return path
+
+
+def table_of(folder: Path, number: int) -> str:
+    return (folder / "campaign.toml").read_text(encoding="utf-8").split("[[runs]]")[number]
+
+
+def head_with(folder: Path, old: str, new: str) -> str:
+    head = (folder / "campaign.toml").read_text(encoding="utf-8").split("[[runs]]")[0]
+    assert old in head
+    return head.replace(old, new)
+
+
+def map_with(folder: Path, name: str, old: str, new: str) -> str:
+    """The head of a campaign that reads its logs by a wrong signal map."""
+    text = (folder / "signals.toml").read_text(encoding="utf-8")
+    assert old in text
+    (folder / f"{name}-signals.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    return head_with(folder, '"signals.toml"', f'"{name}-signals.toml"')
+
+
+def test_a_sound_campaign_passes_without_a_word(folder: Path) -> None:
+    exit_code, found = check(altered(folder, "sound"))
+    assert (exit_code, kinds(found)) == (0, {0: [], 1: [], 2: [], 3: [], 4: []})
+    lines = calibrate(altered(folder, "one", [1, 10]), "--check").stdout.splitlines()
+    assert [line.split("; ")[0].split(": ")[1] for line in lines] == ["sound"] * 2
+
+
+def test_one_load_only_is_a_zero_point_and_nothing_for_the_ratio_index(folder: Path, tmp_path: Path) -> None:
+    campaign = altered(folder, "one-load", [1])
+    exit_code, found = check(campaign)
+    assert (exit_code, kinds(found)) == (0, {0: ["warning:one_load_only"], 1: []})
+    done = calibrate(campaign, "--output", tmp_path / "zero.json")
+    assert done.exit_code == 0, done.output
+    held = load_calibration(tmp_path / "zero.json")
+    assert held.estimators == ("cross_spectrum",)
+    assert "one_load_only: 0 kg in every run that can be used" in held.warnings
+    assert "springs_from_priors" in held.warnings
+    options = ("--estimator", "ratio_index", "--window-s", "100")
+    refused = calibrate(campaign, "--output", tmp_path / "none.json", *options)
+    assert refused.exit_code == 1
+    assert "at least two different payloads" in str(refused.exception)
+    assert not (tmp_path / "none.json").exists()
+
+
+WRONG_MAPS = {
+    "turned": ('signal = "PitchRate"\nsign = 1', 'signal = "PitchRate"\nsign = -1', "fault:pitch_rate_sign"),
+    "upside-down": ('signal = "AccelZ"\nsign = 1', 'signal = "AccelZ"\nsign = -1', "fault:acceleration_sign"),
+    "level": ('signal = "AccelZ"', 'signal = "AccelY"', "fault:acceleration_axis"),
+    "rolled": ('signal = "PitchRate"', 'signal = "RollRate"', "fault:pitch_rate_axis"),
+    "in-g": ('signal = "AccelZ"', 'signal = "AccelZ"\nunit = "g"', "fault:acceleration_unit"),
+    "in-radians": ('signal = "PitchRate"', 'signal = "PitchRate"\nunit = "rad/s"', "fault:pitch_rate_unit"),
+    "no-fix": ("valid_when = { Fix = 3 }", "valid_when = { Fix = 2 }", "fault:speed_missing"),
+}
+
+
+@pytest.mark.parametrize("mistake", WRONG_MAPS)
+def test_a_wrong_signal_map_is_named_and_nothing_is_written(mistake: str, folder: Path, tmp_path: Path) -> None:
+    old, new, expected = WRONG_MAPS[mistake]
+    campaign = altered(folder, mistake, [1, 8], head=map_with(folder, mistake, old, new))
+    exit_code, found = check(campaign)
+    assert (exit_code, kinds(found)) == (1, {0: [], 1: [expected], 2: [expected]})
+    assert found["refusal"] == "no run can be used"
+    refused = calibrate(campaign, "--output", tmp_path / "none.json")
+    assert refused.exit_code == 1
+    assert "no run can be used" in str(refused.exception)
+    assert expected.removeprefix("fault:") in refused.stdout
+    assert not (tmp_path / "none.json").exists()
+
+
+def test_channels_mapped_to_each_others_place_are_named(folder: Path) -> None:
+    text = (folder / "signals.toml").read_text(encoding="utf-8")
+    text = text.replace('message = "IMU_ACCEL"\nsignal = "AccelZ"', "@acceleration", 1)
+    text = text.replace('message = "IMU_GYRO"\nsignal = "PitchRate"', "@pitch", 1)
+    text = (
+        text.replace("AccelValid", "@valid", 1).replace("GyroValid", "AccelValid", 1).replace("@valid", "GyroValid", 1)
+    )
+    text = text.replace("@acceleration", 'message = "IMU_GYRO"\nsignal = "PitchRate"\nunit = "m/s^2"')
+    text = text.replace("@pitch", 'message = "IMU_ACCEL"\nsignal = "AccelZ"\nunit = "deg/s"')
+    (folder / "channels-signals.toml").write_text(text, encoding="utf-8")
+    head = head_with(folder, '"signals.toml"', '"channels-signals.toml"')
+    exit_code, found = check(altered(folder, "channels", [1], head=head))
+    assert (exit_code, kinds(found)) == (1, {0: [], 1: ["fault:channels_swapped"]})
+
+
+def test_twenty_seconds_are_too_short_and_the_rest_goes_on(folder: Path, tmp_path: Path) -> None:
+    short = table_of(folder, 4).rstrip() + "\nstart_s = 40.0\nend_s = 60.0\n\n"
+    campaign = altered(folder, "short", run4=short)
+    done = calibrate(campaign, "--output", tmp_path / "v.json", "--estimator", "cross_spectrum")
+    assert done.exit_code == 0, done.output
+    assert "run 2 04_" in done.stdout
+    assert "left out" in done.stdout
+    held = load_calibration(tmp_path / "v.json")
+    assert [run.number for run in held.provenance.runs] == [1, 3, 4]
+    assert [one for one in held.warnings if one.startswith("run 2 left out: too_short: ")]
+
+
+def test_faults_that_leave_one_load_of_several_are_refused(folder: Path) -> None:
+    short = table_of(folder, 10).rstrip() + "\nend_s = 20.0\n\n"
+    exit_code, found = check(altered(folder, "one-left", [1, 10], run10=short))
+    assert (exit_code, kinds(found)) == (1, {0: ["warning:one_load_only"], 1: [], 2: ["fault:too_short"]})
+    assert found["refusal"] == "faults leave runs with 0 kg alone, which is no scale"
+
+
+@pytest.mark.parametrize(("one", "other"), [(4, 8), (1, 10)])
+def test_two_loads_swapped_in_the_file_are_found(one: int, other: int, folder: Path) -> None:
+    loads = {number: table_of(folder, number).split("\n", 2)[2] for number in (one, other)}
+    logs = {number: "\n".join(table_of(folder, number).split("\n", 2)[:2]) for number in (one, other)}
+    runs = {f"run{one}": f"{logs[one]}\n{loads[other]}", f"run{other}": f"{logs[other]}\n{loads[one]}"}
+    _, found = check(altered(folder, f"swap-{one}-{other}", **runs))
+    places = [CHOSEN.index(number) + 1 for number in (one, other)]
+    faulty = {number: findings for number, findings in kinds(found).items() if number and findings}
+    assert faulty == {place: ["fault:loads_swapped"] for place in places}
+    assert f"exchanging the loads of runs {places[0]} and {places[1]}" in json.dumps(found)
+
+
+@pytest.mark.parametrize(("stated", "expected"), [("2.6", "warning:sensor_position"), ("0.0", "fault:sensor_position")])
+def test_a_wrong_sensor_position_is_told(stated: str, expected: str, folder: Path) -> None:
+    head = head_with(folder, "sensor_position_m = 3.2", f"sensor_position_m = {stated}")
+    _, found = check(altered(folder, f"place-{stated}", [1], head=head))
+    assert kinds(found)[1] == [expected]
+
+
+@pytest.mark.parametrize("suffix", [".log", ".asc", ".blf", ".csv", ".trc"])
+def test_a_campaign_may_hold_logs_of_any_kind(suffix: str, folder: Path) -> None:
+    name = f"kind{suffix}"
+    source = next(folder.glob("01_*/can.log.gz"))
+    if suffix == ".log":
+        (folder / name).write_bytes(gzip.decompress(source.read_bytes()))
+    else:
+        with can.Logger(folder / name) as writer:
+            chunks, _ = open_whole_log(source)
+            for frames in chunks:
+                for row in range(len(frames)):
+                    message = message_of(frames, row)
+                    message.channel = 0
+                    message.timestamp = float(message.timestamp)
+                    writer.on_message_received(message)
+    table = f'\nlog = "{name}"\npayload_kg = 0.0\nfront_share_pct = 50.0\nstart_s = 10.0\nend_s = 150.0\n'
+    exit_code, found = check(altered(folder, f"log{suffix}", [1], run1=table))
+    assert (exit_code, kinds(found)) == (0, {0: ["warning:one_load_only"], 1: []})
+
+
+def test_the_share_may_be_stated_instead_of_the_position(folder: Path) -> None:
+    by_position = load_campaign(altered(folder, "by-position"))
+    share_pct = by_position.front_share_pct(by_position.runs[1])
+    lines = [line for line in table_of(folder, 4).splitlines() if not line.startswith("payload_position_m")]
+    by_share = load_campaign(
+        altered(folder, "by-share", run4="\n".join([*lines, f"front_share_pct = {share_pct!r}", ""]))
+    )
+    assert by_share.front_share_pct(by_share.runs[1]) == share_pct
+    assert check(by_share.path, "--runs", "1,2") == check(by_position.path, "--runs", "1,2")
