@@ -38,7 +38,9 @@ class LatestSpectra(BaseModel):
     t_end: str | None = Field(json_schema_extra={"format": "date-time"}, examples=["2026-11-21T03:55:00.000000Z"])
     estimator: str | None = Field(examples=["cross_spectrum"])
     rejected: list[str] = Field(examples=[[]])
-    payload_kg: float | None = Field(description="what the model below carries", examples=[271.3])
+    payload_kg: float | None = Field(
+        description="as weighed; the model carries it, and a tare that was taken off", examples=[271.3]
+    )
     front_share_pct: float | None = Field(examples=[50.4])
     spectra: Spectra | None = Field(description="as measured")
     model: Spectra | None = Field(
@@ -91,11 +93,13 @@ def modelled_of(record: Record, calibrated: CalibratedVehicle | None) -> dict[st
 def _fitted(record: Record, wheelbase_m: float) -> Fitted | None:
     """What the estimator told of its fit; the delay of the mean speed where it told none."""
     told: Mapping[str, float | None] = record["diagnostics"]
-    if record["payload_kg"] is None or record["front_share_pct"] is None or not record["mean_speed_mps"]:
+    payload_kg = record.get("raw_payload_kg", record["payload_kg"])  # raw: before a tare was taken off
+    front_share_pct = record.get("raw_front_share_pct", record["front_share_pct"])
+    if payload_kg is None or front_share_pct is None or not record["mean_speed_mps"]:
         return None
     return Fitted(
-        payload_kg=record["payload_kg"],
-        front_share_pct=record["front_share_pct"],
+        payload_kg=payload_kg,
+        front_share_pct=front_share_pct,
         delay_s=told.get("delay_s") or wheelbase_m / record["mean_speed_mps"],
         delay_std_s=told.get("delay_std_s") or 0.0,
         damper_front_ratio=told.get("damper_front_ratio") or 1.0,

@@ -93,6 +93,16 @@ def test_the_next_batch_has_a_model_of_its_own(client: Client, board: Board, wei
     assert second["model"]["pitch_rate_radps_rthz"] != first["model"]["pitch_rate_radps_rthz"]
 
 
+def test_the_model_carries_what_a_tare_took_off(client: Client, board: Board, weighed: Estimate) -> None:
+    board.publish(estimate_to_json(weighed))
+    untared = told(client)["model"]
+    raw = {"tare_id": "t1", "raw_payload_kg": 270.0, "raw_front_share_pct": 47.0}
+    board.publish(estimate_to_json(replace(weighed, payload_kg=255.0, front_share_pct=47.3, tare=raw)))
+    answer = told(client)
+    assert answer["payload_kg"] == 255.0
+    assert answer["model"] == untared
+
+
 NO_MODEL = {
     "rejected": {"payload_kg": float("nan"), "front_share_pct": float("nan"), "rejected": (Why.MODEL_MISFIT,)},
     "the other estimator": {"estimator": "ratio_index"},

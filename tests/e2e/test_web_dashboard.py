@@ -18,6 +18,7 @@ playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
 expect = playwright.expect
+expect.set_options(timeout=20_000)  # as long as a busy machine may need
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA
 
 
@@ -145,6 +146,14 @@ def test_numbers_and_tables_need_no_charts(site: str, watched: Watched) -> None:
     page.get_by_text("History as a table").click()
     expect(page.locator("#recent tr").nth(0)).to_contain_text("258 to 282 kg")
     expect(page.locator("#recent tr").nth(1)).to_contain_text("not weighed: too slow, gap")
+
+
+def test_it_looks_further_back_when_asked(site: str, watched: Watched) -> None:
+    page = watched.page
+    page.goto(site)
+    expect(page.locator("#recent tr")).to_have_count(4)
+    with page.expect_request(lambda request: "limit=1000" in request.url):
+        page.get_by_label("7 days").check()
 
 
 def test_it_follows_what_happens(gateway: Gateway, watched: Watched) -> None:

@@ -5,7 +5,9 @@ import { Refused, load } from "/assets/dashboard/gateway.js";
 import { known, learn } from "/assets/dashboard/known.js";
 
 const ASK_EVERY_MS = 5000;
-const BATCHES_BY_HOURS = { 3: 300, 24: 300, 168: 1000 };
+const GATHER_MS = 50;
+const MOST_BATCHES = 1000;
+const BATCHES_BY_HOURS = { 3: 300, 24: 300, 168: MOST_BATCHES };
 
 async function askNow() {
   try {
@@ -35,7 +37,17 @@ async function askTruth() {
   if (path) learn({ truth: (await load(path)).items });
 }
 
-const remembered = (record) => [record, ...known.batches.filter((batch) => batch.id !== record.id)];
+const remembered = (record) => [record, ...known.batches.filter((batch) => batch.id !== record.id)].slice(0, MOST_BATCHES);
+
+let asking = null;
+
+/** Once for all events that come together, as they do after a pause. */
+function askSoon() {
+  asking ??= setTimeout(() => {
+    asking = null;
+    Promise.all([askNow(), askSpectra(), askTruth()]).catch(giveUpUntilNext);
+  }, GATHER_MS);
+}
 
 function onEvent(kind, record) {
   if (kind === "provisional") {
@@ -43,7 +55,7 @@ function onEvent(kind, record) {
     askNow();
   } else if (kind === "estimate" || kind === "rejection") {
     learn({ early: null, batches: remembered(record) });
-    Promise.all([askNow(), askSpectra(), askTruth()]).catch(giveUpUntilNext);
+    askSoon();
   }
 }
 

@@ -32,7 +32,8 @@ show(({ status }) => {
   );
 }, "status");
 
-show(({ vehicle }) => {
+show(({ vehicle, latest }) => {
+  if (vehicle === null) return;
   const { calibration, figures } = vehicle;
   const pairs = [pair("Vehicle", vehicle.vehicle_id ?? figures?.name ?? "unnamed")];
   if (vehicle.vin) pairs.push(pair("VIN", vehicle.vin));
@@ -48,8 +49,9 @@ show(({ vehicle }) => {
       pair("Calibration", calibration.id.replace("sha256:", "").slice(0, 12)),
     );
   }
+  if (latest?.tare_payload_kg != null) pairs.push(pair("Taken off by re-zeroing", figure(latest.tare_payload_kg, 0, "kg")));
   element("calibrated").replaceChildren(...pairs);
-}, "vehicle");
+}, "vehicle", "latest");
 
 /** Names of settings stand in backquotes: as code on the page. */
 function withCode(text) {

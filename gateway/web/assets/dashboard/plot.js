@@ -66,11 +66,15 @@ function layout({ xaxis, yaxis, ...more }) {
   };
 }
 
-/** Draws or redraws a chart, once numbers are on the page. */
+const wanted = new WeakMap(); // place -> what is to be drawn there next
+
+/** Draws or redraws a chart, once numbers are on the page; of several wishes at a time, the last. */
 export async function plot(place, traces, shape) {
+  wanted.set(place, traces);
   await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
   try {
     const plotly = await library();
+    if (wanted.get(place) !== traces) return;
     await plotly.react(place, traces, layout(shape), CONFIG);
     place.dataset.drawn = "yes";
   } catch (error) {
