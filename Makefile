@@ -33,6 +33,7 @@ check: .venv/.development
 	$(BIN)/lint-imports
 	$(BIN)/python docs/make_settings.py --check
 	$(BIN)/python docs/make_reasons.py --check
+	$(BIN)/python docs/make_findings.py --check
 	$(BIN)/python docs/make_calibration_schema.py --check
 
 bench: .venv/.development
@@ -49,6 +50,7 @@ screenshots: .venv/.development
 docs: .venv/.development
 	$(BIN)/python docs/make_settings.py
 	$(BIN)/python docs/make_reasons.py
+	$(BIN)/python docs/make_findings.py
 	$(BIN)/python docs/make_calibration_schema.py
 
 # --no-emit-*: the lock names no package index, so it serves behind any mirror.

@@ -1,0 +1,45 @@
+"""Writes docs/findings.md from gateway/calibration/inspection_kinds.py; with --check only tells if it is up to date."""
+
+import sys
+from pathlib import Path
+
+from gateway.calibration.inspection_kinds import EXPLAINED, Topic
+
+PAGE = Path(__file__).with_name("findings.md")
+
+INTRODUCTION = """\
+# What inspection finds in a campaign
+
+Generated from `gateway/calibration/inspection_kinds.py` by `python docs/make_findings.py`; do not edit by hand.
+
+`springscale calibrate` looks at every drive before it fits anything, and says what it finds and what to do about it
+([calibration](calibration.md)). A fault keeps a run out of the calibration, a warning wants a look and goes into the
+calibration file, a note is to know. Where two are named, it depends on how bad it is.
+"""
+
+
+def findings_page() -> str:
+    """The whole page as Markdown."""
+    return "\n".join([INTRODUCTION, *(_table(topic) for topic in Topic)])
+
+
+def _table(topic: Topic) -> str:
+    rows = [
+        f"| `{kind}` | {' or '.join(explained.severities)} | {explained.means} | {explained.advice} |"
+        for kind, explained in EXPLAINED.items()
+        if explained.topic is topic
+    ]
+    head = "| finding | weight | what it means | what to do |\n|---|---|---|---|"
+    return f"## {topic}\n\n{head}\n" + "\n".join(rows) + "\n"
+
+
+def main() -> None:
+    """Write the page, or compare it."""
+    if "--check" not in sys.argv[1:]:
+        PAGE.write_text(findings_page(), encoding="utf-8")
+    elif not PAGE.is_file() or PAGE.read_text(encoding="utf-8") != findings_page():
+        sys.exit("docs/findings.md does not say what gateway/calibration/inspection_kinds.py does: run `make docs`")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,38 @@
+"""docs/findings.md explains every finding there is, and the code finds each of them."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from gateway.calibration.inspection import Severity
+from gateway.calibration.inspection_kinds import EXPLAINED, Kind, found
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "findings.md").read_text(encoding="utf-8")
+
+
+def test_the_page_is_made_from_the_explanations() -> None:
+    spec = importlib.util.spec_from_file_location("make_findings", ROOT / "docs" / "make_findings.py")
+    assert spec is not None
+    assert spec.loader is not None
+    maker = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(maker)
+    assert maker.findings_page() == PAGE, "run `make docs`"
+
+
+def test_every_finding_is_explained_once() -> None:
+    assert sorted(re.findall(r"^\| `(\w+)`", PAGE, re.MULTILINE)) == sorted(Kind)
+    assert all(explained.means and explained.advice and explained.severities for explained in EXPLAINED.values())
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_every_finding_is_found_somewhere_in_the_code(kind: Kind) -> None:
+    code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "gateway/calibration").glob("inspection_*.py"))
+    assert code.count(f"Kind.{kind.name}") >= 2  # its explanation, and where it is found
+
+
+def test_a_finding_has_no_other_weight_than_the_page_says() -> None:
+    with pytest.raises(ValueError, match="smooth_road is never a fault"):
+        found(Kind.SMOOTH_ROAD, Severity.FAULT, "")
