@@ -16,12 +16,15 @@ from gateway.records import F64, I64, Batch, Bool
 class IndexTable:
     """Spectra of all identification batches with what is known of each.
 
-    run (n,) tells drives apart, 0 for the first in the table; payload_kg, front_share_pct (n,); freq_hz (m,);
+    run (n,) tells drives apart, 0 for the first in the table; number (n,) is the campaign's and t_start_ns (n,)
+    the batch's own; payload_kg, front_share_pct (n,); freq_hz (m,);
     acceleration and pitch_rate (n, m), absent (None) where the sensor is not mapped; n_segments (n,)
     averaged in each.
     """
 
     run: I64
+    number: I64
+    t_start_ns: I64
     payload_kg: F64
     front_share_pct: F64
     freq_hz: F64
@@ -51,6 +54,8 @@ class IndexTable:
         return replace(
             self,
             run=self.run[chosen],
+            number=self.number[chosen],
+            t_start_ns=self.t_start_ns[chosen],
             payload_kg=self.payload_kg[chosen],
             front_share_pct=self.front_share_pct[chosen],
             acceleration=None if self.acceleration is None else self.acceleration[chosen],
@@ -76,6 +81,8 @@ def index_table(runs: Sequence[KnownRun], kind: SpectrumKind, n_segment: int) ->
     freq_hz = next(spectrum[0] for _, _, a, g in whole for spectrum in (a, g) if spectrum is not None)
     return IndexTable(
         run=np.array([place[run.number] for run, _, _, _ in whole]),
+        number=np.array([run.number for run, _, _, _ in whole]),
+        t_start_ns=np.array([batch.t_start_ns for _, batch, _, _ in whole]),
         payload_kg=np.array([run.payload_kg for run, _, _, _ in whole]),
         front_share_pct=np.array([run.front_share_pct for run, _, _, _ in whole]),
         freq_hz=freq_hz,
