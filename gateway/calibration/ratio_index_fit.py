@@ -13,6 +13,8 @@ from typing import Final
 import numpy as np
 from scipy.special import stdtrit
 
+from gateway.calibration.band_map import BandMap, band_maps
+from gateway.calibration.diagnostics import Diagnostics, diagnose
 from gateway.calibration.index_choice import (
     TARGETS,
     BandChoice,
@@ -69,8 +71,8 @@ class RatioIndexFit:
     """The calibration and what stands behind it.
 
     payload_errors_kg and front_share_errors_pct (n,) are the nested errors of the family chosen, batches in
-    the order of ``table``; where so few runs allow none, those of the regression alone, bands given
-    (``is_nested`` tells). ``trials`` are all families, the chosen one first.
+    the order of ``table``; where so few runs allow none, those of the regression alone, bands given.
+    ``trials`` are all families, the chosen one first; ``band_maps`` hold what every band could tell.
     """
 
     calibration: RatioIndexCalibration
@@ -80,6 +82,9 @@ class RatioIndexFit:
     n_batches: int
     table: IndexTable
     trials: tuple[FamilyTrial, ...]
+    band_maps: tuple[BandMap, ...] = ()
+    payload_diagnostics: Diagnostics | None = None
+    front_share_diagnostics: Diagnostics | None = None
 
     @property
     def chosen(self) -> FamilyTrial:
@@ -125,7 +130,17 @@ def fit_ratio_index(
         n_batches=len(table.run),
         table=table,
         trials=trials,
+        band_maps=band_maps(table),
+        payload_diagnostics=_diagnosed(table, chosen.choice, 0),
+        front_share_diagnostics=_diagnosed(table, chosen.choice, 1),
     )
+
+
+def _diagnosed(table: IndexTable, choice: Choice, row: int) -> Diagnostics | None:
+    tried = choice.tried[row]
+    if tried is None:
+        return None
+    return diagnose(tried.fitted, *indexes(table, choice.pairs), truth(table, TARGETS[row]), table.run)
 
 
 def _family_trials(

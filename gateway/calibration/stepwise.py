@@ -54,13 +54,13 @@ def partial_f(columns: F64, added: F64, target: F64) -> PartialF:
     """Does ``added`` (n, k) tell of ``target`` (n,) what ``columns`` (n, p), the constant among them, do not?
 
     The textbook test of nested least-squares models (Draper and Smith, Applied Regression Analysis, ch. 6);
-    rows must be independent, so give run means. Without a degree of freedom left F and p are NaN.
+    rows must be independent, so give run means. F and p are NaN where ``added`` adds nothing
+    or no degree of freedom is left.
     """
-    whole = np.column_stack([columns, added])
-    less, full = _rss(columns, target), _rss(whole, target)
-    n_added = whole.shape[1] - columns.shape[1]
-    dof = len(target) - whole.shape[1]
-    if dof < 1:
+    less, rank_less = _rss(columns, target)
+    full, rank_full = _rss(np.column_stack([columns, added]), target)
+    n_added, dof = rank_full - rank_less, len(target) - rank_full
+    if dof < 1 or n_added < 1:
         return PartialF(float("nan"), float("nan"), dof)
     statistic = float("inf") if full == 0.0 else (less - full) / n_added / (full / dof)
     return PartialF(statistic, float(fdtrc(n_added, dof, statistic)), dof)
@@ -148,6 +148,8 @@ class _Pool:
         return [0, *(self._place[name] for name in chosen)]
 
 
-def _rss(columns: F64, target: F64) -> float:
-    rest = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
-    return float(rest @ rest)
+def _rss(columns: F64, target: F64) -> tuple[float, int]:
+    """Sum of squared residuals, and the rank of the columns."""
+    found, _, rank, _ = np.linalg.lstsq(columns, target, rcond=None)
+    rest = target - columns @ found
+    return float(rest @ rest), int(rank)
