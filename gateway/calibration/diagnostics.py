@@ -18,11 +18,11 @@ MOST_VIF: Final = 10.0  # the usual limit: Draper and Smith, Applied Regression 
 class Diagnostics:
     """Few and meaningful; p-values are small where the assumption is doubtful, None where there is nothing to test.
 
-    normality_p: Shapiro and Wilk's test of the residuals. run_effect_p: do the residuals of a
-    run resemble each other (analysis of variance, exact where the indexes differ between runs only)? Then
-    errors do not average out within a run. spread_p: Breusch and Pagan's test (Koenker's form), does the squared residual change with the
-    fitted value? vif: variance inflation of each term by the others; condition_number of the scaled
-    columns at unit length. High ones make single coefficients meaningless, not the prediction.
+    normality_p: Shapiro and Wilk's test of the residuals. run_effect_p: do the residuals of a run resemble
+    each other (analysis of variance, exact where the indexes differ between runs only)? Then errors do not
+    average out within a run. spread_p: Breusch and Pagan's test (Koenker's form), does the squared residual
+    change with the fitted value? vif: variance inflation of each term by the others; condition_number of
+    the columns at unit length. High ones make single coefficients meaningless, not the prediction.
     """
 
     normality_p: float | None

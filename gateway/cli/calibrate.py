@@ -4,12 +4,15 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import get_args
 
 import click
 
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.draft import load_draft
 from gateway.calibration.file import CalibrationFile
+from gateway.calibration.index_choice import BandChoice
+from gateway.calibration.structures import StructureChoice
 from gateway.cli.inspection_text import inspection_json, inspection_sentences
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
 from gateway.cli.plan_text import plan_sentences
@@ -27,6 +30,20 @@ from gateway.records import json_line
 @click.option("--output", type=FILE, default=None, help="calibration file to write; needed but for --plan")
 @click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]")
 @click.option("--runs", "numbers", type=RunNumbers(), default=None, help="these runs only, counted from 1: 1,5,10")
+@click.option(
+    "--bands",
+    type=click.Choice(get_args(BandChoice)),
+    default="campaign",
+    show_default=True,
+    help="of the ratio index: found on these drives, or the paper's Table 2",
+)
+@click.option(
+    "--structure",
+    type=click.Choice(get_args(StructureChoice)),
+    default="auto",
+    show_default=True,
+    help="of the ratio index: single is (9) and (10), joint is (11)",
+)
 @click.option("--plan", "wants_plan", is_flag=True, help="advise which load to drive next; [vehicle] alone is enough")
 @click.option("--check", "only_checks", is_flag=True, help="inspect the drives and write nothing; exits 1 on a refusal")
 @click.option("--report", type=FILE, default=None, help="directory to write a report into: report.html, figures")
@@ -37,6 +54,8 @@ def calibrate(
     output: Path | None,
     estimators: tuple[str, ...],
     numbers: tuple[int, ...] | None,
+    bands: BandChoice,
+    structure: StructureChoice,
     wants_plan: bool,
     only_checks: bool,
     report: Path | None,
@@ -59,7 +78,14 @@ def calibrate(
     if only_checks:
         return
     command = shlex.join(["springscale", *sys.argv[1:]])
-    outcome = calibrate_inspected(loaded, inspection, estimators=estimators or ESTIMATOR_NAMES, command=command)
+    outcome = calibrate_inspected(
+        loaded,
+        inspection,
+        estimators=estimators or ESTIMATOR_NAMES,
+        bands=bands,
+        structure=structure,
+        command=command,
+    )
     found = outcome.file
     if output is not None:
         output.write_text(found.to_json(), encoding="utf-8")

@@ -21,8 +21,10 @@ from gateway.calibration.file import (
     VehiclePart,
 )
 from gateway.calibration.grey_box import CrossSpectrumFit, fit_cross_spectrum
+from gateway.calibration.index_choice import BandChoice
 from gateway.calibration.inspection import Finding, RunVerdict, Severity
 from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
+from gateway.calibration.structures import StructureChoice
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum import CrossSpectrumCalibration
 from gateway.core.estimator import estimate
@@ -61,6 +63,8 @@ def calibrate(
     *,
     estimators: Sequence[str],
     numbers: Sequence[int] | None = None,
+    bands: BandChoice = "campaign",
+    structure: StructureChoice = "auto",
     command: str = "",
     on_run: OnRun = lambda done, of: None,
 ) -> Outcome:
@@ -69,13 +73,23 @@ def calibrate(
     Raises as :func:`calibrate_inspected` does.
     """
     inspection = inspect(campaign, settings, numbers=numbers, on_run=on_run)
-    return calibrate_inspected(campaign, inspection, estimators=estimators, command=command)
+    return calibrate_inspected(
+        campaign, inspection, estimators=estimators, bands=bands, structure=structure, command=command
+    )
 
 
 def calibrate_inspected(
-    campaign: Campaign, inspection: Inspection, *, estimators: Sequence[str], command: str = ""
+    campaign: Campaign,
+    inspection: Inspection,
+    *,
+    estimators: Sequence[str],
+    bands: BandChoice = "campaign",
+    structure: StructureChoice = "auto",
+    command: str = "",
 ) -> Outcome:
     """Fits every named estimator on the identification parts of the runs without a fault.
+
+    ``bands`` and ``structure`` are the ratio index's: found on the campaign, or named.
 
     An estimator that these runs cannot carry is left out with a warning; raises CalibrationImpossibleError
     when none is left, and where the faults of the runs leave no calibration worth its name.
@@ -85,7 +99,7 @@ def calibrate_inspected(
     split = inspection.usable
     runs = [one.identification for one in split]
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
-    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign)
+    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, bands, structure)
     with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
     speeds = [batch.mean_speed_mps for batch in counted]
     file = CalibrationFile(
@@ -114,7 +128,11 @@ def calibrate_inspected(
 
 
 def _fit(
-    estimators: Sequence[str], runs: Sequence[KnownRun], campaign: Campaign
+    estimators: Sequence[str],
+    runs: Sequence[KnownRun],
+    campaign: Campaign,
+    bands: BandChoice,
+    structure: StructureChoice,
 ) -> tuple[RatioIndexFit | None, CrossSpectrumFit | None, list[str]]:
     """What each named estimator learned, and a warning for each that these runs cannot carry."""
     ratio_index: RatioIndexFit | None = None
@@ -123,7 +141,7 @@ def _fit(
     for name in estimators:
         try:
             if name == "ratio_index":
-                ratio_index = fit_ratio_index(runs, campaign.vehicle)
+                ratio_index = fit_ratio_index(runs, campaign.vehicle, bands=bands, structure=structure)
             else:
                 cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle)
                 warnings.extend(cross_spectrum.calibration.warnings)
