@@ -81,11 +81,8 @@ class TareHistory(Part):
         return self.model_copy(update={"entries": (*self.entries, entry)[-MOST_ENTRIES:]})
 
     def ended(self, ids: set[str], end: TareEnd) -> "TareHistory":
-        """With these tares out of use; those that had ended before stay as they are."""
-        entries = tuple(
-            entry.model_copy(update={"ended": end}) if entry.id in ids and entry.ended is None else entry
-            for entry in self.entries
-        )
+        """With these tares out of use."""
+        entries = tuple(entry.model_copy(update={"ended": end}) if entry.id in ids else entry for entry in self.entries)
         return self.model_copy(update={"entries": entries})
 
 

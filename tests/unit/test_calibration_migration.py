@@ -69,6 +69,11 @@ def test_migration_leaves_what_it_was_given_alone() -> None:
     assert migrated(old, 1) is old
 
 
+def test_the_first_id_is_kept_over_several_migrations() -> None:
+    once = {**first_version(), "migrated_from": "sha256:first"}
+    assert migrated(once, VERSION)["migrated_from"] == "sha256:first"
+
+
 def test_the_shipped_calibration_is_of_the_first_version_and_still_loads() -> None:
     content = json.loads(SHIPPED.read_text())
     assert content["version"] == 1

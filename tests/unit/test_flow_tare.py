@@ -113,6 +113,17 @@ def test_a_long_stop_within_a_drive_is_seen_in_the_window_that_is_still_open() -
     fed(patient, joined(drive(105.0), later(drive(80.0, standing_between(2.0, 66.0)), 105.01)))
     assert patient.weighed is not None
     assert patient.load_may_have_changed
+    fed(patient, later(drive(120.0), 185.02))
+    assert [patient.weighed.n_batches, patient.load_may_have_changed] == [1, False]
+
+
+def test_a_batch_that_is_all_stop_leaves_the_load_open() -> None:
+    """Standing does not end this drive; the batch is refused for it, and the load of the one before is not trusted."""
+    patient = flow(settings=replace(SETTINGS, standstill_s=600.0, window_s=100.0, provisional_every_s=0.0))
+    fed(patient, joined(drive(105.0), later(drive(100.0, standing_between(0.0, 90.0)), 105.01)))
+    assert patient.weighed is not None
+    assert patient.weighed.n_batches == 1
+    assert patient.load_may_have_changed
 
 
 def test_a_short_stop_is_still_the_same_load() -> None:
