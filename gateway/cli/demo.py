@@ -75,9 +75,8 @@ class _Driver:
     def start(self, gateway: Gateway) -> None:
         """Begin to drive; called in the service's event loop once it is ready."""
         if self._is_endless:
-            click.echo(
-                f"Dashboard: {gateway.url}   (Ctrl-C ends; after the first, drives run {self._speed:g} times real time)"
-            )
+            click.echo(f"Dashboard: {gateway.url}   (Ctrl-C ends)")
+            click.echo(f"It fills once the first drive is simulated; later ones run {self._speed:g} times real time.")
         loop = asyncio.get_running_loop()
         self._thread = threading.Thread(target=self._drive, args=(gateway, loop), name="demo-drive", daemon=True)
         self._thread.start()

@@ -11,11 +11,13 @@ _INTERVAL: Final = "95 % interval [low, high]"
 class Spectra(BaseModel):
     """Spectra of one batch, arrays of one length."""
 
-    freq_hz: list[float | None]
-    vertical_acceleration_mps2_rthz: list[float | None]
-    pitch_rate_radps_rthz: list[float | None]
-    coherence: list[float | None]
-    phase_rad: list[float | None]
+    freq_hz: list[float | None] = Field(examples=[[1.17, 1.37, 1.56]])
+    vertical_acceleration_mps2_rthz: list[float | None] = Field(examples=[[0.38, 0.62, 0.97]])
+    pitch_rate_radps_rthz: list[float | None] = Field(examples=[[0.017, 0.027, 0.038]])
+    coherence: list[float | None] = Field(description="0 to 1", examples=[[0.99, 0.98, 0.99]])
+    phase_rad: list[float | None] = Field(
+        description="of pitch rate against acceleration", examples=[[-2.3, -2.1, -1.9]]
+    )
 
 
 class Estimate(BaseModel):

@@ -52,7 +52,9 @@ def drawn(site: str, browser: Any) -> Iterator[Watched]:
 
 @pytest.fixture
 def watched(browser: Any) -> Iterator[Watched]:
-    made = Watched(browser)
+    """A page to which the charts' library does not come: quick, and everything but the charts must be there."""
+    made = Watched(browser, color_scheme="dark")
+    made.page.route("**/plotly-*", lambda route: route.abort())
     yield made
     made.page.close()
 
@@ -139,7 +141,6 @@ def test_all_comes_from_the_gateway_and_the_numbers_come_first(site: str, drawn:
 
 def test_numbers_and_tables_need_no_charts(site: str, watched: Watched) -> None:
     page = watched.page
-    page.route("**/plotly*", lambda route: route.abort())
     page.goto(site)
     expect(page.locator("#payload")).to_have_text("270 kg")
     expect(page.locator("#recent tr")).to_have_count(4)
@@ -272,8 +273,7 @@ def test_it_fits_a_phone(drawn: Watched) -> None:
     page.set_viewport_size(usual)
 
 
-def test_the_theme_is_the_systems_until_another_is_chosen(site: str, browser: Any) -> None:
-    watched = Watched(browser, color_scheme="dark")
+def test_the_theme_is_the_systems_until_another_is_chosen(site: str, watched: Watched) -> None:
     page = watched.page
     page.goto(site)
     button = page.get_by_role("button", name="Theme:")
@@ -287,7 +287,6 @@ def test_the_theme_is_the_systems_until_another_is_chosen(site: str, browser: An
     page.reload()
     expect(button).to_have_attribute("aria-label", "Theme: light")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == grounds["light"]
-    page.close()
 
 
 def test_the_charts_change_their_colours_with_the_page(drawn: Watched) -> None:

@@ -1,19 +1,20 @@
 // Numbers, times and names for people.
 
 export const UNKNOWN = "unknown";
+const GLUE = "\u00a0"; // a number and its unit stay on one line
 
 export function number(x, digits) {
   const shown = Number(x.toFixed(digits)) || 0; // never a negative nought
   return shown.toLocaleString(undefined, { minimumFractionDigits: digits, maximumFractionDigits: digits }).replace("-", "−");
 }
 
-export const figure = (x, digits, unit) => (x == null ? UNKNOWN : `${number(x, digits)} ${unit}`);
+export const figure = (x, digits, unit) => (x == null ? UNKNOWN : `${number(x, digits)}${GLUE}${unit}`);
 
 export const between = (bounds, digits, unit) =>
-  bounds == null ? "" : `${number(bounds[0], digits)} to ${number(bounds[1], digits)} ${unit}`;
+  bounds == null ? "" : `${number(bounds[0], digits)} to ${number(bounds[1], digits)}${GLUE}${unit}`;
 
 export const withStd = (x, std, digits, unit) =>
-  x == null ? UNKNOWN : `${number(x, digits)}${std == null ? "" : ` ± ${number(1.96 * std, digits)}`} ${unit}`;
+  x == null ? UNKNOWN : `${number(x, digits)}${std == null ? "" : ` ± ${number(1.96 * std, digits)}`}${GLUE}${unit}`;
 
 export const kmh = (mps) => figure(mps == null ? null : mps * 3.6, 0, "km/h");
 
