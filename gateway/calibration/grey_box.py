@@ -131,7 +131,8 @@ def known_spectra(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[KnownSpect
             known.append(KnownSpectra(run, vehicle, spectra))
     if not known:
         raise CalibrationImpossibleError(
-            "no run holds enough steady driving for the cross-spectral estimator: drive at least a minute at speed"
+            "no run holds enough steady driving with both sensors for the cross-spectral estimator: drive at least a "
+            "minute at speed, and map both"
         )
     return known
 

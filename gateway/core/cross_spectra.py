@@ -109,7 +109,8 @@ def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra
 
 def _segments(batch: Batch, reading: Reading, kept: I64) -> _Segments:
     n_segment = reading.n_segment
-    starts = segment_starts(batch.usable, n_segment, n_segment // 2)
+    has_both = np.isfinite(batch.vertical_acceleration_mps2) & np.isfinite(batch.pitch_rate_radps)
+    starts = segment_starts(batch.usable & has_both, n_segment, n_segment // 2)
     if starts.size:
         speeds_mps = np.lib.stride_tricks.sliding_window_view(batch.speed_mps, n_segment)[starts]
         is_steady = np.ptp(speeds_mps, axis=1) < SPEED_CHANGE_MAX_MPS2 * n_segment / batch.rate_hz

@@ -158,3 +158,10 @@ def test_calibration_without_driving_says_what_to_do() -> None:
     parked = KnownRun(1, "parked", 0.0, 52.0, (replace(still, usable=np.zeros(15000, bool)),))
     with pytest.raises(CalibrationImpossibleError, match="steady driving"):
         calibrate_cross_spectrum([parked], VAN)
+
+
+def test_a_vehicle_without_a_pitch_rate_is_told_that_both_sensors_are_needed() -> None:
+    batch = batch_over_road(0.0, 52.0, seed=1, duration_s=60.0)
+    silent = replace(batch, pitch_rate_radps=np.full(len(batch.pitch_rate_radps), np.nan))
+    with pytest.raises(CalibrationImpossibleError, match="both sensors"):
+        calibrate_cross_spectrum([KnownRun(1, "run", 0.0, 52.0, (silent,))], VAN)

@@ -1,0 +1,209 @@
+"""springscale calibrate --report and evaluate --report, as a person calls them, on a small made-up campaign."""
+
+import json
+import re
+from collections.abc import Mapping
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+from support.known_load_logs import write_known_loads
+
+from gateway.calibration.file import load_calibration
+from gateway.cli import springscale
+from gateway.reports.calibration_text import percent, shown
+
+WINDOW = ("--window-s", "100")
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+def run(*arguments: str) -> Result:
+    done = CliRunner().invoke(springscale, list(arguments), catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done
+
+
+class Page(HTMLParser):
+    """What a reader finds: ids, links, pictures, tables as lists of cells, headings; every element closed in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.fetched: list[str] = []
+        self.links: list[str] = []
+        self.alts: list[str] = []
+        self.tables: list[list[list[str]]] = []
+        self.headings: list[int] = []
+        self.cell: list[str] | None = None
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        found = dict(attributes)
+        self.ids += [found["id"] or ""] if "id" in found else []
+        self.fetched += [found["src"] or ""] if "src" in found else []
+        self.links += [found["href"] or ""] if "href" in found else []
+        self.alts += [found.get("alt") or ""] if tag == "img" else []
+        self.headings += [int(tag[1])] if re.fullmatch("h[1-6]", tag) else []
+        if tag == "table":
+            self.tables.append([])
+        elif tag == "tr":
+            self.tables[-1].append([])
+        elif tag in ("td", "th"):
+            self.cell = []
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+        if tag in ("td", "th") and self.cell is not None:
+            self.tables[-1][-1].append("".join(self.cell).replace("\u00a0", " "))
+            self.cell = None
+
+    def handle_data(self, text: str) -> None:
+        if self.cell is not None:
+            self.cell.append(text)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """campaign.toml, vehicle.json and report/ of four known loads."""
+    directory = tmp_path_factory.mktemp("known")
+    campaign = write_known_loads(directory)
+    vehicle, report = str(directory / "vehicle.json"), str(directory / "report")
+    run("calibrate", str(campaign), "--output", vehicle, "--report", report, *WINDOW)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def page(made: Path) -> Page:
+    return Page((made / "report" / "report.html").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def numbers(made: Path) -> dict[str, Any]:
+    return dict(json.loads((made / "report" / "report.json").read_text(encoding="utf-8")))
+
+
+def test_every_section_is_there_and_linked(page: Page) -> None:
+    sections = {
+        "verdict", "runs", "next", "spectra", "ratio-index", "half-car", "accuracy-cross-spectrum",
+        "accuracy-ratio-index", "provenance",
+    }  # fmt: skip
+    assert sections <= set(page.ids)
+    assert {f"#{name}" for name in sections} <= {link for link in page.links if link.startswith("#")}
+
+
+def test_the_page_is_well_formed_and_headings_descend_by_one(page: Page) -> None:
+    assert page.open == []
+    assert len(page.ids) == len(set(page.ids))
+    assert page.headings[0] == 1
+    assert all(later <= sooner + 1 for sooner, later in zip(page.headings, page.headings[1:], strict=False))
+    assert all(len(row) == len(table[0]) for table in page.tables for row in table)
+
+
+def test_all_it_needs_lies_in_its_directory(made: Path, page: Page) -> None:
+    assert "plotly.min.js" in page.fetched
+    for source in [*page.fetched, *(link for link in page.links if not link.startswith("#"))]:
+        assert not re.match(r"[a-z]+:|//", source)
+        assert (made / "report" / source).stat().st_size > 1000
+    text = (made / "report" / "report.html").read_text(encoding="utf-8")
+    assert not re.search(r"https?://|url\(|@import|<link", text)
+
+
+def test_every_picture_says_what_is_to_be_seen(page: Page) -> None:
+    assert len(page.alts) > 10
+    assert all(len(alt) > 40 for alt in page.alts)
+    assert len(set(page.alts)) == len(page.alts)
+
+
+def test_every_chart_can_be_drawn_live(made: Path, page: Page) -> None:
+    text = (made / "report" / "report.html").read_text(encoding="utf-8")
+    charts = [json.loads(found) for found in re.findall(r'<script type="application/json">(.*?)</script>', text)]
+    assert len(charts) == len(page.alts)
+    assert all(chart["data"] and "height" in chart["layout"] for chart in charts)
+
+
+@pytest.mark.parametrize("estimator", ["cross_spectrum", "ratio_index"])
+@pytest.mark.parametrize("part", ["left_one_run_out", "validation", "identification"])
+def test_the_tables_say_what_the_numbers_say(page: Page, numbers: Mapping[str, Any], estimator: str, part: str) -> None:
+    errors = numbers["errors"][estimator][part]
+    payload = errors["payload"]
+    in_short = [
+        shown(payload["mean_abs_kg"], " kg"), shown(payload["bias_kg"], " kg"), shown(payload["std_kg"], " kg"),
+        shown(payload["max_abs_kg"], " kg"), shown(payload["mean_abs_pct"]),
+    ]  # fmt: skip
+    assert any(in_short == row[3:8] for table in page.tables for row in table)
+    for one in errors["runs"]:
+        cells = [shown(one["payload"]["mean_abs_kg"], " kg"), shown(one["payload"]["bias_kg"], " kg")]
+        cells += [shown(one["payload"]["max_abs_kg"], " kg"), percent(one["payload"]["coverage95"])]
+        rows = [row for table in page.tables for row in table if row[0] == str(one["run"]) and row[4:8] == cells]
+        assert rows
+
+
+def test_runs_left_out_err_as_the_calibration_file_expects(made: Path, numbers: Mapping[str, Any]) -> None:
+    file = load_calibration(made / "vehicle.json")
+    for estimator, expected in file.expected_errors.items():
+        errors = numbers["errors"][estimator]["left_one_run_out"]["payload"]
+        rms_kg = (errors["bias_kg"] ** 2 + errors["std_kg"] ** 2) ** 0.5
+        assert rms_kg == pytest.approx(expected.payload_rms_kg, rel=1e-6)
+
+
+def test_the_verdict_is_of_the_better_estimator_and_gives_its_reasons(numbers: Mapping[str, Any], made: Path) -> None:
+    best = numbers["verdicts"][0]
+    assert numbers["grade"] == best["grade"]
+    assert best["estimator"] == "cross_spectrum"  # the roads of this campaign are just what it supposes
+    assert numbers["calibration_id"] == load_calibration(made / "vehicle.json").id
+    rules = {reason["rule"] for reason in best["reasons"]}
+    assert {"payload_error", "front_share_error", "payload_coverage", "answered", "stated_spread", "runs"} <= rules
+    text = unescape((made / "report" / "report.html").read_text(encoding="utf-8")).replace("\u00a0", " ")
+    assert all(reason["text"] in text for verdict in numbers["verdicts"] for reason in verdict["reasons"])
+
+
+def test_the_plan_says_what_to_drive_next(numbers: Mapping[str, Any], page: Page) -> None:
+    assert len(numbers["plan"]["advice"]) == 3
+    (planned,) = [table for table in page.tables if table[0][0] == "After driving"]
+    assert [row[0][:2] for row in planned[2:5]] == ["1.", "2.", "3."]
+
+
+def test_an_evaluation_has_a_report_of_its_own(made: Path) -> None:
+    told = run(
+        "evaluate", str(made / "campaign.toml"), "--calibration", str(made / "vehicle.json"), "--estimator",
+        "ratio_index", "--report", str(made / "evaluated"), *WINDOW, "--json",
+    )  # fmt: skip
+    numbers = json.loads((made / "evaluated" / "report.json").read_text(encoding="utf-8"))
+    assert numbers["errors"] == {"ratio_index": {"validation": json.loads(told.stdout)}}
+    page = Page((made / "evaluated" / "report.html").read_text(encoding="utf-8"))
+    assert {"verdict", "accuracy-ratio-index", "provenance"} <= set(page.ids)
+    assert not {"half-car", "spectra", "runs"} & set(page.ids)
+
+
+def test_one_load_without_validation_reports_what_there_is(tmp_path: Path) -> None:
+    campaign = write_known_loads(tmp_path, loads=((0.0, None),), identification_fraction=1.0)
+    report = tmp_path / "report"
+    run("calibrate", str(campaign), "--output", str(tmp_path / "v.json"), "--report", str(report), *WINDOW)
+    numbers = json.loads((report / "report.json").read_text(encoding="utf-8"))
+    assert numbers["grade"] != "fit"  # it knows the zero, and says itself how little of the rest
+    assert {"unseen", "stated_spread", "one_load_only"} <= {r["rule"] for r in numbers["verdicts"][0]["reasons"]}
+    assert list(numbers["errors"]) == ["cross_spectrum"]
+    assert list(numbers["errors"]["cross_spectrum"]) == ["identification"]
+    page = Page((report / "report.html").read_text(encoding="utf-8"))
+    assert "ratio-index" not in page.ids
+    assert {"half-car", "accuracy-cross-spectrum"} <= set(page.ids)
+
+
+def test_one_sensor_reports_what_it_can(tmp_path: Path) -> None:
+    """Without a pitch rate the ratio index alone answers, and of the payload alone."""
+    campaign = write_known_loads(tmp_path, has_pitch_rate=False)
+    report = tmp_path / "report"
+    run("calibrate", str(campaign), "--output", str(tmp_path / "v.json"), "--report", str(report), *WINDOW)
+    numbers = json.loads((report / "report.json").read_text(encoding="utf-8"))
+    assert list(numbers["errors"]) == ["ratio_index"]
+    assert numbers["errors"]["ratio_index"]["left_one_run_out"]["front_share"]["mean_abs_pct"] is None
+    assert numbers["plan"] is None
+    page = Page((report / "report.html").read_text(encoding="utf-8"))
+    assert {"ratio-index", "accuracy-ratio-index"} <= set(page.ids)
