@@ -1,0 +1,164 @@
+"""Fit for use or not: every rule by itself, on estimates made up for it."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.calibrated import calibration_file
+
+from gateway.calibration.evaluation import Judged, error_table
+from gateway.calibration.inspection import Finding, RunVerdict, Severity
+from gateway.calibration.inspection_kinds import Kind
+from gateway.core.vehicle import Vehicle
+from gateway.offline.calibrate import Outcome
+from gateway.offline.plan import Expected
+from gateway.records import Estimate, Why
+from gateway.reports.calibration_evidence import Evidence, Judgement, Part
+from gateway.reports.calibration_verdict import Grade, Verdict, verdicts_of
+
+VAN = Vehicle("van", 1240.0, 2.8)  # ranges of 450 kg and of 20 points
+
+
+def judged(run: int, error_kg: float = 0.0, half_kg: float = 20.0, error_pp: float = 0.0) -> Judged:
+    payload_kg, share_pct = 200.0 + error_kg, 50.0 + error_pp
+    estimate = Estimate(
+        0, 1, "cross_spectrum", payload_kg=payload_kg, front_share_pct=share_pct,
+        payload_interval95_kg=(payload_kg - half_kg, payload_kg + half_kg),
+        front_share_interval95_pct=(share_pct - 5.0, share_pct + 5.0),
+    )  # fmt: skip
+    return Judged(run, f"{run}.log", 200.0, 50.0, estimate)
+
+
+def refused(run: int) -> Judged:
+    return Judged(run, f"{run}.log", 200.0, 50.0, Estimate(0, 1, "cross_spectrum", rejected=(Why.GAP,)))
+
+
+def judgement(parts: dict[Part, list[Judged]], estimator: str = "cross_spectrum") -> Judgement:
+    tables = {part: error_table(rows, VAN, estimator) for part, rows in parts.items()}
+    return Judgement(estimator, {part: tuple(rows) for part, rows in parts.items()}, tables)
+
+
+def verdict(
+    left_out: list[Judged],
+    validation: list[Judged] | None = None,
+    warnings: tuple[str, ...] = (),
+    runs: tuple[RunVerdict, ...] | None = None,
+    expected: Expected | None = None,
+) -> Verdict:
+    file = calibration_file().model_copy(update={"warnings": warnings})
+    parts = {Part.LEFT_OUT: left_out} if left_out else {}
+    parts |= {Part.VALIDATION: validation} if validation else {}
+    outcome = None if runs is None else Outcome(file, runs, (), None, None)
+    (found,) = verdicts_of(Evidence("", file, VAN, (judgement(parts),), outcome), expected)
+    return found
+
+
+def grade_of(found: Verdict, rule: str) -> Grade:
+    return next(reason.grade for reason in found.reasons if reason.rule == rule)
+
+
+def test_a_calibration_that_errs_little_is_fit() -> None:
+    found = verdict([judged(run, error_kg=5.0) for run in range(1, 11)])
+    assert found.grade is Grade.FIT
+    assert {reason.grade for reason in found.reasons} == {Grade.FIT}
+
+
+@pytest.mark.parametrize(
+    ("error_kg", "grade"),
+    [(44.0, Grade.FIT), (46.0, Grade.RESERVED), (89.0, Grade.RESERVED), (91.0, Grade.UNFIT)],
+)
+def test_mean_errors_of_a_tenth_and_a_fifth_of_the_range_are_the_limits(error_kg: float, grade: Grade) -> None:
+    found = verdict([judged(run, error_kg, half_kg=200.0) for run in range(1, 11)])
+    assert (found.grade, grade_of(found, "payload_error")) == (grade, grade)
+
+
+@pytest.mark.parametrize(("error_pp", "grade"), [(1.9, Grade.FIT), (2.1, Grade.RESERVED), (4.1, Grade.UNFIT)])
+def test_the_front_share_has_the_same_limits(error_pp: float, grade: Grade) -> None:
+    assert grade_of(verdict([judged(run, error_pp=error_pp) for run in range(1, 5)]), "front_share_error") is grade
+
+
+@pytest.mark.parametrize(("n_missed", "grade"), [(0, Grade.FIT), (3, Grade.FIT), (5, Grade.RESERVED), (9, Grade.UNFIT)])
+def test_intervals_too_narrow_are_told_from_bad_luck(n_missed: int, grade: Grade) -> None:
+    """30 of an interval of 20 kg is a miss; one batch a run, ten runs."""
+    rows = [judged(run, error_kg=30.0 if run <= n_missed else 1.0) for run in range(1, 11)]
+    assert grade_of(verdict(rows), "payload_coverage") is grade
+
+
+def test_batches_of_one_run_say_no_more_of_coverage_than_the_run() -> None:
+    """Two of five runs missed in every batch: forty batches make it no surer than ten."""
+    rows = [judged(run, 30.0 if run <= 2 else 1.0) for run in range(1, 6)]
+    once, often = verdict(rows * 2), verdict(rows * 8)
+    assert grade_of(once, "payload_coverage") == grade_of(often, "payload_coverage")
+
+
+@pytest.mark.parametrize(("n_refused", "grade"), [(1, Grade.FIT), (3, Grade.RESERVED), (6, Grade.UNFIT)])
+def test_a_calibration_that_seldom_answers_is_of_little_use(n_refused: int, grade: Grade) -> None:
+    rows = [refused(run) if run <= n_refused else judged(run) for run in range(1, 11)]
+    assert grade_of(verdict(rows), "answered") is grade
+
+
+def test_validation_far_worse_than_runs_left_out_is_suspicious() -> None:
+    left_out = [judged(run, 5.0) for run in range(1, 5)]
+    assert grade_of(verdict(left_out, [judged(1, 9.0)]), "agreement") is Grade.FIT
+    assert grade_of(verdict(left_out, [judged(1, 30.0)]), "agreement") is Grade.RESERVED
+
+
+def test_without_anything_unseen_there_is_no_unreserved_verdict() -> None:
+    found = verdict([])
+    assert (found.grade, grade_of(found, "unseen")) == (Grade.RESERVED, Grade.RESERVED)
+
+
+def test_warnings_reserve_but_not_those_about_the_other_estimator() -> None:
+    rows = [judged(run) for run in range(1, 5)]
+    assert verdict(rows, warnings=("ratio_index: needs two loads",)).grade is Grade.FIT
+    assert verdict(rows, warnings=("springs_from_priors",)).grade is Grade.RESERVED
+
+
+@pytest.mark.parametrize(
+    ("severities", "grade"),
+    [
+        ((None, None, None), Grade.FIT),
+        ((None, None, Severity.NOTE), Grade.FIT),
+        ((None, None, Severity.WARNING), Grade.RESERVED),
+        ((None, None, Severity.FAULT), Grade.RESERVED),
+        ((None, Severity.FAULT, Severity.FAULT), Grade.UNFIT),
+    ],
+)
+def test_the_runs_count(severities: tuple[Severity | None, ...], grade: Grade) -> None:
+    runs = tuple(
+        RunVerdict(number, "a.log", () if severity is None else (Finding(Kind.GAPS, severity, "gaps", "drive again"),))
+        for number, severity in enumerate(severities, 1)
+    )
+    rows = [judged(run) for run in range(1, 5)]
+    assert grade_of(verdict(rows, runs=runs), "runs") is grade
+
+
+@pytest.mark.parametrize(("std_kg", "grade"), [(50.0, Grade.FIT), (100.0, Grade.RESERVED), (120.0, Grade.UNFIT)])
+def test_what_it_states_of_all_loads_counts_too(std_kg: float, grade: Grade) -> None:
+    """sqrt(2 / pi) of 50, 100 and 120 kg are 8.9, 17.7 and 21.3 % of 450 kg."""
+    found = verdict([judged(run) for run in range(1, 5)], expected=Expected(std_kg, 1.0, None))
+    assert grade_of(found, "stated_spread") is grade
+
+
+def test_the_better_estimator_comes_first() -> None:
+    file = calibration_file()
+    bad = judgement({Part.LEFT_OUT: [judged(run, 100.0, 200.0) for run in range(1, 5)]}, "cross_spectrum")
+    good = judgement({Part.LEFT_OUT: [judged(run, 10.0) for run in range(1, 5)]}, "ratio_index")
+    found = verdicts_of(Evidence("", file, VAN, (bad, good)))
+    assert [one.estimator for one in found] == ["ratio_index", "cross_spectrum"]
+
+
+@given(errors_kg=st.lists(st.floats(0.0, 200.0), min_size=3, max_size=8), factor=st.floats(1.0, 3.0))
+def test_larger_errors_never_make_it_fitter(errors_kg: list[float], factor: float) -> None:
+    small = [judged(run, error, half_kg=60.0) for run, error in enumerate(errors_kg)]
+    large = [judged(run, factor * error, half_kg=60.0) for run, error in enumerate(errors_kg)]
+    assert verdict(large).grade.rank >= verdict(small).grade.rank
+
+
+def test_a_missing_front_share_is_a_reservation_and_no_miss_of_its_interval() -> None:
+    nothing = {"front_share_pct": float("nan"), "front_share_interval95_pct": (float("nan"), float("nan"))}
+    rows = [replace(one, estimate=replace(one.estimate, **nothing)) for one in (judged(1), judged(2), judged(3))]
+    found = verdict(rows)
+    assert found.grade is Grade.RESERVED
+    assert not any(reason.rule == "front_share_coverage" for reason in found.reasons)
