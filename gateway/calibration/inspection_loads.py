@@ -25,8 +25,9 @@ from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
 
 LEAST_EVIDENCE: Final = 20.0
-PAIRS_TRIED: Final = 3
-FEW_RUNS: Final = 4  # these can bend the fit to their labels, so that pairs are tried whatever the fit says
+PAIRS_TRIED: Final = 2
+FEW_RUNS: Final = 4  # so few can bend the fit to their labels: pairs are tried whatever the fit says
+STRAINED_MISFIT: Final = 4.0  # 1 is perfect, true labels have stayed below 3
 LEAST_OTHERS: Final = 3  # to weigh a run by
 DOUBT_STDS: Final = 6.0  # of the run's own spread, which does not hold the model's errors
 DOUBT_PAYLOAD_SHARE: Final = 0.08  # of the empty mass
@@ -69,12 +70,19 @@ class _Labelled:
         own = np.diag(costs)
         gains = own[:, None] + own[None, :] - costs - costs.T
         pairs = [pair for pair in combinations(range(len(self.known)), 2) if self._differ(*pair)]
-        likely = sorted(pairs, key=lambda pair: -gains[pair])[:PAIRS_TRIED]
+        pairs.sort(key=lambda pair: -gains[pair])
         if len(self.known) > FEW_RUNS:
-            likely = [pair for pair in likely if gains[pair] > 0.0]
+            likely = [pair for pair in pairs[:PAIRS_TRIED] if gains[pair] > 0.0]
+        else:
+            likely = pairs if self._is_strained() else pairs[:PAIRS_TRIED]
         tried = [(i, j, self.found.cost - self._with_exchanged(i, j).cost) for i, j in likely]
         best = max(tried, key=lambda one: one[2], default=None)
         return best if best is not None and best[2] > LEAST_EVIDENCE else None
+
+    def _is_strained(self) -> bool:
+        """True where no half-car explains some run with its label."""
+        misfits = [k.whittle.misfit(k.at(self.found.x)) for k in self.known]
+        return float(np.nanmax(misfits)) > STRAINED_MISFIT
 
     def _differ(self, i: int, j: int) -> bool:
         one, other = self.known[i].run, self.known[j].run

@@ -1,0 +1,134 @@
+"""What runs say of each other: loads that teach, speeds and roads that compare, labels that agree with the drives."""
+
+from dataclasses import replace
+
+import pytest
+from support.half_car_road import VAN, batch_over_road
+from support.known_runs import LOADS, campaign, known_run
+
+from gateway.calibration.inspection import Finding, RunVerdict, Severity
+from gateway.calibration.inspection_campaign import inspect_campaign, load_findings
+from gateway.calibration.inspection_kinds import Kind, found
+from gateway.calibration.inspection_loads import compare_loads
+from gateway.calibration.inspection_rows import RowFacts
+from gateway.calibration.inspection_run import Inspected
+from gateway.core.known_run import KnownRun
+from gateway.core.settings import BatchSettings
+from gateway.offline.inspect import Inspection
+
+SETTINGS = BatchSettings(window_s=200.0)
+
+
+def labelled(*loads: tuple[float, float]) -> list[KnownRun]:
+    """Runs with these payloads and shares and nothing driven."""
+    return [KnownRun(number, "a.log", payload, share, ()) for number, (payload, share) in enumerate(loads, 1)]
+
+
+@pytest.mark.parametrize(
+    ("loads", "expected"),
+    [
+        ([(0.0, 52.0), (200.0, 48.0), (400.0, 55.0)], []),
+        ([(0.0, 52.0), (0.0, 52.0)], [Kind.ONE_LOAD_ONLY]),
+        ([(0.0, 52.0), (40.0, 50.0)], [Kind.LOADS_ALIKE]),
+        ([(0.0, 52.0), (200.0, 52.3), (400.0, 51.8)], [Kind.SHARES_ALIKE]),
+        ([(0.0, 52.0), (200.0, 48.0), (400.0, 44.5)], [Kind.LOAD_AND_SHARE_TOGETHER]),
+        ([(0.0, 52.0), (400.0, 44.0)], []),
+        ([], []),
+    ],
+)
+def test_loads_that_teach_too_little_are_named(loads: list[tuple[float, float]], expected: list[Kind]) -> None:
+    assert [finding.kind for finding in load_findings(labelled(*loads), VAN)] == expected
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[KnownRun]:
+    return [known_run(number, *load, seed=7) for number, load in enumerate(LOADS, 1)]
+
+
+def relabelled(run: KnownRun, like: KnownRun) -> KnownRun:
+    return replace(run, payload_kg=like.payload_kg, front_share_pct=like.front_share_pct)
+
+
+def test_true_labels_raise_no_doubt(runs: list[KnownRun]) -> None:
+    assert list(compare_loads(runs, VAN)) == []
+    assert list(compare_loads(runs[:1], VAN)) == []
+    assert list(compare_loads(labelled((0.0, 52.0), (100.0, 50.0)), VAN)) == []
+
+
+@pytest.mark.parametrize(("i", "j"), [(0, 1), (2, 3)])
+def test_two_exchanged_labels_are_found_whichever_they_are(i: int, j: int, runs: list[KnownRun]) -> None:
+    wrong = list(runs)
+    wrong[i], wrong[j] = relabelled(runs[i], runs[j]), relabelled(runs[j], runs[i])
+    findings = dict(compare_loads(wrong, VAN))
+    assert {number: finding.kind for number, finding in findings.items()} == dict.fromkeys(
+        (i + 1, j + 1), Kind.LOADS_SWAPPED
+    )
+    assert f"runs {i + 1} and {j + 1}" in findings[i + 1].text
+
+
+def test_the_order_of_runs_changes_no_verdict(runs: list[KnownRun]) -> None:
+    wrong = [relabelled(runs[1], runs[3]), runs[2], relabelled(runs[3], runs[1]), runs[0]]
+    assert sorted(number for number, _ in compare_loads(wrong, VAN)) == [2, 4]
+    assert sorted(number for number, _ in compare_loads(wrong[::-1], VAN)) == [2, 4]
+
+
+def test_a_load_that_was_noted_wrong_is_told_with_what_the_others_weigh(runs: list[KnownRun]) -> None:
+    more = [*runs, known_run(5, 100.0, 1.4, seed=7)]
+    more[4] = relabelled(more[4], more[3])
+    ((number, finding),) = compare_loads(more, VAN)
+    assert (number, finding.kind, finding.severity) == (5, Kind.LOAD_DISAGREES, Severity.WARNING)
+    weighed_kg = float(finding.text.split("at ")[1].split(" kg")[0])
+    assert weighed_kg == pytest.approx(100.0, abs=40.0)
+
+
+def inspected(run: KnownRun) -> Inspected:
+    return Inspected(run, replace(run, batches=()), RowFacts())
+
+
+def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_of(runs: list[KnownRun]) -> None:
+    share_pct = runs[0].front_share_pct
+    fast = replace(runs[0], number=5, batches=(batch_over_road(0.0, share_pct, 3, 200.0, speed_mps=20.0),))
+    (batch,) = runs[0].batches
+    quiet = replace(
+        batch,
+        vertical_acceleration_mps2=batch.vertical_acceleration_mps2 / 6.0,
+        pitch_rate_radps=batch.pitch_rate_radps / 6.0,
+    )
+    smooth = replace(runs[0], number=6, batches=(quiet,))
+    verdicts, findings = inspect_campaign([inspected(run) for run in (*runs, fast, smooth)], VAN, SETTINGS)
+    assert findings == ()
+    told = {verdict.number: [finding.kind for finding in verdict.findings] for verdict in verdicts}
+    assert told == {1: [], 2: [], 3: [], 4: [], 5: [Kind.SPEED_DIFFERS], 6: [Kind.SMOOTH_ROAD]}
+
+
+FAULT = found(Kind.PITCH_RATE_SIGN, Severity.FAULT, "it is turned")
+WARNING = found(Kind.SMOOTH_ROAD, Severity.WARNING, "it is smooth")
+
+
+def inspection(*findings: tuple[Finding, ...]) -> Inspection:
+    """The runs of support.known_runs with these findings."""
+    split = campaign()
+    return Inspection(split, tuple(RunVerdict(n, "a.log", one) for n, one in enumerate(findings, 1)), ())
+
+
+def test_a_calibration_is_refused_only_where_faults_leave_no_scale() -> None:
+    assert inspection((), (), (), ()).refusal is None
+    assert inspection((FAULT,), (WARNING,), (FAULT,), ()).refusal is None
+    assert inspection((FAULT,), (FAULT,), (FAULT,), (FAULT,)).refusal == "no run can be used"
+    alone = inspection((WARNING,), (FAULT,), (FAULT,), (FAULT,))
+    assert alone.refusal == "faults leave runs with 0 kg alone, which is no scale"
+
+
+def test_the_calibration_file_remembers_faults_of_runs_left_out_and_warnings_of_the_others() -> None:
+    found_in = inspection((FAULT, WARNING), (WARNING,), (), ())
+    assert [one.identification.number for one in found_in.usable] == [2, 3, 4]
+    assert found_in.warnings == (
+        "run 1 left out: pitch_rate_sign: it is turned",
+        "run 2: smooth_road: it is smooth",
+    )
+
+
+def test_a_campaign_without_identification_says_so() -> None:
+    split = tuple(replace(one, has_identification=False) for one in campaign())
+    verdicts = tuple(RunVerdict(n, "a.log") for n in range(1, 5))
+    assert "identification_fraction" in str(Inspection(split, verdicts, ()).refusal)
