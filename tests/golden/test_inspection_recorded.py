@@ -1,0 +1,67 @@
+"""Inspection of recorded drives: no false alarm on any, and the right one where the signal map is spoiled."""
+
+from pathlib import Path
+
+import pytest
+from support.recordings import recordings
+
+from gateway.bus.signal_map import load_signal_map
+from gateway.calibration.campaign import load_campaign
+from gateway.calibration.inspection_rows import row_facts
+from gateway.calibration.inspection_run import Inspected, inspect_run
+from gateway.core.known_run import KnownRun
+from gateway.core.settings import BatchSettings
+from gateway.offline.batches import Stretch, batches_of_motion, motion_of_whole_log, rows_within
+from gateway.offline.inspect import Inspection, inspect
+
+SETTINGS = BatchSettings()
+
+
+def findings(campaign: str) -> dict[int, list[str]]:
+    found: Inspection = inspect(load_campaign(recordings() / campaign), SETTINGS)
+    assert found.refusal is None
+    return {one.number: [f"{finding.severity}:{finding.kind}" for finding in one.findings] for one in found.verdicts}
+
+
+def test_ten_sound_runs_are_sound() -> None:
+    assert findings("known_loads/campaign.toml") == {number: [] for number in range(1, 11)}
+
+
+@pytest.mark.parametrize("trip", ["a", "b"])
+def test_a_real_car_raises_neither_fault_nor_warning(trip: str) -> None:
+    for found in findings(f"real_drive/campaign_trip_{trip}.toml").values():
+        assert [one for one in found if not one.startswith("note:")] == []
+
+
+@pytest.mark.parametrize(
+    ("folder", "campaign", "log", "old", "new", "expected"),
+    [
+        ("known_loads", "campaign", 7, "PitchRate", "RollRate", "pitch_rate_axis"),
+        ("known_loads", "campaign", 7, "PitchRate", "YawRate", "pitch_rate_axis"),
+        ("known_loads", "campaign", 7, "AccelZ", "AccelX", "acceleration_axis"),
+        ("known_loads", "campaign", 7, 'PitchRate"\nsign = 1', 'PitchRate"\nsign = -1', "pitch_rate_sign"),
+        ("real_drive", "campaign_trip_a", 1, "sign = -1", "sign = 1", "pitch_rate_sign"),
+        ("real_drive", "campaign_trip_a", 1, "AngularRateZ", "AngularRateY", "pitch_rate_axis"),
+        ("real_drive", "campaign_trip_a", 1, "AngularRateZ", "AngularRateX", "pitch_rate_axis"),
+        ("real_drive", "campaign_trip_a", 1, "AccelerationX", "AccelerationY", "acceleration_axis"),
+    ],
+)
+def test_a_spoiled_signal_map_is_named(
+    folder: str, campaign: str, log: int, old: str, new: str, expected: str, tmp_path: Path
+) -> None:
+    source = recordings() / folder
+    text = (source / "signals.toml").read_text(encoding="utf-8")
+    assert old in text
+    spoiled = text.replace(old, new, 1).replace('dbc = ["', f'dbc = ["{source}/')
+    (tmp_path / "signals.toml").write_text(spoiled, encoding="utf-8")
+    loaded = load_campaign(source / f"{campaign}.toml")
+    run = loaded.runs[log - 1]
+    signal_map = load_signal_map(tmp_path / "signals.toml")
+    motion = rows_within(motion_of_whole_log(loaded.log_of(run), signal_map), Stretch(0.0, 700.0))
+    batches = batches_of_motion(motion, signal_map, SETTINGS)
+    known = KnownRun(log, str(run.log), run.payload_kg, loaded.front_share_pct(run), batches)
+    one = Inspected(known, KnownRun(log, "", 0.0, 0.0, ()), row_facts(motion, signal_map.traits))
+    faults = [
+        finding.kind for finding in inspect_run(one, loaded.vehicle, SETTINGS).findings if finding.severity == "fault"
+    ]
+    assert faults == [expected]
