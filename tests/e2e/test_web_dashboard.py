@@ -162,7 +162,9 @@ def test_it_follows_what_happens(gateway: Gateway, watched: Watched) -> None:
         page = watched.page
         page.goto(server.url)
         expect(page.locator("#payload")).to_have_text("unknown")
-        expect(page.locator("#note")).to_have_text("No estimate: no estimate yet.")
+        expect(page.locator("#note")).to_have_text("No estimate yet.")
+        expect(page.locator("#history")).to_contain_text("No batch yet.")
+        expect(page.locator("#payload-chart")).to_be_hidden()
         expect(page.locator("#link")).to_have_text("live")
         gateway.publish(make_record(7))
         expect(page.locator("#payload")).to_have_text("107 kg")

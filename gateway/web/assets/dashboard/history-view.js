@@ -96,6 +96,7 @@ const floor = { overlaying: "y", range: [0, 1], visible: false, fixedrange: true
 
 function drawCharts() {
   const batches = shownBatches(known);
+  element("history").classList.toggle("empty", !batches.length);
   if (!batches.length) return;
   for (const [name, quantity] of Object.entries(QUANTITIES)) {
     element(`${name}-chart-words`).textContent = inWords(batches, quantity);

@@ -10,7 +10,8 @@ function notes(latest) {
   const said = [];
   if (latest.is_stale) said.push("This estimate is old: the load may have changed since.");
   if (latest.provisional) said.push("Early value: the batch under way is not complete yet.");
-  if (latest.rejected.length) said.push(`No estimate: ${latest.rejected.map(words).join(", ")}.`);
+  if (latest.rejected.includes("no_estimate_yet")) said.push("No estimate yet.");
+  else if (latest.rejected.length) said.push(`No estimate: ${latest.rejected.map(words).join(", ")}.`);
   return said.join(" ");
 }
 
@@ -30,6 +31,11 @@ function gauge(id, value, bounds, seen, unit) {
     bar("track", seen), bar("band", bounds), bar("mark", [value, value]),
     made("span", `calibrated: ${between(seen, 0, unit)}`, "scale"),
   );
+}
+
+function writeNumber(id, value, digits, unit) {
+  write(id, figure(value, digits, unit));
+  element(id).classList.toggle("none", value == null);
 }
 
 function epoch(latest) {
@@ -55,10 +61,10 @@ function announce(latest) {
 show(({ latest, vehicle }) => {
   if (latest === null) return;
   const seen = vehicle?.calibration;
-  write("payload", figure(latest.payload_kg, 0, "kg"));
+  writeNumber("payload", latest.payload_kg, 0, "kg");
   write("payload-range", interval(latest.payload_interval95_kg, 0, "kg"));
   gauge("payload-gauge", latest.payload_kg, latest.payload_interval95_kg, seen?.payload_seen_kg, "kg");
-  write("share", figure(latest.front_share_pct, 1, "%"));
+  writeNumber("share", latest.front_share_pct, 1, "%");
   write("share-range", interval(latest.front_share_interval95_pct, 1, "%"));
   gauge("share-gauge", latest.front_share_pct, latest.front_share_interval95_pct, seen?.front_share_seen_pct, "%");
   write("age-at", latest.t_end ? `(batch until ${clock(latest.t_end)})` : "");

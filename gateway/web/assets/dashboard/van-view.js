@@ -99,7 +99,7 @@ show(({ vehicle, weights, latest }) => {
   element("weights").replaceChildren(
     weightPair("Front axle", weights.front_axle),
     weightPair("Rear axle", weights.rear_axle),
-    pair("Load's centre", place ? `${withStd(place.position_m, place.std_m, 2, "m")} behind the front axle` : "no load that is surely there"),
+    pair("Load's centre", place ? `${withStd(place.position_m, place.std_m, 2, "m")} behind the front axle` : weights.id === null ? "unknown" : "no load that is surely there"),
   );
   write("gross", weightInWords(weights.gross));
   element("gross").classList.toggle("over", weights.gross.is_over_limit);
