@@ -127,9 +127,14 @@ class TareState(BaseModel):
     history: list[Tare]
 
 
-UndoTo = Annotated[
-    Literal["previous", "factory"], Query(description="the tare before this one, or none: as it was calibrated")
-]
+class UndoQuery(BaseModel):
+    """How far to go back."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    to: Literal["previous", "factory"] = Field(
+        "previous", description="the tare before this one, or none: as it was calibrated"
+    )
 
 
 def tare_router(desk: TareDesk) -> APIRouter:
@@ -148,9 +153,9 @@ def tare_router(desk: TareDesk) -> APIRouter:
         return await _answered(request, lambda: desk.tare(_who(request), claim.note), 201)
 
     @router.delete(TARE_PATH, response_model=TareState, responses={**refusals, **problem_responses(422)})
-    async def undo_tare(request: Request, to: UndoTo = "previous") -> Response:
+    async def undo_tare(request: Request, query: Annotated[UndoQuery, Query()]) -> Response:
         """Take the last tare out of use, or all of them; raw numbers never change. On disk when answered."""
-        return await _answered(request, lambda: desk.undo(_who(request), to_factory=to == "factory"), 200)
+        return await _answered(request, lambda: desk.undo(_who(request), to_factory=query.to == "factory"), 200)
 
     return router
 

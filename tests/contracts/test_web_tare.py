@@ -93,6 +93,13 @@ def test_a_disk_that_refuses_is_503(local: Client, tmp_path: Path) -> None:
     assert local.get(URL).json()["active"] is None
 
 
+@pytest.mark.parametrize("query", ["to=nothing", "too=factory", "to=factory&to=previous&x=1"])
+def test_an_undo_that_is_not_understood_undoes_nothing(local: Client, query: str) -> None:
+    local.request("POST", URL, json=EMPTY)
+    assert local.request("DELETE", f"{URL}?{query}").status_code == 422
+    assert local.get(URL).json()["active"] is not None
+
+
 @pytest.mark.parametrize(
     "body", [{}, {"is_empty": False}, {"is_empty": "yes"}, {**EMPTY, "note": "x" * 201}, {**EMPTY, "force": True}, []]
 )

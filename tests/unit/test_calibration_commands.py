@@ -171,6 +171,8 @@ FAULTS: list[tuple[Callable[[Path], Any], str]] = [
     (lambda c: (c.parent / "a.log").write_bytes(b"012345678"), "not the log it was calibrated from"),
     (lambda c: c.write_text(c.read_text().replace("payload_kg = 0.0", "payload_kg = 9.0\npayload_position_m = 1.0")),
      "calibrated as 0 kg and 50 %, the campaign says 9 kg"),
+    (lambda c: c.write_text(c.read_text().replace("payload_kg = 0.0", "payload_kg = 9.0\nfront_share_pct = 50.0")),
+     "calibrated as 0 kg and 50 %, the campaign says 9 kg and 50 %"),
 ]  # fmt: skip
 
 
