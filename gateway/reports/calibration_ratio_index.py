@@ -1,15 +1,17 @@
 """The ratio index over load and share: its curves with the fitted model, its bands, and its coefficients."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
 
+from gateway.calibration.ratio_index_fit import RatioIndexFit
 from gateway.core.known_run import KnownRun
 from gateway.core.ratio_index import Band, RatioIndexCalibration
 from gateway.core.regression import RegressionModel
 from gateway.offline.left_out import IndexRows, index_rows
 from gateway.records import F64
+from gateway.reports.calibration_bands import band_chart, model_table, steps_table, trials_table
 from gateway.reports.calibration_text import NONE
 from gateway.reports.chart import Axis, Chart, Line, Mark, Marker, Panel, Points, Ribbon, Section, Table
 
@@ -20,9 +22,10 @@ QUARTILES: Final = "model, the other index at its quartiles"
 
 
 def ratio_index_section(
-    calibration: RatioIndexCalibration, identification: Sequence[KnownRun], validation: Sequence[KnownRun]
+    fit: RatioIndexFit, identification: Sequence[KnownRun], validation: Sequence[KnownRun]
 ) -> Section:
-    """R_a and R_g of every batch, the regression through them, and what it consists of."""
+    """What every band could tell, R_a and R_g of every batch, the regression through them and how it was chosen."""
+    calibration = fit.calibration
     fitted, later = index_rows(identification, calibration), index_rows(validation, calibration)
     panels = []
     if calibration.acceleration_bands is not None:
@@ -37,8 +40,21 @@ def ratio_index_section(
         f"Ratio indexes over load and share. {len(fitted.run)} batches identify, {len(later.run)} validate.",
         tuple(panels),
     )
-    tables = (_bands_table(calibration), *_model_tables(calibration))
-    return Section("ratio-index", "Ratio index", (), (chart,), tables)
+    maps = band_chart(fit)
+    return Section(
+        "ratio-index",
+        "Ratio index",
+        tuple(_warnings(fit)),
+        (*((maps,) if maps else ()), chart),
+        (_bands_table(calibration), trials_table(fit), *_model_tables(fit)),
+    )
+
+
+def _warnings(fit: RatioIndexFit) -> Iterator[str]:
+    """What residuals and columns say against the regressions."""
+    for target, found in (("payload", fit.payload_diagnostics), ("front share", fit.front_share_diagnostics)):
+        if found is not None and found.warnings:
+            yield f"Against the regression of {target}: {'; '.join(found.warnings)}."
 
 
 def _panels(name: str, fitted: IndexRows, later: IndexRows, model: RegressionModel | None) -> list[Panel]:
@@ -109,20 +125,11 @@ def _band(band: Band) -> str:
     return f"{band.centre_hz:g} Hz, {band.width_hz:g} Hz wide"
 
 
-def _model_tables(calibration: RatioIndexCalibration) -> list[Table]:
-    models = (("payload [kg]", calibration.payload), ("front share [%]", calibration.front_share))
-    return [_model_table(target, model) for target, model in models if model is not None]
-
-
-def _model_table(target: str, model: RegressionModel) -> Table:
-    stds = model.residual_std * np.sqrt(np.diag(model.gram_inverse))
-    rows = tuple(
-        (term, f"{coefficient:.4g}", f"{std:.3g}", f"{coefficient / std:.1f}" if std > 0.0 else NONE)
-        for term, coefficient, std in zip(("constant", *model.terms), model.coefficients, stds, strict=True)
-    )
-    return Table(
-        f"Regression of {target}: terms scaled to -1..1 over what was seen; residual standard deviation over runs left "
-        f"out {model.residual_std:.3g}, {model.dof:g} degrees of freedom",
-        ("Term", "coefficient", "standard deviation", "ratio"),
-        rows,
-    )
+def _model_tables(fit: RatioIndexFit) -> Iterator[Table]:
+    models = (fit.calibration.payload, fit.calibration.front_share)
+    for target, tried, model in zip(("payload [kg]", "front share [%]"), fit.chosen.choice.tried, models, strict=True):
+        if tried is not None and model is not None:
+            yield model_table(target, tried, model.residual_std, model.dof)
+            steps = steps_table(target, tried)
+            if steps is not None:
+                yield steps

@@ -54,8 +54,8 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: Plan | Non
     spectra = spectra_section(identification, ratio_index)
     if spectra is not None:
         yield spectra
-    if ratio_index is not None:
-        yield ratio_index_section(ratio_index, identification, [one.validation for one in outcome.split])
+    if outcome.ratio_index is not None:
+        yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.split])
     if outcome.cross_spectrum is not None:
         yield half_car_section(identification, outcome.cross_spectrum, campaign.vehicle)
 
