@@ -5,7 +5,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from gateway.calibration.bands import partial_residuals, rank_correlation
+from gateway.calibration.bands import partial_residuals, rank_correlations
 from gateway.calibration.index_table import IndexTable
 from gateway.calibration.spectral_scatter import bin_covariance, integral_covariance
 from gateway.core.ratio_index import UPPER_LIMIT_HZ
@@ -102,4 +102,4 @@ def _trends(table: IndexTable, spectra: F64, weights: F64, target: F64, other: F
     scale = np.linalg.norm(rest, axis=0) * np.linalg.norm(aim)
     with np.errstate(divide="ignore", invalid="ignore"):
         trend: F64 = np.nan_to_num(rest.T @ aim / scale)
-    return trend, np.array([rank_correlation(column, aim) for column in rest.T])
+    return trend, rank_correlations(rest, aim)

@@ -65,10 +65,14 @@ def candidate_pairs(
     rest, aim = partial_residuals(table.run, levels, target, other)
     scatter = _log_scatter(table, spectra, bands) * (1.0 - 2.0 / len(rest))
     strength = _significance(rest, aim, scatter)
-    found = []
-    for i, j in _peaks(strength, n_best):
-        order = rank_correlation(rest[:, i] - rest[:, j], aim)
-        found.append(BandPair((bands[i], bands[j]), float(strength[i, j]), order))
+    peaks = _peaks(strength, n_best)
+    if not peaks:
+        return []
+    order = rank_correlations(np.column_stack([rest[:, i] - rest[:, j] for i, j in peaks]), aim)
+    found = [
+        BandPair((bands[i], bands[j]), float(strength[i, j]), float(rho))
+        for (i, j), rho in zip(peaks, order, strict=True)
+    ]
     return sorted(found, key=lambda pair: -pair.significance * pair.monotonicity)
 
 
@@ -85,12 +89,13 @@ def run_means(run: I64, columns: F64) -> F64:
     return np.array([columns[run == number].mean(axis=0) for number in np.unique(run)])
 
 
-def rank_correlation(x: F64, y: F64) -> float:
-    """Spearman's: 1 where y rises whenever x does. 0 where either is constant."""
-    ranks = np.array([rankdata(x.round(12)), rankdata(y.round(12))])
-    ranks -= ranks.mean(axis=1, keepdims=True)
-    scale = np.sqrt(np.prod(np.sum(ranks**2, axis=1)))
-    return float(ranks[0] @ ranks[1] / scale) if scale > 0.0 else 0.0
+def rank_correlations(columns: F64, target: F64) -> F64:
+    """Spearman's, of each column (r, b) with target (r,): 1 where it rises whenever the target does. 0 if constant."""
+    ranks, aim = rankdata(columns.round(12), axis=0), rankdata(target.round(12))
+    ranks, aim = ranks - ranks.mean(axis=0), aim - aim.mean()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found: F64 = np.nan_to_num(aim @ ranks / (np.linalg.norm(ranks, axis=0) * np.linalg.norm(aim)))
+    return found
 
 
 def _log_scatter(table: IndexTable, spectra: F64, bands: list[Band]) -> F64:
