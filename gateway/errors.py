@@ -46,4 +46,10 @@ class BusError(SpringscaleError):
 
 
 class StoreError(SpringscaleError):
-    """The database cannot be used (newer schema, another program's file)."""
+    """The database cannot be used now (another Springscale is at work on it)."""
+
+
+class StoreRefusedError(StoreError):
+    """The file is not for this version or not ours: a person must decide, trying again helps nobody; exits with 2."""
+
+    exit_code = 2

@@ -18,6 +18,7 @@ from gateway.units import NS_PER_S
 FILE_NAME: Final = "springscale.db"
 LOCK_NAME: Final = "springscale.lock"
 _DAMAGED: Final = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
+_CLOCK_UNSET_NS: Final = 1_577_836_800 * NS_PER_S  # 2020: an earlier clock was never set (no RTC battery)
 _PRUNE_SHARE: Final = 0.05  # of the rows, removed at a time until the size fits
 
 
@@ -199,7 +200,10 @@ class Database:
         return Opened(new_epoch if known is None else known[0], 0 if last is None else last[0])
 
     def _prune_old(self, connection: sqlite3.Connection, now_ns: int) -> int:
-        """Oldest first, ending at the first row young enough: a row's cost is paid once, not at every look."""
+        """Oldest first, ending at the first row young enough: a row's cost is paid once, not at every look.
+
+        Rows received before the clock was set have no known age: only the limit of size removes them.
+        """
         cut_ns = now_ns - int(self._retention.max_age_s * NS_PER_S)
         n_removed = 0
         for table, stamp in (("estimates", "received_ns"), ("events", "t_ns")):
@@ -207,7 +211,9 @@ class Database:
                 f"SELECT seq FROM {table} WHERE {stamp} >= ? ORDER BY seq LIMIT 1", (cut_ns,)
             ).fetchone()
             seq = (1 << 62) if first_kept is None else first_kept[0]
-            n_removed += connection.execute(f"DELETE FROM {table} WHERE seq < ?", (seq,)).rowcount
+            n_removed += connection.execute(
+                f"DELETE FROM {table} WHERE seq < ? AND {stamp} >= ?", (seq, _CLOCK_UNSET_NS)
+            ).rowcount
         return n_removed
 
     @staticmethod

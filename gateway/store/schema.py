@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from gateway.errors import StoreError
+from gateway.errors import StoreRefusedError
 
 APPLICATION_ID: Final = 0x53505253  # "SPRS" in the file's header
 
@@ -56,7 +56,7 @@ MIGRATIONS: Final[tuple[str, ...]] = (
 def connect_writer(path: Path, migrations: Sequence[str] = MIGRATIONS) -> sqlite3.Connection:
     """The one connection that writes, its schema brought up to date; every commit reaches the disk.
 
-    Raises StoreError for a file of a newer Springscale or of another program, sqlite3.Error for what
+    Raises StoreRefusedError for a file of a newer Springscale or of another program, sqlite3.Error for what
     the disk refuses.
     """
     connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=5.0)
@@ -89,9 +89,9 @@ def _refuse_foreign(connection: sqlite3.Connection, path: Path, newest: int) -> 
     version = pragma(connection, "user_version")
     is_empty = connection.execute("SELECT 1 FROM sqlite_schema LIMIT 1").fetchone() is None
     if pragma(connection, "application_id") != APPLICATION_ID and not (is_empty and version == 0):
-        raise StoreError(f"{path} is a database of another program: give [store] directory a place of its own")
+        raise StoreRefusedError(f"{path} is a database of another program: give [store] directory a place of its own")
     if version > newest:
-        raise StoreError(
+        raise StoreRefusedError(
             f"{path} has schema {version}, this Springscale knows {newest}: "
             "install the newer Springscale again or move the file away"
         )
