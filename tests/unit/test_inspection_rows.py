@@ -46,9 +46,11 @@ def test_a_slow_sensor_is_named() -> None:
 
 def test_stamps_in_bursts_are_named() -> None:
     motion = drive(30.0)
-    bursts = (motion.t_ns - T0_NS) // 50_000_000 * 50_000_000
-    late = np.arange(len(motion)) % 2 * 100_000  # five or so frames every 50 ms
-    assert rate_kinds(replace(motion, t_ns=T0_NS + bursts + late)) == ["jitter", "jitter"]
+    since_ns = motion.t_ns - T0_NS
+    burst_ns = 30_000_000
+    in_burst_ns = since_ns % burst_ns // 100  # three samples of each sensor, a tenth of a millisecond apart
+    bursts = replace(motion, t_ns=T0_NS + since_ns // burst_ns * burst_ns + in_burst_ns)
+    assert rate_kinds(bursts) == ["jitter", "jitter"]
 
 
 def test_a_silent_sensor_is_named_and_one_that_is_not_mapped_is_not() -> None:
