@@ -103,7 +103,7 @@ def _residuals(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
         "errors are, a steeper course means intervals too narrow.",
         f"Residuals of the {estimator_name(judgement.estimator)} over truth, speed and normal quantiles.",
         tuple(panels),
-        n_columns=3,
+        most_columns=3,
         row_height_px=300,
     )
 

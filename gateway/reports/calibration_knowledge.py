@@ -69,7 +69,7 @@ def knowledge_chart(known: Sequence[Known]) -> Chart:
         "sensor (acceleration a, pitch rate g) that does not come through the modelled path.",
         "Identifiability: share of the prior standard deviation left over after calibration, parameter by parameter.",
         panels,
-        n_columns=3,
+        most_columns=3,
         row_height_px=560,
     )
 

@@ -106,14 +106,19 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """Panels side by side, ``n_columns`` in a row. ``name`` is a file's; ``alt`` says in words what is to be seen."""
+    """Panels side by side, ``most_columns`` in a row. ``name`` is a file's; ``alt`` tells in words what is seen."""
 
     name: str
     caption: str
     alt: str
     panels: tuple[Panel, ...]
-    n_columns: int = 2
+    most_columns: int = 2
     row_height_px: int = 340
+
+    @property
+    def n_columns(self) -> int:
+        """Panels in a row."""
+        return min(self.most_columns, len(self.panels))
 
     @property
     def n_rows(self) -> int:

@@ -1,0 +1,100 @@
+"""One chart, drawn twice: what the live one shows, the still one shows too."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.reports.chart import COLOURS, Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.chart_live import live, plotly_json, plotly_script
+from gateway.reports.chart_still import draw, save_still
+
+X = np.linspace(1.0, 3.0, 5)
+MARKS: tuple[Mark, ...] = (
+    Line(X, X**2, "line"),
+    Points(X, X, "points", 1, "diamond", X - 1.0, X + 2.0, tuple("abcde")),
+    Ribbon(X, X - 1.0, X + 1.0, "ribbon", 2),
+    Rule(2.0, is_vertical=True, label="rule"),
+    Span(1.2, 1.4, "span", 3),
+)
+
+
+def chart(*panels: Panel) -> Chart:
+    return Chart("name", "caption", "what is to be seen", panels)
+
+
+def panel(*marks: Mark, is_log: bool = False) -> Panel:
+    return Panel(Axis("x [Hz]"), Axis("y [kg]", is_log=is_log), marks)
+
+
+def luminance(colour: str) -> float:
+    """Relative, as WCAG 2.2 defines it."""
+    parts = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+@pytest.mark.parametrize("ground", ["#ffffff", "#192220"])
+@pytest.mark.parametrize("colour", COLOURS)
+def test_every_colour_is_seen_on_light_and_on_dark(colour: str, ground: str) -> None:
+    dark, light = sorted((luminance(colour), luminance(ground)))
+    assert (light + 0.05) / (dark + 0.05) >= 3.0
+
+
+@pytest.mark.parametrize("mark", MARKS, ids=lambda mark: type(mark).__name__)
+def test_every_mark_is_drawn_by_both(mark: Mark) -> None:
+    one = chart(panel(mark))
+    shown = live(one)
+    assert len(shown.data) + len(shown.layout.shapes) == 1
+    (axes, *_) = draw(one).axes
+    assert len(axes.lines) + len(axes.collections) + len(axes.patches) >= 1
+
+
+def test_a_map_is_drawn_by_both_with_a_bar_beside_its_own_panel() -> None:
+    cells = Cells(X, np.arange(2.0), np.arange(10.0).reshape(2, 5), "z", is_about_zero=True)
+    one = chart(panel(Line(X, X)), panel(cells))
+    heat = live(one).data[-1]
+    assert heat.type == "heatmap"
+    assert heat.zmid == 0.0
+    assert heat.colorbar.x == pytest.approx(live(one).layout.xaxis2.domain[1])
+    assert len(draw(one).axes) == 3  # two panels and the bar
+
+
+def test_numbers_reach_plotly_as_they_are() -> None:
+    trace = live(chart(panel(MARKS[1]))).data[0]
+    assert np.array_equal(trace.x, X)
+    assert np.allclose(trace.y + trace.error_y.array, X + 2.0)
+    assert np.allclose(trace.y - trace.error_y.arrayminus, X - 1.0)
+
+
+def test_a_label_stands_in_the_legend_once_and_switches_every_panel() -> None:
+    traces = live(chart(panel(Line(X, X, "same")), panel(Line(X, -X, "same"), Line(X, X, "other")))).data
+    assert [trace.showlegend for trace in traces] == [True, False, True]
+    assert [trace.legendgroup for trace in traces] == ["same", "same", "other"]
+    (legend,) = draw(chart(panel(Line(X, X, "same")), panel(Line(X, -X, "same")))).legends
+    assert [text.get_text() for text in legend.get_texts()] == ["same"]
+
+
+def test_axes_say_what_they_are() -> None:
+    one = chart(Panel(Axis("f", limits=(1.0, 9.0)), Axis("", places=("low", "high")), (Line(X, X),)))
+    layout = json.loads(plotly_json(one))["layout"]
+    assert layout["xaxis"]["title"]["text"] == "f"
+    assert layout["xaxis"]["range"] == [1.0, 9.0]
+    assert layout["yaxis"]["ticktext"] == ["low", "high"]
+    (axes,) = draw(one).axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["low", "high"]
+    logarithmic = live(chart(Panel(Axis("f", is_log=True, limits=(0.1, 10.0)), Axis("y"), (Line(X, X),))))
+    assert logarithmic.layout.xaxis.range == (-1.0, 1.0)
+
+
+def test_the_same_chart_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("one", "other"):
+        save_still(chart(panel(*MARKS, is_log=True)), tmp_path / name)
+    for ending in ("svg", "png"):
+        one, other = (tmp_path / name / f"name.{ending}" for name in ("one", "other"))
+        assert one.read_bytes() == other.read_bytes()
+
+
+def test_the_script_is_the_installed_packages_own() -> None:
+    assert plotly_script().startswith("/**\n* plotly.js")
