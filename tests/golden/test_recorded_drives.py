@@ -40,7 +40,7 @@ def table(campaign: str, calibration: Path, *arguments: str) -> dict[str, Any]:
         ("known_loads/campaign.toml", ["--estimator", "cross_spectrum"], 10, 3.0, 1.5),
         ("speeds/campaign.toml", ["--estimator", "cross_spectrum"], 15, 5.0, 2.0),
         ("known_loads/campaign.toml", ["--estimator", "cross_spectrum", "--window-s", "60"], 50, 6.0, 2.0),
-        ("known_loads/campaign.toml", ["--estimator", "ratio_index"], 10, 15.0, 9.0),
+        ("known_loads/campaign.toml", ["--estimator", "ratio_index"], 10, 15.0, 7.5),
     ],
 )
 def test_errors_stay_within_what_is_promised(
