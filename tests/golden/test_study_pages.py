@@ -1,0 +1,34 @@
+"""docs/coverage.md says what the numbers beside it say, and nothing else.
+
+Both come from `springscale study coverage --output DIR`.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.calibration.coverage_table import ALL_KINDS
+from gateway.offline.coverage_drives import TRIPS
+from gateway.reports.coverage_page import coverage_page
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {"coverage": coverage_page}
+
+
+def numbers(name: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((DOCS / f"{name}.json").read_text(encoding="utf-8"))
+    return found
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_the_page_is_made_from_the_numbers(name: str) -> None:
+    assert (DOCS / f"{name}.md").read_text(encoding="utf-8") == PAGES[name](numbers(name))
+
+
+def test_coverage_pools_at_least_200_batches_of_every_kind_of_drive() -> None:
+    lines = numbers("coverage")["lines"]
+    assert {line["kind"] for line in lines} == {*TRIPS, ALL_KINDS}
+    assert min(line["n_batches"] for line in lines if line["kind"] == ALL_KINDS) >= 200
