@@ -43,11 +43,12 @@ def density_of(batches: Iterable[Batch], sensor: str) -> Density | None:
     for batch in batches:
         x = batch.vertical_acceleration_mps2 if sensor == ACCELERATION else batch.pitch_rate_radps
         starts = segment_starts(batch.usable & np.isfinite(x), N_SEGMENT, N_SEGMENT // 2)
-        powers.append(np.abs(segment_transforms(x, starts, N_SEGMENT, batch.rate_hz)) ** 2)
-        rate_hz = batch.rate_hz
-    n_segments = sum(len(power) for power in powers)
-    if not n_segments:
+        if starts.size:
+            powers.append(np.abs(segment_transforms(x, starts, N_SEGMENT, batch.rate_hz)) ** 2)
+            rate_hz = batch.rate_hz
+    if not powers:
         return None
+    n_segments = sum(len(power) for power in powers)
     freq_hz = frequencies_hz(N_SEGMENT, rate_hz)
     kept = (freq_hz >= SHOWN_HZ[0]) & (freq_hz <= SHOWN_HZ[1])
     mean = np.concatenate(powers)[:, kept].mean(axis=0)

@@ -1,0 +1,61 @@
+"""Every run judged by what the other runs teach: the errors are those the calibration file expects."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.known_load_logs import write_known_loads
+
+from gateway.calibration.campaign import load_campaign
+from gateway.calibration.regression_fit import fit_regression
+from gateway.core.settings import BatchSettings
+from gateway.offline.calibrate import Outcome, calibrate
+from gateway.offline.left_out import index_rows, judged_left_out
+
+LOADS = ((0.0, None), (150.0, 0.5), (200.0, 2.6), (300.0, 1.4), (400.0, 0.7), (400.0, 2.4))
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    campaign = load_campaign(write_known_loads(tmp_path_factory.mktemp("left_out"), LOADS, duration_s=150.0))
+    return calibrate(campaign, BatchSettings(window_s=100.0), estimators=("ratio_index",))
+
+
+def errors_kg(outcome: Outcome) -> np.ndarray:
+    judged = judged_left_out(outcome, "ratio_index")
+    return np.array([one.estimate.payload_kg - one.payload_kg for one in judged if one.estimate.counted])
+
+
+def test_errors_are_those_the_file_expects(outcome: Outcome) -> None:
+    expected = outcome.file.expected_errors["ratio_index"].payload_rms_kg
+    assert np.sqrt(np.mean(errors_kg(outcome) ** 2)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_every_run_is_judged_once_a_batch_with_an_interval_about_its_answer(outcome: Outcome) -> None:
+    judged = [one for one in judged_left_out(outcome, "ratio_index") if one.estimate.counted]
+    assert [one.run for one in judged] == [1, 2, 3, 4, 5, 6]
+    for one in judged:
+        low, high = one.estimate.payload_interval95_kg
+        assert (low + high) / 2.0 == pytest.approx(one.estimate.payload_kg)
+        assert high - low > 0.0
+
+
+def test_where_no_choice_can_be_made_anew_bands_and_terms_stay(outcome: Outcome) -> None:
+    """Then the error of a run is that of the same regression fitted to the other runs."""
+    fit = outcome.ratio_index
+    assert fit is not None
+    assert fit.calibration.payload is not None
+    blank = replace(fit.chosen, nested=replace(fit.chosen.nested, error=np.full_like(fit.chosen.nested.error, np.nan)))
+    found = errors_kg(replace(outcome, ratio_index=replace(fit, trials=(blank, *fit.trials[1:]))))
+    rows = index_rows([one.identification for one in outcome.split], fit.calibration)
+    again = fit_regression(fit.calibration.payload.terms, rows.ra, rows.rg, rows.payload_kg, rows.run)
+    assert found == pytest.approx(again.held_out_errors, rel=1e-4, abs=1e-3)
+
+
+def test_two_runs_leave_nothing_to_learn_from(outcome: Outcome) -> None:
+    assert judged_left_out(replace(outcome, cross_spectrum_without={}), "cross_spectrum") == []
+
+
+def test_the_logs_are_of_the_campaign(outcome: Outcome) -> None:
+    assert {Path(run.log).name for run in outcome.file.provenance.runs} == {f"0{n}.log" for n in range(1, 7)}
