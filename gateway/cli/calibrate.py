@@ -12,6 +12,7 @@ from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.draft import load_draft
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.index_choice import BandChoice
+from gateway.calibration.learning_curve import LearningCurve
 from gateway.calibration.structures import StructureChoice
 from gateway.cli.inspection_text import inspection_json, inspection_sentences
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
@@ -21,6 +22,7 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError
 from gateway.offline.calibrate import Outcome, calibrate_inspected
 from gateway.offline.inspect import Inspection, inspect
+from gateway.offline.learning_curve import curve_of
 from gateway.offline.plan import Plan, plan_first, plan_next
 from gateway.records import json_line
 
@@ -47,6 +49,9 @@ from gateway.records import json_line
 @click.option("--plan", "wants_plan", is_flag=True, help="advise which load to drive next; [vehicle] alone is enough")
 @click.option("--check", "only_checks", is_flag=True, help="inspect the drives and write nothing; exits 1 on a refusal")
 @click.option("--report", type=FILE, default=None, help="directory to write a report into: report.html, figures")
+@click.option(
+    "--learning-curve", "wants_curve", is_flag=True, help="how accurate with fewer runs, in the report; takes minutes"
+)
 @window
 @as_json
 def calibrate(
@@ -59,12 +64,15 @@ def calibrate(
     wants_plan: bool,
     only_checks: bool,
     report: Path | None,
+    wants_curve: bool,
     window_s: float | None,
     as_json: bool,
 ) -> None:
     """Fit every estimator on the identification parts of CAMPAIGN's runs."""
     if output is None and not wants_plan and not only_checks:
         raise click.UsageError("name the calibration file to write with --output, or ask with --check or --plan")
+    if wants_curve and report is None:
+        raise click.UsageError("--learning-curve is part of a report: name its directory with --report")
     if wants_plan and not (draft := load_draft(campaign)).runs:
         plan = plan_first(draft.vehicle)
         click.echo(json_line({"plan": plan.to_json()}) if as_json else plan_sentences(plan))
@@ -90,7 +98,7 @@ def calibrate(
     if output is not None:
         output.write_text(found.to_json(), encoding="utf-8")
     if report is not None:
-        _report(report, loaded, outcome)
+        _report(report, loaded, outcome, _curve(loaded, outcome) if wants_curve else None)
     next_runs = plan_next(outcome, loaded.vehicle) if wants_plan else None
     if as_json:
         summary = _summary(found, output, next_runs) | {"inspection": inspection_json(inspection)}
@@ -110,11 +118,22 @@ def _inspect(campaign: Campaign, numbers: Sequence[int] | None, window_s: float 
         )
 
 
-def _report(directory: Path, campaign: Campaign, outcome: Outcome) -> None:
+def _curve(campaign: Campaign, outcome: Outcome) -> LearningCurve:
+    with counted("calibrating on fewer runs") as on_trial:
+        return curve_of(
+            outcome.split,
+            campaign.vehicle,
+            name=campaign.vehicle.name,
+            estimators=outcome.file.estimators,
+            on_trial=on_trial,
+        )
+
+
+def _report(directory: Path, campaign: Campaign, outcome: Outcome, curve: LearningCurve | None) -> None:
     from gateway.reports.calibration_report import write_calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
 
     with counted("judging and drawing") as on_chart:
-        written = write_calibration_report(directory, campaign, outcome, on_chart)
+        written = write_calibration_report(directory, campaign, outcome, on_chart, curve=curve)
     click.echo(str(written), err=True)
 
 

@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from gateway.calibration.campaign import Campaign
+from gateway.calibration.learning_curve import LearningCurve
 from gateway.offline.calibrate import Outcome
 from gateway.offline.plan import Plan, plan_next
 from gateway.reports.calibration_accuracy import accuracy_section
 from gateway.reports.calibration_evidence import PART_NAMES, Evidence, evidence_of_calibration
 from gateway.reports.calibration_half_car import half_car_section
+from gateway.reports.calibration_learning import learning_section
 from gateway.reports.calibration_page import Page, page_html
 from gateway.reports.calibration_ratio_index import ratio_index_section
 from gateway.reports.calibration_runs import best_next, plan_section, provenance_section, runs_section
@@ -31,13 +33,19 @@ OnChart = Callable[[int, int], None]  # (charts drawn, charts in all)
 
 
 def write_calibration_report(
-    directory: Path, campaign: Campaign, outcome: Outcome, on_chart: OnChart = lambda done, of: None
+    directory: Path,
+    campaign: Campaign,
+    outcome: Outcome,
+    on_chart: OnChart = lambda done, of: None,
+    *,
+    curve: LearningCurve | None = None,
 ) -> Path:
-    """Everything known of a calibration; the path of report.html."""
+    """Everything known of a calibration, with its learning curve where one was made; the path of report.html."""
     evidence = evidence_of_calibration(campaign, outcome)
     plan = plan_next(outcome, campaign.vehicle) if outcome.cross_spectrum else None
-    sections = [*_calibration_sections(outcome, campaign, plan), *_evaluation_sections(evidence)]
-    return _write(directory, evidence, sections, plan, on_chart)
+    learning = [learning_section(curve)] if curve else []
+    sections = [*_calibration_sections(outcome, campaign, plan), *learning, *_evaluation_sections(evidence)]
+    return _write(directory, evidence, sections, plan, on_chart, curve)
 
 
 def write_evaluation_report(directory: Path, evidence: Evidence, on_chart: OnChart = lambda done, of: None) -> Path:
@@ -64,7 +72,14 @@ def _evaluation_sections(evidence: Evidence) -> list[Section]:
     return [*(accuracy_section(judgement) for judgement in evidence.judgements), provenance_section(evidence)]
 
 
-def _write(directory: Path, evidence: Evidence, sections: list[Section], plan: Plan | None, on_chart: OnChart) -> Path:
+def _write(
+    directory: Path,
+    evidence: Evidence,
+    sections: list[Section],
+    plan: Plan | None,
+    on_chart: OnChart,
+    curve: LearningCurve | None = None,
+) -> Path:
     directory.mkdir(parents=True, exist_ok=True)
     charts = list(_charts(sections))
     for done, chart in enumerate(charts, 1):
@@ -81,7 +96,8 @@ def _write(directory: Path, evidence: Evidence, sections: list[Section], plan: P
         {chart.name: plotly_json(chart) for chart in charts},
     )
     (directory / "plotly.min.js").write_text(plotly_script(), encoding="utf-8")
-    text = json.dumps(report_json(evidence, verdicts, plan), indent=1, allow_nan=False)
+    numbers = report_json(evidence, verdicts, plan) | {"learning_curve": curve.to_json() if curve else None}
+    text = json.dumps(numbers, indent=1, allow_nan=False)
     (directory / "report.json").write_text(text + "\n", encoding="utf-8")
     report = directory / "report.html"
     report.write_text(page_html(page), encoding="utf-8")

@@ -1,0 +1,92 @@
+"""How accurate the vehicle would be with fewer runs: errors over their number, found by leaving runs out."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gateway.calibration.learning_curve import LearningCurve, Rung, Spread
+from gateway.reports.calibration_text import NONE, estimator_name, percent, shown
+from gateway.reports.chart import Axis, Chart, Marker, Panel, Points, Rule, Section, Table
+
+_MARKERS: tuple[Marker, ...] = ("circle", "diamond", "square", "x")
+
+
+def learning_section(curve: LearningCurve) -> Section:
+    """Errors on runs that were not among those calibrated on, and on the later part of all runs."""
+    names = sorted({rung.estimator for rung in curve.rungs})
+    panels = tuple(
+        Panel(
+            Axis("known-load runs"),
+            Axis(f"mean |error| of {what} [% of range]"),
+            (Rule(0.0), *_points(curve, names, quantity)),
+        )
+        for what, quantity in (("payload", "payload"), ("front share", "front_share"))
+    )
+    chart = Chart(
+        "learning_curve",
+        "Mean errors on batches of runs that were left out, over the number of runs calibrated on: means over choices "
+        "of runs, bars their standard deviation between choices. Every choice holds the empty run, if there is one.",
+        "Learning curve: mean error of payload and front share over the number of known-load runs. " + _in_words(curve),
+        panels,
+    )
+    return Section("learning-curve", "With fewer runs", (), (chart,), (_table(curve),))
+
+
+def _points(curve: LearningCurve, names: Sequence[str], quantity: str) -> list[Points]:
+    found = []
+    for colour, name in enumerate(names):
+        rows = [
+            (rung.n_runs, *_mean_and_std(rung.left_out, quantity)) for rung in curve.rungs if rung.estimator == name
+        ]
+        known = np.array([row for row in rows if None not in row], dtype=float).reshape(-1, 3)
+        if len(known):
+            n, mean, std = known.T
+            x = n + 0.06 * colour  # beside one another
+            found.append(Points(x, mean, estimator_name(name), colour, _MARKERS[colour], mean - std, mean + std))
+    return found
+
+
+def _mean_and_std(spread: Spread, quantity: str) -> tuple[float | None, float | None]:
+    if quantity == "payload":
+        return spread.payload_mean_pct, spread.payload_std_pct
+    return spread.front_share_mean_pct, spread.front_share_std_pct
+
+
+def _in_words(curve: LearningCurve) -> str:
+    return " ".join(
+        f"{rung.n_runs} runs, {estimator_name(rung.estimator)}: {shown(rung.left_out.payload_mean_pct, ' %', 1)}."
+        for rung in curve.rungs
+        if rung.left_out.payload_mean_pct is not None
+    )
+
+
+def _table(curve: LearningCurve) -> Table:
+    rows = tuple(
+        (str(rung.n_runs), estimator_name(rung.estimator), _tried(rung), judged, *_cells(spread))
+        for rung in curve.rungs
+        for judged, spread in (("runs left out", rung.left_out), ("later part of all", rung.validation))
+        if spread.n_trials
+    )
+    errors = ("worst", "95 % covers")
+    columns = ("Runs", "estimator", "choices", "judged on", "payload", *errors, "share", *errors)
+    caption = "Mean |error| in percent of the ranges (12) over choices of runs, and that of the worst choice"
+    return Table(caption, columns, rows, n_heads=2)
+
+
+def _tried(rung: Rung) -> str:
+    return f"{rung.n_subsets - rung.n_refused} of {rung.n_subsets}" if rung.n_refused else str(rung.n_subsets)
+
+
+def _cells(spread: Spread) -> tuple[str, ...]:
+    payload, share = (
+        NONE if mean is None or std is None else f"{mean:.1f} ± {std:.1f} %"
+        for mean, std in (_mean_and_std(spread, quantity) for quantity in ("payload", "front_share"))
+    )
+    return (
+        payload,
+        shown(spread.payload_worst_pct, " %", 1),
+        percent(spread.payload_coverage95),
+        share,
+        shown(spread.front_share_worst_pct, " %", 1),
+        percent(spread.front_share_coverage95),
+    )
