@@ -16,6 +16,7 @@ from gateway.web.export import export_router
 from gateway.web.guard import Failures, Guard, describe_guard
 from gateway.web.headers import SecurityHeaders
 from gateway.web.health import health_router
+from gateway.web.j1939 import j1939_router
 from gateway.web.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
 from gateway.web.latest import LatestFirst
 from gateway.web.metrics import metrics_registry
@@ -81,6 +82,7 @@ def create_app(
     app.include_router(tare_router(tare or NoTareDesk()))
     app.include_router(export_router(reader))
     app.include_router(weights_router(board, scales))
+    app.include_router(j1939_router(board, scales))
     app.include_router(vss_router(board, scales))
     app.include_router(rfms_router(board, reader, status, scales))
     app.include_router(health_router(status, metrics_registry(board, scales, status, responses)))

@@ -192,3 +192,29 @@ def test_rfms_media_types_count_in_any_case(gateway: Gateway, accept: str, given
 @pytest.mark.parametrize("accept", ["text/html", "application/vnd.fmsstandard.com.vehicles.v3.0+json", ""])
 def test_rfms_refuses_other_media_types(gateway: Gateway, accept: str) -> None:
     assert client(gateway).get(f"{STATUSES}?latestOnly=true", headers={"Accept": accept}).status_code == 406
+
+
+def test_j1939_counts_are_the_weights_in_its_resolutions(gateway: Gateway) -> None:
+    gateway.publish(record(0, payload_kg=101.3))
+    told = client(gateway).get("/api/v1/weights/j1939").json()
+    counted = {(each["spn"], each["axle"]): (each["pgn"], each["raw"], each["kg"]) for each in told["parameters"]}
+    assert counted == {
+        (582, 1): (65258, 1521, 760.5),  # 90 + (1240 + 101.3) / 2 = 760.65 kg at 0.5 kg a bit
+        (582, 2): (65258, 1561, 780.5),
+        (181, None): (65258, 51, 102.0),
+        (1760, None): (65136, 154, 1540.0),
+    }
+    assert told["id"] == record(0)["id"]
+
+
+@pytest.mark.parametrize(("payload_kg", "raw", "kg"), [(-3.2, 0, 0.0), (200_000.0, 65535, None)])
+def test_j1939_counts_stay_in_their_range(gateway: Gateway, payload_kg: float, raw: int, kg: float | None) -> None:
+    gateway.publish(record(0, payload_kg=payload_kg))
+    cargo = client(gateway).get("/api/v1/weights/j1939").json()["parameters"][2]
+    assert (cargo["spn"], cargo["raw"], cargo["kg"]) == (181, raw, kg)
+
+
+def test_j1939_says_not_available_for_what_is_not_known(gateway: Gateway) -> None:
+    told = client(gateway, vehicle=None).get("/api/v1/weights/j1939").json()
+    assert {each["raw"] for each in told["parameters"]} == {0xFFFF}
+    assert {each["kg"] for each in told["parameters"]} == {None}
