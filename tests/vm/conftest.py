@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from vm.harness.backend import best_backend
 from vm.harness.machine import Machine
-from vm.harness.vehicle import NO_START_LIMIT, SETTINGS, Vehicle
+from vm.harness.vehicle import Vehicle
 
 BUILD = Path(__file__).parents[2] / "build"
 RESULTS = BUILD / "vm-results.json"
@@ -66,12 +66,7 @@ def installed(machine: Machine, package: Path) -> Vehicle:
 def vehicle(installed: Vehicle) -> Iterator[Vehicle]:
     """The service as a test finds it: settings as shipped for tests, bus up, nothing playing, running."""
     yield installed
-    installed.stop_playing()
-    installed.run("ip link set vcan0 up 2>/dev/null || networkctl reload")
-    installed.configure(SETTINGS)
-    installed.drop_in("no-start-limit", NO_START_LIMIT)
-    installed.restart()
-    installed.wait_until(lambda status: True)
+    installed.restore()
 
 
 @pytest.fixture
@@ -109,6 +104,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     findings = session.config.stash.get(_FINDINGS, {})
     if findings:
         BUILD.mkdir(exist_ok=True)
+        earlier = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+        findings = {key: earlier.get(key, {}) | findings.get(key, {}) for key in {*earlier, *findings}}
         RESULTS.write_text(json.dumps(findings, indent=1) + "\n")
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     if reporter is not None:

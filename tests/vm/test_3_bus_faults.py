@@ -1,0 +1,139 @@
+"""What a real interface does to the service, and how soon it is itself again."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from vm.harness.drives import loaded_drive, log_of
+from vm.harness.vehicle import Vehicle
+
+Recovered = Callable[[float], None]
+WATCHDOG_S = 20.0
+GUEST = Path(__file__).parent / "guest"
+
+
+@pytest.fixture
+def drive(vehicle: Vehicle, tmp_path: Path) -> str:
+    """A log of 100 s in the guest."""
+    return vehicle.put_log(log_of(loaded_drive(100.0, 3), tmp_path / "drive.log"))
+
+
+def receiving_again(vehicle: Vehicle, drive: str) -> float:
+    """Seconds from now, with frames on the bus again, until the service counts them."""
+    vehicle.play(drive)
+    return vehicle.wait_until(lambda status: status["bus"]["state"] == "receiving")
+
+
+def in_reader_fault(vehicle: Vehicle, reason: str) -> None:
+    """Wait until the status says so, and check that it says why and that the service lives."""
+    vehicle.wait_until(lambda status: status["bus"]["state"] == "reader_fault")
+    status = vehicle.status()
+    assert reason in status["bus"]["last_fault"]
+    assert not status["is_ready"]
+
+
+def test_interface_down_and_up(vehicle: Vehicle, drive: str, recovered: Recovered) -> None:
+    vehicle.play(drive)
+    vehicle.wait_until(lambda status: status["bus"]["state"] == "receiving")
+    pid = vehicle.pid()
+    vehicle.run("ip link set vcan0 down")
+    in_reader_fault(vehicle, "ip link set vcan0 up")
+    vehicle.stop_playing()
+    vehicle.run("ip link set vcan0 up")
+    recovered(receiving_again(vehicle, drive))
+    assert vehicle.pid() == pid
+
+
+def test_interface_deleted_and_made_again(vehicle: Vehicle, drive: str, recovered: Recovered) -> None:
+    pid = vehicle.pid()
+    vehicle.run("ip link delete vcan0")
+    in_reader_fault(vehicle, "does not exist")
+    vehicle.run("ip link add vcan0 type vcan && ip link set vcan0 up")
+    recovered(receiving_again(vehicle, drive))
+    assert vehicle.pid() == pid
+
+
+def test_interface_absent_at_the_start(vehicle: Vehicle, drive: str, recovered: Recovered) -> None:
+    vehicle.run("systemctl stop springscale; ip link delete vcan0")
+    vehicle.run("systemctl start springscale", timeout_s=90.0)
+    in_reader_fault(vehicle, "does not exist")
+    vehicle.run("ip link add vcan0 type vcan && ip link set vcan0 up")
+    recovered(receiving_again(vehicle, drive))
+    assert vehicle.n_restarts() == 0
+
+
+def test_a_silent_bus_is_no_fault_and_feeds_the_watchdog(vehicle: Vehicle) -> None:
+    pid = vehicle.pid()
+    vehicle.wait_until(lambda status: status["bus"]["state"] == "bus_silent")
+    time.sleep(WATCHDOG_S + 5.0)
+    status = vehicle.status()
+    assert status["state"] == "waiting_for_bus"
+    assert status["is_ready"]
+    assert vehicle.pid() == pid
+
+
+def test_bus_off_is_told_and_passes(vehicle: Vehicle, drive: str, recovered: Recovered) -> None:
+    vehicle.machine.write("/root/odd_frames.py", (GUEST / "odd_frames.py").read_bytes())
+    vehicle.run("python3 /root/odd_frames.py 1 bus_off")
+    in_reader_fault(vehicle, "bus-off")
+    recovered(receiving_again(vehicle, drive))
+
+
+def test_a_flood_is_survived_and_every_frame_accounted_for(vehicle: Vehicle, drive: str, recovered: Recovered) -> None:
+    before, pid, n = vehicle.status()["bus"], vehicle.pid(), 30_000
+    vehicle.run(f"cangen vcan0 -g 0 -p 10 -n {n} -I 120 -L 8 -D i", timeout_s=120.0)
+
+    def accounted() -> bool:
+        bus = vehicle.status()["bus"]
+        return sum(bus[key] - before[key] for key in ("n_frames", "n_kernel_dropped")) >= n
+
+    # The kernel tells of what it dropped with the next frame that finds room.
+    vehicle.run("sleep 0.5; cansend vcan0 120#0000000000000000")
+    vehicle.wait_for(accounted)
+    bus = vehicle.status()["bus"]
+    assert sum(bus[key] - before[key] for key in ("n_frames", "n_kernel_dropped")) == n + 1
+    recovered(receiving_again(vehicle, drive))
+    assert vehicle.pid() == pid
+
+
+def step_clock(vehicle: Vehicle, by_s: int) -> None:
+    vehicle.run(f"date --set @$(( $(date +%s) + {by_s} ))")
+
+
+@pytest.mark.parametrize("by_s", [3600, -3600])
+def test_a_clock_step_ends_the_drive_and_nothing_else(
+    by_s: int, vehicle: Vehicle, drive: str, recovered: Recovered
+) -> None:
+    pid, n_before = vehicle.pid(), len(vehicle.records())
+    vehicle.play(drive)
+    vehicle.wait_until(lambda status: status["bus"]["state"] == "receiving")
+    time.sleep(3.0)
+    step_clock(vehicle, by_s)
+    try:
+        recovered(vehicle.wait_for(lambda: len(vehicle.records()) > n_before))
+        ended = vehicle.records()[n_before:]
+        assert all(record["rejected"] for record in ended)  # begun before the step, hence too short
+        weighed = vehicle.wait_for(lambda: any(not record["rejected"] for record in vehicle.records()[n_before:]))
+        assert weighed < 60.0
+    finally:
+        step_clock(vehicle, -by_s)
+    assert vehicle.pid() == pid
+
+
+def test_estimates_from_before_the_clock_was_set_are_kept(vehicle: Vehicle, tmp_path: Path) -> None:
+    """A box without a clock battery starts in 1970, drives, and learns the date later."""
+    pulse = vehicle.put_log(log_of(loaded_drive(2.0, 4), tmp_path / "pulse.log"))
+    today_s = int(vehicle.run("date +%s"))
+    try:
+        vehicle.run("date --set @1000")
+        for _ in range(2):
+            vehicle.run(f"canplayer -I {pulse}; sleep 3.5")
+        vehicle.wait_for(lambda: any(record["t_end"].startswith("1970") for record in vehicle.stored()))
+    finally:
+        vehicle.run(f"date --set @{today_s + 30}")
+    n_before = len(vehicle.stored())
+    for _ in range(2):
+        vehicle.run(f"canplayer -I {pulse}; sleep 3.5")
+    vehicle.wait_for(lambda: len(vehicle.stored()) > n_before + 1)
+    assert any(record["t_end"].startswith("1970") for record in vehicle.stored())

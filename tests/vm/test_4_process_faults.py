@@ -1,0 +1,166 @@
+"""What happens to the process itself: killed, hung, starved, flooded, badly configured."""
+
+import os
+import random
+import socket
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import httpx
+import pytest
+from vm.harness.drives import loaded_drive, log_of
+from vm.harness.vehicle import CONFIG, SETTINGS, STATE, Answer, Vehicle
+
+Recovered = Callable[[float], None]
+N_KILLS = int(os.environ.get("SPRINGSCALE_KILLS", "20"))
+GUEST = Path(__file__).parent / "guest"
+SHORT_DRIVES = SETTINGS.replace("silence_s = 3.0", "silence_s = 0.5")  # each second of frames is a drive of its own
+
+
+@pytest.fixture
+def many_records(vehicle: Vehicle, tmp_path: Path) -> Vehicle:
+    """A service that commits a record every two seconds or so."""
+    vehicle.configure(SHORT_DRIVES)
+    vehicle.restart()
+    pulse = vehicle.put_log(log_of(loaded_drive(1.0, 4), tmp_path / "pulse.log"))
+    vehicle.play_pulses(pulse, pause_s=0.8)
+    return vehicle
+
+
+def ids(records: list[Answer]) -> list[str]:
+    """Identifiers, none of which may come twice."""
+    found = [record["id"] for record in records]
+    assert len(found) == len(set(found))
+    return found
+
+
+def test_killed_again_and_again_it_loses_and_doubles_nothing(many_records: Vehicle, recovered: Recovered) -> None:
+    vehicle, moments = many_records, random.Random(4)
+    n_restarts = vehicle.n_restarts()
+    vehicle.wait_for(lambda: len(vehicle.stored()) > 2)
+    n_first = len(vehicle.stored())
+    for _ in range(N_KILLS):
+        committed = ids(vehicle.stored())
+        vehicle.run("systemctl kill --signal KILL springscale")
+        time.sleep(moments.uniform(2.0, 12.0))
+        assert ids(vehicle.stored())[: len(committed)] == committed
+    vehicle.run("systemctl kill --signal KILL springscale || true")
+    recovered(vehicle.wait_until(lambda status: status["bus"]["state"] == "receiving"))
+    assert vehicle.n_restarts() - n_restarts >= N_KILLS // 2  # the other signals found it waiting to be restarted
+    vehicle.wait_for(lambda: len(vehicle.stored()) > n_first)
+    told = ids(vehicle.records())
+    assert told == ids(vehicle.stored())[: len(told)]
+
+
+def test_a_hung_pipeline_is_ended_and_begun_anew(vehicle: Vehicle, recovered: Recovered) -> None:
+    pid, n_restarts = vehicle.pid(), vehicle.n_restarts()
+    vehicle.machine.write("/root/freeze_thread.py", (GUEST / "freeze_thread.py").read_bytes())
+    vehicle.run(f"systemd-run --quiet --collect --unit freezer python3 /root/freeze_thread.py {pid} pipeline")
+    recovered(vehicle.wait_for(lambda: vehicle.pid() not in (0, pid) and bool(vehicle.status())))
+    assert vehicle.n_restarts() == n_restarts + 1
+    journal = vehicle.journal(300)
+    assert "Watchdog timeout" in journal
+    assert "Fatal Python error: Aborted" in journal  # every thread's stack, for whoever looks for the reason
+    assert "pipeline.py" in journal
+
+
+def test_the_memory_limit_ends_it_and_it_begins_anew(vehicle: Vehicle, recovered: Recovered) -> None:
+    pid, before = vehicle.pid(), ids(vehicle.stored())
+    vehicle.run("systemctl set-property --runtime springscale MemoryMax=20M")
+    vehicle.wait_for(lambda: vehicle.pid() != pid)
+    vehicle.run("systemctl set-property --runtime springscale MemoryMax=512M")
+    recovered(vehicle.wait_until(lambda status: True))
+    assert "oom-kill" in vehicle.run("journalctl --unit springscale --no-pager --lines 200")
+    assert ids(vehicle.stored())[: len(before)] == before
+
+
+def test_floods_and_slow_clients_cost_no_frame(vehicle: Vehicle, tmp_path: Path) -> None:
+    frames = loaded_drive(20.0, 5)
+    before = vehicle.status()["bus"]
+    over = threading.Event()
+    codes: set[int] = set()
+
+    def flood() -> None:
+        with httpx.Client(timeout=30.0) as client:
+            while not over.is_set():
+                codes.add(client.get(f"http://{vehicle.machine.address}:8000/health/live").status_code)
+
+    threads = [threading.Thread(target=flood) for _ in range(4)]
+    with ExitStack() as slow_clients:
+        for _ in range(50):
+            slow = slow_clients.enter_context(socket.create_connection((vehicle.machine.address, 8000), 10.0))
+            slow.sendall(b"GET /api/v1/status HTTP/1.1\r\nHost: ")
+        for thread in threads:
+            thread.start()
+        vehicle.run(f"canplayer -I {vehicle.put_log(log_of(frames, tmp_path / 'drive.log'))}")
+        over.set()
+        for thread in threads:
+            thread.join()
+    vehicle.wait_for_frames(before["n_frames"] + len(frames))
+    after = vehicle.status()["bus"]
+    assert codes == {200}
+    assert [after[key] - before[key] for key in ("n_kernel_dropped", "n_inbox_dropped")] == [0, 0]
+
+
+def unknown_key(vehicle: Vehicle) -> str:
+    vehicle.configure(SETTINGS + 'colour = "red"\n')
+    return f"{CONFIG}: web.colour: unknown key"
+
+
+def missing_calibration(vehicle: Vehicle) -> str:
+    vehicle.configure(SETTINGS.replace("vehicle.json", "gone.json"))
+    return "/etc/springscale/gone.json"
+
+
+def tampered_calibration(vehicle: Vehicle) -> str:
+    vehicle.run("sed 's/1240/1340/g' /etc/springscale/vehicle.json > /etc/springscale/tampered.json")
+    vehicle.run("! cmp -s /etc/springscale/vehicle.json /etc/springscale/tampered.json")
+    vehicle.configure(SETTINGS.replace("vehicle.json", "tampered.json"))
+    return "does not match its id"
+
+
+def another_vehicles_calibration(vehicle: Vehicle) -> str:
+    vehicle.configure(SETTINGS.replace('id = "van-17"', 'id = "van-17"\ncalibrated_as = "lorry-3"'))
+    return "calibrated_as says 'lorry-3'"
+
+
+def newer_database(vehicle: Vehicle) -> str:
+    set_schema(vehicle, 99)
+    return "has schema 99"
+
+
+def set_schema(vehicle: Vehicle, version: int) -> int:
+    """Write a schema version into the stopped service's database; the one it had."""
+    script = (
+        f"import sqlite3; c = sqlite3.connect('{STATE}/springscale.db');"
+        f"print(c.execute('PRAGMA user_version').fetchone()[0]); c.execute('PRAGMA user_version = {version}')"
+    )
+    return int(vehicle.run(f'python3 -c "{script}"'))
+
+
+@pytest.mark.parametrize(
+    "fault", [unknown_key, missing_calibration, tampered_calibration, another_vehicles_calibration, newer_database]
+)
+def test_a_fault_for_a_person_ends_the_start_once_and_says_which(
+    fault: Callable[[Vehicle], str], vehicle: Vehicle
+) -> None:
+    vehicle.run("systemctl stop springscale; systemctl reset-failed springscale 2>/dev/null || true")
+    schema = set_schema(vehicle, 0)
+    set_schema(vehicle, schema)
+    before = ids(vehicle.stored())
+    try:
+        message = fault(vehicle)
+        assert not vehicle.machine.succeeds("systemctl start springscale")
+        time.sleep(3.0)  # RestartSec and a little
+        shown = vehicle.run("systemctl show --property ExecMainStatus,NRestarts,ActiveState --value springscale")
+        assert shown.split() == ["2", "0", "failed"] or sorted(shown.split()) == ["0", "2", "failed"]
+        assert message in vehicle.journal(20)
+        assert "Traceback" not in vehicle.journal(20)
+    finally:
+        set_schema(vehicle, schema)
+        vehicle.configure(SETTINGS)
+    vehicle.restart()
+    assert ids(vehicle.stored())[: len(before)] == before
