@@ -14,11 +14,13 @@ _MARKERS: tuple[Marker, ...] = ("circle", "diamond", "square", "x")
 def learning_section(curve: LearningCurve) -> Section:
     """Errors on runs that were not among those calibrated on, and on the later part of all runs."""
     names = sorted({rung.estimator for rung in curve.rungs})
+    sizes = sorted({rung.n_runs for rung in curve.rungs})
+    runs = Axis("known-load runs", places=tuple(map(str, sizes)))
     panels = tuple(
         Panel(
-            Axis("known-load runs"),
+            runs,
             Axis(f"mean |error| of {what} [% of range]"),
-            (Rule(0.0), *_points(curve, names, quantity)),
+            (Rule(0.0), *_points(curve, names, sizes, quantity)),
         )
         for what, quantity in (("payload", "payload"), ("front share", "front_share"))
     )
@@ -32,16 +34,18 @@ def learning_section(curve: LearningCurve) -> Section:
     return Section("learning-curve", "With fewer runs", (), (chart,), (_table(curve),))
 
 
-def _points(curve: LearningCurve, names: Sequence[str], quantity: str) -> list[Points]:
+def _points(curve: LearningCurve, names: Sequence[str], sizes: Sequence[int], quantity: str) -> list[Points]:
     found = []
     for colour, name in enumerate(names):
         rows = [
-            (rung.n_runs, *_mean_and_std(rung.left_out, quantity)) for rung in curve.rungs if rung.estimator == name
+            (sizes.index(rung.n_runs), *_mean_and_std(rung.left_out, quantity))
+            for rung in curve.rungs
+            if rung.estimator == name
         ]
         known = np.array([row for row in rows if None not in row], dtype=float).reshape(-1, 3)
         if len(known):
-            n, mean, std = known.T
-            x = n + 0.06 * colour  # beside one another
+            place, mean, std = known.T
+            x = place + 0.06 * colour  # beside one another
             found.append(Points(x, mean, estimator_name(name), colour, _MARKERS[colour], mean - std, mean + std))
     return found
 

@@ -38,7 +38,9 @@ def draw(chart: Chart) -> Figure:
     }  # fmt: skip
     if shown:
         n_columns = min(len(shown), _LEGEND_COLUMNS)
-        figure.legend(list(shown.values()), list(shown), loc="outside lower center", ncols=n_columns, fontsize=7)
+        figure.legend(
+            list(shown.values()), list(shown), loc="outside lower center", ncols=n_columns, fontsize=7, frameon=False
+        )
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # laid out once, not again for every format
     return figure

@@ -21,7 +21,7 @@ def test_means_over_choices_of_runs_with_their_spread() -> None:
     section = learning_section(LearningCurve("van", 1, (*trials, refused), ()))
     (chart,) = section.charts
     payload, share = (next(mark for mark in panel.marks if isinstance(mark, Points)) for panel in chart.panels)
-    assert payload.x.tolist() == [2.0, 4.0]
+    assert [chart.panels[0].x.places[int(at)] for at in payload.x] == ["2", "4"]
     assert payload.y.tolist() == [25.0, 10.0]
     assert payload.low is not None
     assert np.allclose(payload.y - payload.low, [5.0, 2.0])
