@@ -1,6 +1,6 @@
-"""docs/coverage.md says what the numbers beside it say, and nothing else.
+"""docs/learning_curve.md and coverage.md say what the numbers beside them say, and nothing else.
 
-Both come from `springscale study coverage --output DIR`.
+They come from `springscale study NAME --output DIR`: NAME.md, and its numbers NAME.json.
 """
 
 import json
@@ -13,9 +13,13 @@ import pytest
 from gateway.calibration.coverage_table import ALL_KINDS
 from gateway.offline.coverage_drives import TRIPS
 from gateway.reports.coverage_page import coverage_page
+from gateway.reports.study_pages import learning_curve_page
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {"coverage": coverage_page}
+PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "learning_curve": learning_curve_page,
+    "coverage": coverage_page,
+}
 
 
 def numbers(name: str) -> dict[str, Any]:
@@ -32,3 +36,12 @@ def test_coverage_pools_at_least_200_batches_of_every_kind_of_drive() -> None:
     lines = numbers("coverage")["lines"]
     assert {line["kind"] for line in lines} == {*TRIPS, ALL_KINDS}
     assert min(line["n_batches"] for line in lines if line["kind"] == ALL_KINDS) >= 200
+
+
+def test_the_learning_curve_holds_every_size_and_all_27_triples() -> None:
+    found = numbers("learning_curve")
+    assert {2, 3, 4, 6, 10} <= {rung["n_runs"] for rung in found["rungs"]}
+    assert {(rung["estimator"], rung["n_subsets"]) for rung in found["triples"]} == {
+        ("cross_spectrum", 27),
+        ("ratio_index", 27),
+    }
