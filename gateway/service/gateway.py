@@ -10,7 +10,7 @@ from dataclasses import asdict
 import uvicorn
 
 from gateway.bus.decode import Decoder
-from gateway.bus.source import LiveSource
+from gateway.bus.source import LiveSource, OpenReceiver
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.offline.estimates import Setup
@@ -56,8 +56,12 @@ class Gateway:
         load: LoadSettings | None = None,
         on_started: OnStarted = lambda gateway: None,
         known_loads: KnownLoads | None = None,
+        open_receiver: OpenReceiver | None = None,
     ) -> None:
-        """``load`` reads the settings anew for a reload; without it a reload finds them unchanged."""
+        """``load`` reads the settings anew for a reload; without it a reload finds them unchanged.
+
+        ``open_receiver`` stands in for the interface (the soak run).
+        """
         self._settings = settings
         self._on_started = on_started
         token_file = TokenFile(settings.store.directory / "tokens.json")
@@ -82,6 +86,7 @@ class Gateway:
             options=settings.bus.options,
             inbox_frames=settings.bus.inbox_frames,
             silence_s=settings.bus.silence_s,
+            open_receiver=open_receiver,
         )
         flow = setup.flow(settings.batch.for_core(is_live=True))
         self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board)

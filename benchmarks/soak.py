@@ -1,0 +1,171 @@
+"""A simulated week in the real service at high speed: memory, file handles, threads and database stay flat.
+
+`make soak` runs it and prints one line a simulated day; it ends with 1 where something grew. Each day has hours of
+driving and a night of silence; a client asks for the latest estimate all the while. The bus is replaced by a receiver
+that hands out the frames of one simulated drive again and again, stamped later and later; everything behind it is the
+service as it runs in a vehicle.
+"""
+
+import argparse
+import asyncio
+import json
+import shutil
+import sys
+import threading
+import time
+import urllib.request
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import numpy as np
+
+from gateway.bus.frames import empty_frames, take
+from gateway.bus.receiver import Burst
+from gateway.config import load_settings
+from gateway.offline.demo_drive import demo_drive, frames_of
+from gateway.offline.estimates import setup_of
+from gateway.records import Frames
+from gateway.service.gateway import Gateway
+from gateway.units import NS_PER_S
+
+DAY_S: Final = 86_400
+BURST_S: Final = 10.0
+SETTINGS: Final = """\
+signals = "springscale:reference"
+calibration = "vehicle.json"
+[bus]
+interface = "virtual"
+[web]
+port = 0
+[store]
+directory = "state"
+max_size_mb = 4.0
+[log]
+level = "error"
+"""
+# What may grow from the end of the first day to the end of the last: caches fill, then nothing more.
+MEMORY_GROWTH_MB: Final = 15.0
+DATABASE_MB: Final = 4.5  # the limit set above, and a batch of rows
+
+
+class EndlessDrive:
+    """A receiver: the frames of one drive over and over, each day's driving followed by a night of silence."""
+
+    dropped_kernel = 0
+
+    def __init__(self, drive: Frames, hours_a_day: float, n_days: int) -> None:
+        self.days_done = 0
+        self.is_over = False
+        self._drive, self._n_days = drive, n_days
+        self._length_ns = int(drive.t_ns[-1] - drive.t_ns[0]) + 20 * NS_PER_S  # parked a little between drives
+        self._drives_a_day = max(1, round(hours_a_day * 3600 * NS_PER_S / self._length_ns))
+        pieces = (drive.t_ns - drive.t_ns[0]) // int(BURST_S * NS_PER_S)
+        self._edges = [*np.searchsorted(pieces, np.arange(pieces[-1] + 1)), len(drive)]
+        self._bursts = self._all_bursts()
+
+    def receive(self, timeout_s: float) -> Burst:
+        """The next ten seconds of driving; empty bursts once the week is over."""
+        frames = next(self._bursts, None)
+        if frames is None:
+            self.is_over = True
+            time.sleep(timeout_s)
+            return Burst(empty_frames(self._drive.payload.shape[1]))
+        return Burst(frames)
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+    def _all_bursts(self):  # type: ignore[no-untyped-def]  # an endless generator of Frames
+        for day in range(self._n_days):
+            for drive in range(self._drives_a_day):
+                later_ns = day * DAY_S * NS_PER_S + drive * self._length_ns
+                for begin, end in zip(self._edges, self._edges[1:], strict=False):
+                    part = take(self._drive, slice(begin, end))
+                    yield Frames(part.t_ns + later_ns, part.can_id, part.length, part.payload)
+            self.days_done = day + 1
+
+
+def footprint(state: Path) -> dict[str, float]:
+    """What the process holds now."""
+    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
+    return {
+        "memory_mb": round(int(status["VmRSS"].split()[0]) / 1024, 1),
+        "handles": sum(1 for _ in Path("/proc/self/fd").iterdir()),
+        "threads": int(status["Threads"]),
+        "database_mb": round(sum(file.stat().st_size for file in state.glob("springscale.db*")) / 1e6, 2),
+    }
+
+
+def watch(gateway: Gateway, receiver: EndlessDrive, state: Path, days: list[dict[str, float]]) -> None:
+    """Ask for the latest estimate all the time; note the footprint at every day's end."""
+    while not (receiver.is_over and gateway.has_caught_up):
+        urllib.request.urlopen(f"{gateway.url}/api/v1/estimates/latest", timeout=30.0).read()
+        if receiver.days_done > len(days):
+            counts = gateway.status().batches
+            done = {"day": receiver.days_done, "estimates": counts.n_estimates, "rejected": counts.n_rejected}
+            days.append(done | footprint(state))
+            print(json.dumps(days[-1]), flush=True)
+        time.sleep(0.1)
+
+
+def soak(hours_a_day: float, n_days: int) -> list[dict[str, float]]:
+    """The footprint at the end of each day."""
+    drive = frames_of(demo_drive())
+    receiver = EndlessDrive(drive, hours_a_day, n_days)
+    days: list[dict[str, float]] = []
+    with TemporaryDirectory() as folder:
+        config = Path(folder) / "springscale.toml"
+        config.write_text(SETTINGS)
+        shutil.copy(Path(__file__).parents[1] / "gateway/demo/paper_van.json", Path(folder) / "vehicle.json")
+        settings = load_settings(config)
+
+        def on_started(gateway: Gateway) -> None:
+            loop = asyncio.get_running_loop()
+
+            def watch_and_stop() -> None:
+                try:
+                    watch(gateway, receiver, settings.store.directory, days)
+                finally:
+                    loop.call_soon_threadsafe(gateway.request_stop)
+
+            threading.Thread(target=watch_and_stop).start()
+
+        Gateway(settings, setup_of(settings), on_started=on_started, open_receiver=lambda: receiver).run()
+    return days
+
+
+def what_grew(days: list[dict[str, float]]) -> list[str]:
+    """Sentences about everything that is not flat."""
+    first, last = days[0], days[-1]
+    grown = []
+    if last["memory_mb"] - first["memory_mb"] > MEMORY_GROWTH_MB:
+        grown.append(f"memory grew from {first['memory_mb']} to {last['memory_mb']} MB")
+    grown += [f"{what} grew from {first[what]} to {last[what]}" for what in ("threads",) if last[what] > first[what]]
+    if last["handles"] > first["handles"] + 2:  # one connection more or less is open at any moment
+        grown.append(f"file handles grew from {first['handles']} to {last['handles']}")
+    if last["database_mb"] > DATABASE_MB + 4.2:  # and the write-ahead log, which SQLite keeps below that
+        grown.append(f"the database has {last['database_mb']} MB")
+    return grown
+
+
+def main() -> None:
+    """Print the days; exit with 1 where something grew."""
+    arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    arguments.add_argument("--days", type=int, default=7)
+    arguments.add_argument("--hours", type=float, default=8.0, help="of driving a day")
+    arguments.add_argument("--output", type=Path, help="JSON file for the figures")
+    asked = arguments.parse_args()
+    begun_s = time.monotonic()
+    days = soak(asked.hours, asked.days)
+    took_s = time.monotonic() - begun_s
+    if asked.output:
+        asked.output.write_text(json.dumps({"hours_a_day": asked.hours, "days": days}, indent=1) + "\n")
+    print(f"{asked.days} days of {asked.hours:g} h driving in {took_s:.0f} s")
+    grown = what_grew(days)
+    if grown:
+        sys.exit("\n".join(grown))
+
+
+if __name__ == "__main__":
+    main()
