@@ -1,5 +1,6 @@
 """One machine for the whole run: booted once, the package under test installed in it. Files run in their order."""
 
+import fcntl
 import json
 import os
 import time
@@ -100,13 +101,19 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write what was found and how long it took."""
+    """Add what was found to the results; several workers may do so, one after the other."""
     findings = session.config.stash.get(_FINDINGS, {})
-    if findings:
-        BUILD.mkdir(exist_ok=True)
-        earlier = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-        findings = {key: earlier.get(key, {}) | findings.get(key, {}) for key in {*earlier, *findings}}
-        RESULTS.write_text(json.dumps(findings, indent=1) + "\n")
-    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
-    if reporter is not None:
-        reporter.write_line(f"\nthe machine's tests took {time.monotonic() - _BEGUN_S:.0f} s")
+    if not findings:
+        return
+    BUILD.mkdir(exist_ok=True)
+    with RESULTS.open("a+") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        file.seek(0)
+        earlier = json.loads(file.read() or "{}")
+        file.truncate(0)
+        file.write(json.dumps({key: earlier.get(key, {}) | findings.get(key, {}) for key in {*earlier, *findings}}))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """How long it took, for the log of continuous integration."""
+    terminalreporter.write_line(f"the machine's tests took {time.monotonic() - _BEGUN_S:.0f} s")

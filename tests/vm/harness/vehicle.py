@@ -177,13 +177,14 @@ class Vehicle:
 
     def listen(self) -> None:
         """Begin to record vcan0 with candump, without a trace of what was there before."""
+        self.stop_listening()
         self.run(f"rm -f {HEARD}; systemd-run --quiet --collect --unit witness sh -c 'exec candump -L any > {HEARD}'")
         self.wait_for(lambda: self.machine.succeeds(f"test -e {HEARD}"))
         self.run("sleep 0.5")
 
     def stop_listening(self) -> None:
         """End the recording in HEARD."""
-        self.run("systemctl stop witness")
+        self.run("systemctl stop witness 2>/dev/null || true")
 
     def stop_playing(self) -> None:
         """End what :meth:`play` began, if it is not over."""
