@@ -3,7 +3,7 @@
     write_calibration_report(DIR, campaign, outcome)      springscale calibrate ... --report DIR
     write_evaluation_report(DIR, evidence)                springscale evaluate ... --report DIR
 
-The directory is whole: the page fetches nothing from elsewhere, and reads without scripts.
+Where the directory cannot be made they raise ConfigurationError. It is whole: the page fetches nothing from elsewhere, and reads without scripts.
 """
 
 import json
@@ -13,6 +13,7 @@ from typing import Any
 
 from gateway.calibration.campaign import Campaign
 from gateway.calibration.learning_curve import LearningCurve
+from gateway.errors import ConfigurationError
 from gateway.offline.calibrate import Outcome
 from gateway.offline.plan import Plan, plan_next
 from gateway.reports.calibration_accuracy import accuracy_section
@@ -80,7 +81,7 @@ def _write(
     on_chart: OnChart,
     curve: LearningCurve | None = None,
 ) -> Path:
-    directory.mkdir(parents=True, exist_ok=True)
+    _make(directory)
     charts = list(_charts(sections))
     for done, chart in enumerate(charts, 1):
         save_still(chart, directory / "figures")
@@ -102,6 +103,14 @@ def _write(
     report = directory / "report.html"
     report.write_text(page_html(page), encoding="utf-8")
     return report
+
+
+def _make(directory: Path) -> None:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        why = f"no report can be written there ({fault.strerror}): name a directory"
+        raise ConfigurationError(f"{directory}: {why}") from None
 
 
 def _charts(sections: list[Section]) -> Iterator[Chart]:

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from support.known_load_logs import write_known_loads
 
 from gateway.calibration.file import load_calibration
-from gateway.cli import springscale
+from gateway.cli import main, springscale
 from gateway.reports.calibration_text import percent, shown
 
 WINDOW = ("--window-s", "100")
@@ -180,6 +180,14 @@ def test_an_evaluation_has_a_report_of_its_own(made: Path) -> None:
     page = Page((made / "evaluated" / "report.html").read_text(encoding="utf-8"))
     assert {"verdict", "accuracy-ratio-index", "provenance"} <= set(page.ids)
     assert not {"half-car", "spectra", "runs"} & set(page.ids)
+
+
+def test_a_report_is_not_written_over_a_file(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["evaluate", str(made / "campaign.toml"), "--calibration", str(made / "vehicle.json")]
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments, "--report", str(made / "vehicle.json"), *WINDOW])
+    assert ended.value.code == 2
+    assert "no report can be written there" in capsys.readouterr().err
 
 
 def test_one_load_without_validation_reports_what_there_is(tmp_path: Path) -> None:
