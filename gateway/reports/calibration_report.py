@@ -3,7 +3,8 @@
     write_calibration_report(DIR, campaign, outcome)      springscale calibrate ... --report DIR
     write_evaluation_report(DIR, evidence)                springscale evaluate ... --report DIR
 
-Where the directory cannot be made they raise ConfigurationError. It is whole: the page fetches nothing from elsewhere, and reads without scripts.
+Where the directory cannot be made they raise ConfigurationError. It is whole: the page fetches nothing
+from elsewhere, and reads without scripts.
 """
 
 import json
