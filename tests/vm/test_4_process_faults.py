@@ -45,7 +45,7 @@ def test_killed_again_and_again_it_loses_and_doubles_nothing(many_records: Vehic
     for _ in range(N_KILLS):
         committed = ids(vehicle.stored())
         vehicle.run("systemctl kill --signal KILL springscale")
-        time.sleep(moments.uniform(2.0, 12.0))
+        time.sleep(moments.uniform(1.0, 8.0))
         assert ids(vehicle.stored())[: len(committed)] == committed
     vehicle.run("systemctl kill --signal KILL springscale || true")
     recovered(vehicle.wait_until(lambda status: status["bus"]["state"] == "receiving"))
@@ -110,21 +110,11 @@ def unknown_key(vehicle: Vehicle) -> str:
     return f"{CONFIG}: web.colour: unknown key"
 
 
-def missing_calibration(vehicle: Vehicle) -> str:
-    vehicle.configure(SETTINGS.replace("vehicle.json", "gone.json"))
-    return "/etc/springscale/gone.json"
-
-
 def tampered_calibration(vehicle: Vehicle) -> str:
     vehicle.run("sed 's/1240/1340/g' /etc/springscale/vehicle.json > /etc/springscale/tampered.json")
     vehicle.run("! cmp -s /etc/springscale/vehicle.json /etc/springscale/tampered.json")
     vehicle.configure(SETTINGS.replace("vehicle.json", "tampered.json"))
     return "does not match its id"
-
-
-def another_vehicles_calibration(vehicle: Vehicle) -> str:
-    vehicle.configure(SETTINGS.replace('id = "van-17"', 'id = "van-17"\ncalibrated_as = "lorry-3"'))
-    return "calibrated_as says 'lorry-3'"
 
 
 def newer_database(vehicle: Vehicle) -> str:
@@ -141,9 +131,7 @@ def set_schema(vehicle: Vehicle, version: int) -> int:
     return int(vehicle.run(f'python3 -c "{script}"'))
 
 
-@pytest.mark.parametrize(
-    "fault", [unknown_key, missing_calibration, tampered_calibration, another_vehicles_calibration, newer_database]
-)
+@pytest.mark.parametrize("fault", [unknown_key, tampered_calibration, newer_database])
 def test_a_fault_for_a_person_ends_the_start_once_and_says_which(
     fault: Callable[[Vehicle], str], vehicle: Vehicle
 ) -> None:

@@ -1,5 +1,6 @@
 """The test machine's disk: Debian with systemd, can-utils and Python, built once from Debian packages and kept."""
 
+import fcntl
 import hashlib
 import os
 import shutil
@@ -34,11 +35,14 @@ def kept_image(backend: str) -> Path:
     """Folder with root.img (and vmlinuz, initrd.img for qemu), built now unless it is there already. Wants root."""
     cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "springscale"
     folder = cache / f"vm-{backend}-{_recipe(backend)}"
-    if not (folder / "root.img").exists():
-        for older in cache.glob(f"vm-{backend}-*"):
-            shutil.rmtree(older)
-        folder.mkdir(parents=True)
-        _build(folder, backend)
+    cache.mkdir(parents=True, exist_ok=True)
+    with (cache / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # of several workers one builds, the others wait
+        if not (folder / "root.img").exists():
+            for older in cache.glob(f"vm-{backend}-*"):
+                shutil.rmtree(older)
+            folder.mkdir()
+            _build(folder, backend)
     return folder
 
 
