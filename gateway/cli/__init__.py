@@ -12,6 +12,7 @@ import click
 from gateway.errors import SpringscaleError
 
 _COMMANDS = {
+    "bounds": ("gateway.cli.bounds", "bounds", "How well anyone could weigh, by what is seen and known."),
     "calibrate": ("gateway.cli.calibrate", "calibrate", "Known-load drives to a calibration file."),
     "calibration": (
         "gateway.cli.calibration",
