@@ -33,6 +33,7 @@ LEAST_COHERENCE: Final = 0.2
 LEAST_POWER_SHARE: Final = 0.05  # of the calibrated amplitude
 MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
+UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
 Z95: Final = 1.959964
 
@@ -195,7 +196,7 @@ def _judged(
     blank: Estimate, spectra: CrossSpectra, located: Located, calibration: CrossSpectrumCalibration
 ) -> Estimate:
     payload_var, share_var = np.diag(located.load_covariance)
-    unseen = _unseen_speed_inflation(blank.mean_speed_mps, calibration.speed_seen_mps)
+    unseen = _unseen_inflation(blank.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
     payload_std_kg = unseen * calibration.payload_inflation * math.sqrt(payload_var)
     share_std_pct = unseen * calibration.front_share_inflation * 100.0 * math.sqrt(share_var)
     diagnostics = {
@@ -233,10 +234,15 @@ def _disbelieved(located: Located, payload_std_kg: float, calibration: CrossSpec
     return None
 
 
-def _unseen_speed_inflation(speed_mps: float, seen_mps: tuple[float, float]) -> float:
-    """How much wider an interval gets at a mean speed outside those of calibration; 1 inside."""
-    beyond = max(0.0, math.log(seen_mps[0] / speed_mps), math.log(speed_mps / seen_mps[1]))
-    return math.hypot(1.0, beyond / UNSEEN_SPEED_SCALE)
+def _unseen_inflation(speed_mps: float, shaken_mps2: float, calibration: CrossSpectrumCalibration) -> float:
+    """How much wider an interval gets away from what calibration saw; 1 within its speeds on roads as rough.
+
+    ``shaken_mps2`` is the batch's vertical acceleration (root mean square within the band).
+    """
+    slowest, fastest = calibration.speed_seen_mps
+    faster = max(0.0, math.log(slowest / speed_mps), math.log(speed_mps / fastest))
+    rougher = math.log(shaken_mps2 / calibration.acceleration_rms_mps2)
+    return math.hypot(1.0, faster / UNSEEN_SPEED_SCALE, rougher / UNSEEN_ROUGHNESS_SCALE)
 
 
 def _ratio(located: Located, calibration: CrossSpectrumCalibration, name: str) -> float:

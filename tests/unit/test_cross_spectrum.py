@@ -82,6 +82,17 @@ def test_an_unseen_speed_widens_the_interval(calibration: CrossSpectrumCalibrati
     assert unseen.payload_std_kg > 1.5 * seen.payload_std_kg
 
 
+@pytest.mark.parametrize("rougher", [0.5, 2.0])
+def test_another_roughness_widens_the_interval(calibration: CrossSpectrumCalibration, rougher: float) -> None:
+    """Friction makes dampers depend on how much they move; the half-car has none."""
+    seen = weigh(batch_over_road(200.0, 50.0, seed=3), calibration)
+    on_other_roads = replace(calibration, acceleration_rms_mps2=calibration.acceleration_rms_mps2 / rougher)
+    unseen = weigh(batch_over_road(200.0, 50.0, seed=3), on_other_roads)
+    assert unseen.payload_kg == seen.payload_kg
+    assert unseen.payload_std_kg > 1.5 * seen.payload_std_kg
+    assert unseen.front_share_std_pct > 1.5 * seen.front_share_std_pct
+
+
 def test_one_empty_run_is_enough_and_says_so() -> None:
     calibration = calibrate_cross_spectrum([known_run(1, 0.0, 52.0)], VAN)
     assert calibration.warnings == (SPRINGS_FROM_PRIORS, UNTESTED)
