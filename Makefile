@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check bench deb lock docs screenshots clean
+.PHONY: demo test check bench deb soak test-vm vcan lock docs screenshots clean
 .DEFAULT_GOAL := demo
 
 .venv/bin/python:
@@ -32,12 +32,27 @@ check: .venv/.development
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python docs/make_settings.py --check
+	$(BIN)/python docs/make_faults.py --check
 	$(BIN)/python docs/make_reasons.py --check
 	$(BIN)/python docs/make_findings.py --check
 	$(BIN)/python docs/make_calibration_schema.py --check
 
 bench: .venv/.development
 	for bench in benchmarks/bench_*.py; do echo "== $$bench"; $(BIN)/python $$bench || exit 1; done
+
+# The installed package on a real vcan0 under real systemd, in a small virtual machine: wants root, /dev/net/tun and the
+# Debian packages that .ci/run names; skips with a reason without them. One machine on each of two processors.
+test-vm: .venv/.development deb
+	rm -f build/vm-results.json
+	$(BIN)/python -m pytest -n 2 --dist loadfile tests/vm
+
+# A simulated drive on this machine's own vcan0, into the service: docs/deployment.md.
+vcan: .venv/.package
+	PATH="$(CURDIR)/$(BIN):$$PATH" deploy/try-on-vcan.sh
+
+# A simulated week in the service at high speed; about ten minutes of one processor.
+soak: .venv/.development
+	$(BIN)/python benchmarks/soak.py --output build/soak.json
 
 # Debian packages in build/, for this machine's architecture; dpkg-deb must be there, root need not.
 deb: .venv/.package
@@ -49,6 +64,7 @@ screenshots: .venv/.development
 
 docs: .venv/.development
 	$(BIN)/python docs/make_settings.py
+	$(BIN)/python docs/make_faults.py
 	$(BIN)/python docs/make_reasons.py
 	$(BIN)/python docs/make_findings.py
 	$(BIN)/python docs/make_calibration_schema.py

@@ -160,6 +160,7 @@ def main() -> None:
     days = soak(asked.hours, asked.days)
     took_s = time.monotonic() - begun_s
     if asked.output:
+        asked.output.parent.mkdir(exist_ok=True)
         asked.output.write_text(json.dumps({"hours_a_day": asked.hours, "days": days}, indent=1) + "\n")
     print(f"{asked.days} days of {asked.hours:g} h driving in {took_s:.0f} s")
     grown = what_grew(days)

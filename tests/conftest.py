@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-PROMISED = ("chromium", "playwright", "mosquitto", "recorded drives")  # the last lie beside the checkout there
+PROMISED = ("chromium", "playwright", "mosquitto", "a test machine", "recorded drives")  # the last beside the checkout
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -90,6 +90,13 @@ def measured(request: pytest.FixtureRequest) -> Callable[..., None]:
     return note
 
 
+def pytest_runtest_setup() -> None:
+    """SPRINGSCALE_VM_BUDGET_S: no test begins later than this many seconds after the first."""
+    budget_s = float(os.environ.get("SPRINGSCALE_VM_BUDGET_S", "inf"))
+    if time.monotonic() - _BEGUN_S > budget_s:
+        pytest.skip(f"the {budget_s:.0f} s for this run are used up; make test-vm runs all")
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
     """Keep each test's outcome and recovery time."""

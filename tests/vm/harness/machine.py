@@ -47,12 +47,13 @@ class Machine:
         self._last_breath, write_end = os.pipe()
         # Killing the monitor alone would leave the guest's processes behind: they live in a PID namespace that dies
         # with it. The pipe ends when the last of them is gone.
-        self._process = subprocess.Popen(
-            ["setpriv", "--pdeathsig", "KILL", "unshare", "--pid", "--mount", "--mount-proc", "--fork",
-             "--kill-child=KILL", *self.backend.command(self._wiring)],
-            stdin=subprocess.DEVNULL, stdout=self.console.open("ab"), stderr=subprocess.STDOUT, pass_fds=[write_end],
-            env={**os.environ, "TMPDIR": "/dev/shm", "HOME": "/tmp"},
-        )  # fmt: skip
+        with self.console.open("ab") as console:
+            self._process = subprocess.Popen(
+                ["setpriv", "--pdeathsig", "KILL", "unshare", "--pid", "--mount", "--mount-proc", "--fork",
+                 "--kill-child=KILL", *self.backend.command(self._wiring)],
+                stdin=subprocess.DEVNULL, stdout=console, stderr=subprocess.STDOUT, pass_fds=[write_end],
+                env={**os.environ, "TMPDIR": "/dev/shm", "HOME": "/tmp"},
+            )  # fmt: skip
         os.close(write_end)
         while True:
             with contextlib.suppress(OSError):

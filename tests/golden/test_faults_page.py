@@ -1,0 +1,32 @@
+"""docs/faults.md is what its sources make of it, and every row names a test that exists."""
+
+import runpy
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROWS = tomllib.loads((ROOT / "tests" / "faults.toml").read_text())["row"]
+
+
+def test_the_page_is_up_to_date() -> None:
+    made = runpy.run_path(str(ROOT / "docs" / "make_faults.py"))["faults_page"]()
+    assert (ROOT / "docs" / "faults.md").read_text(encoding="utf-8") == made, "make docs"
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row["fault"][:40])
+def test_every_row_names_a_test_that_exists(row: dict[str, str]) -> None:
+    file, _, name = row["test"].partition("::")
+    assert f"\ndef {name}(" in (ROOT / file).read_text(encoding="utf-8")
+
+
+def test_every_fault_test_of_the_machine_has_a_row() -> None:
+    named = {row["test"] for row in ROWS}
+    found = {
+        f"tests/vm/{file.name}::{line.partition('def ')[2].partition('(')[0]}"
+        for file in (ROOT / "tests" / "vm").glob("test_[3-7]_*.py")
+        for line in file.read_text(encoding="utf-8").splitlines()
+        if line.startswith("def test_")
+    }
+    assert found <= named
