@@ -59,7 +59,7 @@ def test_a_hung_pipeline_is_ended_and_begun_anew(vehicle: Vehicle, recovered: Re
     pid, n_restarts = vehicle.pid(), vehicle.n_restarts()
     vehicle.machine.write("/root/freeze_thread.py", (GUEST / "freeze_thread.py").read_bytes())
     vehicle.run(f"systemd-run --quiet --collect --unit freezer python3 /root/freeze_thread.py {pid} pipeline")
-    recovered(vehicle.wait_for(lambda: vehicle.pid() not in (0, pid) and bool(vehicle.status())))
+    recovered(vehicle.wait_for(lambda: vehicle.pid() not in (0, pid) and bool(vehicle.status()), timeout_s=180.0))
     assert vehicle.n_restarts() == n_restarts + 1
     journal = vehicle.journal(300)
     assert "Watchdog timeout" in journal
