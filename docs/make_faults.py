@@ -46,10 +46,10 @@ FIGURES = {
     "security_score": "`systemd-analyze security springscale` (0 is best, 10 worst)",
     "sustained_frames_per_s": "frames/s of a timed canplayer log without one lost, by candump and by the service",
     "boot_after_power_cut_s": "s from power on to a running system after a power cut",
-    "reference_same_stamps_kg": "kg between HTTP and `springscale estimate` on candump's recording, 20 s batches",
-    "reference_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log before canplayer's jitter",
-    "j1939_same_stamps_kg": "the first of these two, for a J1939 log",
-    "j1939_new_stamps_kg": "the second, for a J1939 log",
+    "same_stamps_kg": "kg between HTTP and `springscale estimate` on candump's recording of the replay, 20 s batches",
+    "late_ms": "ms that canplayer's frames were late at most, 99 of 100, in the replay compared below",
+    "reference_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log that canplayer read",
+    "j1939_new_stamps_kg": "the same for a J1939 log",
 }
 
 

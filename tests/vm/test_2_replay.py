@@ -8,13 +8,15 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 from vm.harness.drives import faster, loaded_drive, log_of
 from vm.harness.vehicle import CONFIG, HEARD, SETTINGS, Answer, Vehicle
 
+from gateway.bus.logs import open_whole_log
 from gateway.config import load_settings
 from gateway.offline.estimates import estimates_of_logs, setup_of
-from gateway.records import estimate_to_json
+from gateway.records import I64, estimate_to_json
 
 TRIES = 4
 DRIVE_S = 45.0  # two batches of 20 s and a rest
@@ -22,9 +24,10 @@ GUEST = Path(__file__).parent / "guest"
 
 # candump writes the very stamps that the service got, in whole microseconds.
 SAME_STAMPS_KG, SAME_STAMPS_PP = 0.1, 0.01
-# The log's own stamps are others: canplayer sends a frame up to a millisecond late, and later where the host lets the
-# emulated machine wait. That jitter is noise of the replay, so it is held to the batch's own standard deviation.
-NEW_STAMPS_STDS = 4.0
+# The log's own stamps are others: canplayer sends a frame about a millisecond late, and later where the host lets the
+# emulated machine wait. That jitter is noise of the replay, so its effect is held to the batch's own uncertainty.
+LATE_MS = 3.0
+NEW_STAMPS_STDS = 3.0
 
 
 def of_guests_estimate(vehicle: Vehicle, log: str) -> list[Answer]:
@@ -62,49 +65,68 @@ def length_s(record: Answer) -> float:
     return (end - begin).total_seconds()
 
 
-def play_until_weighed(vehicle: Vehicle, log: str, n_frames: int) -> list[Answer]:
-    """The records of one drive's two whole batches, both weighed; candump's recording of it is in HEARD.
+def stamps_ns(log: Path) -> I64:
+    """Stamps (n,) of a log's frames, in order."""
+    chunks, _ = open_whole_log(log, None)
+    return np.concatenate([chunk.t_ns for chunk in chunks])
 
-    Every drive, weighed or not, is held to what `springscale estimate` makes of candump's recording. A busy host that
-    stops the whole guest for a moment makes a gap, rightly refused: then the drive is driven again.
-    """
-    for _ in range(TRIES):
-        n_before, frames_before = len(vehicle.records()), vehicle.n_frames()
-        vehicle.listen()
-        vehicle.play(log)
-        time.sleep(DRIVE_S)
-        vehicle.wait_for_frames(frames_before + n_frames)
-        vehicle.stop_listening()
-        whole = whole_batches(vehicle.records()[n_before:])
-        expected = whole_batches(of_guests_estimate(vehicle, HEARD))
-        assert len(whole) == 2
-        assert [record["rejected"] for record in whole] == [record["rejected"] for record in expected]
-        if not any(record["rejected"] for record in whole):
-            return whole
-        time.sleep(4.0)  # silence ends the drive
-    pytest.fail(f"in {TRIES} drives none without a gap: {[record['rejected'] for record in whole]}")
+
+def lateness_ms(log: Path, heard: Path) -> float:
+    """How much later than the log says frames were sent: 99 of 100 were less late than this, after the first."""
+    delay_ns = stamps_ns(heard) - stamps_ns(log)
+    return float(np.quantile(delay_ns - delay_ns.min(), 0.99)) / 1e6
 
 
 @pytest.mark.parametrize("signals", ["reference", "j1939"])
 def test_http_tells_what_estimate_tells_of_the_same_frames(
     signals: str, vehicle: Vehicle, tmp_path: Path, measured: Callable[..., None]
 ) -> None:
+    """Every drive is held to what `springscale estimate` makes of candump's recording of it.
+
+    A busy host stops the whole emulated machine for moments: frames are late, or a gap is rightly refused. Then the
+    drive is driven again before it is compared with the log that canplayer read.
+    """
     if signals != "reference":
         vehicle.configure(SETTINGS.replace("springscale:reference", f"springscale:{signals}"))
         vehicle.restart()
     frames = loaded_drive(DRIVE_S, 1, signals)
-    log, dropped_before = log_of(frames, tmp_path / "drive.log"), dropped(vehicle)
-    told = play_until_weighed(vehicle, vehicle.put_log(log), len(frames))
-    assert dropped(vehicle) == dropped_before
-
-    same_kg, same_pp = furthest_apart(told, of_guests_estimate(vehicle, HEARD))
-    new_kg, new_pp = furthest_apart(told, of_own_estimate(log, signals, tmp_path))
-    figures = {"same_stamps_kg": same_kg, "same_stamps_pp": same_pp, "new_stamps_kg": new_kg, "new_stamps_pp": new_pp}
-    measured(**{f"{signals}_{name}": figure for name, figure in figures.items()})
-    assert same_kg < SAME_STAMPS_KG
-    assert same_pp < SAME_STAMPS_PP
+    log, heard = log_of(frames, tmp_path / "drive.log"), tmp_path / "heard.log"
+    in_guest, expected = vehicle.put_log(log), whole_batches(of_own_estimate(log, signals, tmp_path))
+    late_ms = []
+    for _ in range(TRIES):
+        told = drive_once(vehicle, in_guest, len(frames), measured)
+        heard.write_text(vehicle.run(f"cat {HEARD}"))
+        late_ms.append(lateness_ms(log, heard))
+        if late_ms[-1] < LATE_MS and not any(record["rejected"] for record in told):
+            break
+        time.sleep(4.0)  # silence ends the drive
+    else:
+        pytest.skip(f"this host is too busy: at best canplayer was {min(late_ms):.0f} ms late, not {LATE_MS:.0f}")
+    new_kg, new_pp = furthest_apart(told, expected)
+    measured(**{f"{signals}_new_stamps_kg": new_kg, f"{signals}_new_stamps_pp": new_pp, "late_ms": late_ms[-1]})
     assert new_kg < NEW_STAMPS_STDS * told[0]["payload_std_kg"]
     assert new_pp < NEW_STAMPS_STDS * told[0]["front_share_std_pct"]
+
+
+def drive_once(vehicle: Vehicle, log: str, n_frames: int, measured: Callable[..., None]) -> list[Answer]:
+    """The records of a drive's two whole batches, after comparing them with `estimate` on candump's recording."""
+    n_before, frames_before, dropped_before = len(vehicle.records()), vehicle.n_frames(), dropped(vehicle)
+    vehicle.listen()
+    vehicle.play(log)
+    time.sleep(DRIVE_S)
+    vehicle.wait_for_frames(frames_before + n_frames)
+    vehicle.stop_listening()
+    assert dropped(vehicle) == dropped_before
+    told = whole_batches(vehicle.records()[n_before:])
+    expected = whole_batches(of_guests_estimate(vehicle, HEARD))
+    assert len(told) == 2
+    assert [record["rejected"] for record in told] == [record["rejected"] for record in expected]
+    if not all(record["rejected"] for record in told):
+        same_kg, same_pp = furthest_apart(told, expected)
+        measured(same_stamps_kg=same_kg, same_stamps_pp=same_pp)
+        assert same_kg < SAME_STAMPS_KG
+        assert same_pp < SAME_STAMPS_PP
+    return told
 
 
 def dropped(vehicle: Vehicle) -> int:

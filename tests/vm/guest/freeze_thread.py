@@ -3,10 +3,10 @@
 import ctypes
 import os
 import sys
-import time
 from pathlib import Path
 
 PTRACE_ATTACH = 16
+WALL = 0x4000_0000  # threads too
 
 process, name = sys.argv[1:3]
 threads = Path("/proc", process, "task").iterdir()
@@ -14,5 +14,5 @@ chosen = next(int(thread.name) for thread in threads if (thread / "comm").read_t
 libc = ctypes.CDLL(None, use_errno=True)
 if libc.ptrace(PTRACE_ATTACH, chosen, 0, 0) != 0:
     sys.exit(os.strerror(ctypes.get_errno()))
-while Path("/proc", process).exists():  # a tracer that ends would let it go
-    time.sleep(0.1)
+os.waitpid(chosen, WALL)  # it has stopped
+os.waitpid(chosen, WALL)  # until it is killed: a tracer that ended would let it go, one that did not wait keep it
