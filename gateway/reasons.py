@@ -139,6 +139,12 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "the 95 % interval lies wholly outside the loads or shares of the calibration plus a margin",
             "calibrate with such loads, or suspect vehicle and sensor",
         ),
+        Why.TOO_UNCERTAIN: Explanation(
+            Cause.ANSWER,
+            "the interval would be too wide to be of use (a standard deviation of more than 15 % of the empty sprung "
+            "mass)",
+            "calibrate with loads nearer to this one; drive on a rougher road or for longer",
+        ),
         Why.MODEL_MISFIT: Explanation(
             Cause.ANSWER,
             "no payload and share explain these spectra as well as calibration leads to expect",

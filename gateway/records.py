@@ -65,6 +65,7 @@ class Why(StrEnum):
     SENSOR_RATE_LOW = "sensor_rate_low"
     OUT_OF_RANGE = "out_of_range"
     NOT_ENOUGH_EXCITATION = "not_enough_excitation"
+    TOO_UNCERTAIN = "too_uncertain"
     MODEL_MISFIT = "model_misfit"
     SENSOR_DISAGREEMENT = "sensor_disagreement"
     WRONG_SIGN = "wrong_sign"

@@ -135,6 +135,9 @@ class CrossSpectrumPart(Part):
     speed_seen_mps: tuple[float, float]
     warnings: tuple[str, ...] = ()
     version: int = 1
+    known_loads: tuple[tuple[float, float], ...] = ()
+    payload_inflation_per_reach: float = Field(0.0, ge=0.0)
+    front_share_inflation_per_reach: float = Field(0.0, ge=0.0)
 
     @classmethod
     def of(cls, calibration: CrossSpectrumCalibration) -> "CrossSpectrumPart":

@@ -9,18 +9,21 @@ true of loads that calibration has not seen.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from gateway.calibration.grey_box_prior import Prior, prior_of
+from gateway.calibration.inflation import UNTESTED as UNTESTED_INFLATION
+from gateway.calibration.inflation import inflation_of
 from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
 from gateway.core.cross_spectrum import CrossSpectrumCalibration, locate
 from gateway.core.grey_model import PARAMETERS, Ground
 from gateway.core.known_run import KnownRun
 from gateway.core.likelihood import Curvature, Point, Whittle
 from gateway.core.map_fit import Found, most_probable
+from gateway.core.reach import beyond
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
@@ -29,9 +32,6 @@ BAND_HZ: Final = (1.1, 14.0)
 N_SEGMENT: Final = 256
 EVIDENCE_WEIGHT: Final = 0.2  # minutes of driving repeat the same model error: less than they seem to say
 LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
-UNTESTED_INFLATION: Final = 1.5  # where no run can be left out
-LEAST_INFLATION: Final = 1.25  # roads and kinds of driving that no run holds cannot be left out
-GAUSS_90: Final = 1.645
 MISFIT_MARGIN: Final = 3.0
 SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
 UNTESTED: Final = "intervals_untested"
@@ -90,7 +90,7 @@ def fit_cross_spectrum(
     calibration = half_car_calibration(known, vehicle, found)
     if not can_leave_out:
         return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
-    errors: list[tuple[float, float, float, float, float]] = []
+    errors: list[_LeftOut] = []
     without: dict[int, CrossSpectrumCalibration] = {}
     for left_out, one in enumerate(known):
         others = [k for k in known if k is not one]
@@ -98,13 +98,16 @@ def fit_cross_spectrum(
         without[one.run.number] = half_car_calibration(others, vehicle, refound)
         errors.extend(_left_out_errors(one, without[one.run.number]))
         _tell(progress, 2 + left_out, n_steps)
-    payload_z, share_z, misfits, payload_kg, share_pct = (np.array(column) for column in zip(*errors, strict=True))
+    payload_z, share_z, misfits, payload_kg, share_pct, reach = np.array([astuple(one) for one in errors]).T
+    of_payload, of_share = inflation_of(payload_z, reach), inflation_of(share_z, reach)
 
     def tested(untested: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
         return replace(
             untested,
-            payload_inflation=_inflation(payload_z),
-            front_share_inflation=_inflation(share_z),
+            payload_inflation=of_payload.within,
+            payload_inflation_per_reach=of_payload.per_reach,
+            front_share_inflation=of_share.within,
+            front_share_inflation_per_reach=of_share.per_reach,
             misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.max(misfits))),
         )
 
@@ -184,32 +187,38 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         front_share_seen_pct=(min(shares), max(shares)),
         speed_seen_mps=(min(speeds), max(speeds)),
         warnings=(SPRINGS_FROM_PRIORS,) if len({*payloads}) == 1 else (),
+        known_loads=tuple(zip(payloads, shares, strict=True)),
     )
 
 
-def _left_out_errors(
-    one: KnownSpectra, calibration: CrossSpectrumCalibration
-) -> list[tuple[float, float, float, float, float]]:
-    """For each batch of an unseen run: (payload, share) errors in their own standard deviations, the misfit,
-    and the errors in kg and percentage points.
+@dataclass(frozen=True, slots=True)
+class _LeftOut:
+    """A batch of a run that the others weighed: errors in their own standard deviations, the misfit, errors in
+    kg and percentage points, and how far the load lies beyond the others'.
     """
+
+    payload_z: float
+    front_share_z: float
+    misfit: float
+    payload_kg: float
+    front_share_pct: float
+    reach: float
+
+
+def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -> list[_LeftOut]:
+    """Every batch of a run that ``calibration`` has not seen."""
     errors = []
+    truth = (one.run.payload_kg, one.run.front_share_pct)
+    reach = beyond(truth, calibration.known_loads, calibration.empty_mass_kg)
     for batch in one.run.batches:
         spectra = cross_spectra_of([batch], calibration.reading)
         if spectra is None or batch.rejected:
             continue
         located = locate(spectra, calibration)
-        std = np.sqrt(np.diag(located.load_covariance))
+        payload_std_kg, share_std = np.sqrt(np.diag(located.load_covariance))
         payload_kg = located.point.payload_kg - one.run.payload_kg
         share = located.point.front_share - one.run.front_share_pct / 100.0
-        errors.append((payload_kg / std[0], share / std[1], located.misfit, payload_kg, 100.0 * share))
+        errors.append(
+            _LeftOut(payload_kg / payload_std_kg, share / share_std, located.misfit, payload_kg, 100.0 * share, reach)
+        )
     return errors
-
-
-def _inflation(z: F64) -> float:
-    """By how much errors, in their own standard deviations, exceed a Gaussian's at its 90 % point, with a floor.
-
-    Not their root mean square: a left-out run may be the only one with its axle loads, and an error of
-    extrapolation says nothing of the intervals within what was calibrated.
-    """
-    return max(LEAST_INFLATION, float(np.quantile(np.abs(z), 0.9)) / GAUSS_90)

@@ -19,6 +19,7 @@ from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
 from gateway.core.grey_model import INDEX, PARAMETERS, Ground
 from gateway.core.likelihood import Curvature, Point, Whittle
 from gateway.core.map_fit import Found, most_probable
+from gateway.core.reach import beyond
 from gateway.records import F64, Batch, Estimate, Why
 
 DRIFT_STD: Final = {"damper_front_nspm": 0.02, "damper_rear_nspm": 0.02, "delay_scale": 0.003}
@@ -43,7 +44,8 @@ class CrossSpectrumCalibration:
     """What known-load drives taught, as plain numbers and arrays.
 
     parameters (p,) and covariance (p, p) follow ``names`` (grey_model.PARAMETERS; logarithms where
-    these are positive quantities). The inflations widen standard deviations; misfit_limit is the
+    these are positive quantities). The inflations widen standard deviations, by so much more per_reach
+    as a load lies beyond ``known_loads`` (payload kg, front share %; core.reach); misfit_limit is the
     largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
     root mean squares within the band.
     """
@@ -66,6 +68,9 @@ class CrossSpectrumCalibration:
     speed_seen_mps: tuple[float, float]
     warnings: tuple[str, ...] = ()
     version: int = 1
+    known_loads: tuple[tuple[float, float], ...] = ()
+    payload_inflation_per_reach: float = 0.0
+    front_share_inflation_per_reach: float = 0.0
 
     @property
     def ground(self) -> Ground:
@@ -195,11 +200,16 @@ def _off_its_speeds(batch: Batch, calibration: CrossSpectrumCalibration) -> Why 
 def _judged(
     blank: Estimate, spectra: CrossSpectra, located: Located, calibration: CrossSpectrumCalibration
 ) -> Estimate:
+    payload_kg, share_pct = located.point.payload_kg, 100.0 * located.point.front_share
     payload_var, share_var = np.diag(located.load_covariance)
     unseen = _unseen_inflation(blank.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
-    payload_std_kg = unseen * calibration.payload_inflation * math.sqrt(payload_var)
-    share_std_pct = unseen * calibration.front_share_inflation * 100.0 * math.sqrt(share_var)
+    reach = beyond((payload_kg, share_pct), calibration.known_loads, calibration.empty_mass_kg)
+    of_payload = calibration.payload_inflation * (1.0 + calibration.payload_inflation_per_reach * reach)
+    of_share = calibration.front_share_inflation * (1.0 + calibration.front_share_inflation_per_reach * reach)
+    payload_std_kg = unseen * of_payload * math.sqrt(payload_var)
+    share_std_pct = unseen * of_share * 100.0 * math.sqrt(share_var)
     diagnostics = {
+        "reach": reach,
         "misfit": located.misfit,
         "n_segments": float(spectra.n_total),
         "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
@@ -211,7 +221,6 @@ def _judged(
     why = _disbelieved(located, payload_std_kg, calibration)
     if why is not None:
         return replace(blank, rejected=(why,), diagnostics=diagnostics)
-    payload_kg, share_pct = located.point.payload_kg, 100.0 * located.point.front_share
     return replace(
         blank,
         payload_kg=payload_kg,
@@ -230,7 +239,7 @@ def _disbelieved(located: Located, payload_std_kg: float, calibration: CrossSpec
     if not located.misfit <= calibration.misfit_limit:
         return Why.MODEL_MISFIT
     if not payload_std_kg <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:
-        return Why.NOT_ENOUGH_EXCITATION
+        return Why.TOO_UNCERTAIN
     return None
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from gateway.calibration.design import Design
 from gateway.calibration.design_loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
 from gateway.calibration.design_ratio_index import IndexDesign, IndexSpread
-from gateway.calibration.grey_box import UNTESTED_INFLATION
 from gateway.calibration.grey_box_prior import prior_of
+from gateway.calibration.inflation import UNTESTED as UNTESTED_INFLATION
 from gateway.core.bounds import Drive
 from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import Vehicle
