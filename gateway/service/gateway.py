@@ -12,7 +12,7 @@ import uvicorn
 from gateway.bus.decode import Decoder
 from gateway.bus.source import LiveSource, OpenReceiver
 from gateway.config import Settings
-from gateway.errors import SpringscaleError
+from gateway.errors import SpringscaleError, StoreError
 from gateway.offline.estimates import Setup
 from gateway.service.forwarding import uplink_of
 from gateway.service.log import log_event
@@ -78,7 +78,7 @@ class Gateway:
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
         self.board = Board(stale_after_s=settings.web.stale_after_s)
-        self.board.restore(**asdict(self.store.reader().latest()))
+        self._restore_board()
         self.source = LiveSource(
             settings.bus.interface,
             settings.bus.channel,
@@ -115,6 +115,13 @@ class Gateway:
         self._notifier = Notifier()
         self._stopping = asyncio.Event()
         self._failure: str | None = None
+
+    def _restore_board(self) -> None:
+        """Show what was known before; a disk that refuses even to be read is no reason not to start."""
+        try:
+            self.board.restore(**asdict(self.store.reader().latest()))
+        except StoreError as fault:
+            log_event("what was stored cannot be shown yet", level=logging.WARNING, fault=str(fault))
 
     @property
     def url(self) -> str:

@@ -18,10 +18,11 @@ from support.bus_drive import bus_drive
 from gateway.bus.candump_write import write_candump
 from gateway.bus.sink import replay
 from gateway.config import load_settings
+from gateway.errors import StoreError
 from gateway.offline.estimates import estimates_of_logs, setup_of
 from gateway.records import Motion, estimate_to_json, json_line
 from gateway.service.gateway import Gateway, GatewayFailedError
-from gateway.store import Store
+from gateway.store import Latest, Store
 
 WINDOW_S = 20.0
 
@@ -206,3 +207,23 @@ def test_a_dead_pipeline_ends_the_service_with_its_reason(config: Path, monkeypa
 
     with pytest.raises(GatewayFailedError, match="the flow broke"):
         Gateway(settings, setup_of(settings), on_started=on_started).run()
+
+
+def test_a_database_that_cannot_even_be_read_at_the_start_does_not_keep_the_service_from_running(
+    config: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As SQLite refuses to open a write-ahead database on a disk that is read-only."""
+
+    def refuse(_self: object) -> Latest:
+        raise StoreError("springscale.db cannot be read: unable to open database file")
+
+    monkeypatch.setattr("gateway.store.reader.StoreReader.latest", refuse)
+    settings = load_settings(config)
+    started = []
+
+    def on_started(gateway: Gateway) -> None:
+        started.append(gateway.status().state)
+        gateway.request_stop()
+
+    Gateway(settings, setup_of(settings), on_started=on_started).run()
+    assert started
