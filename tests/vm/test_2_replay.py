@@ -27,7 +27,7 @@ SAME_STAMPS_KG, SAME_STAMPS_PP = 0.1, 0.01
 # The log's own stamps are others: canplayer sends a frame about a millisecond late, and later where the host lets the
 # emulated machine wait. That jitter is noise of the replay, so its effect is held to the batch's own uncertainty.
 LATE_MS = 3.0
-NEW_STAMPS_STDS = 3.0
+NEW_STAMPS_STDS = 0.5
 
 
 def of_guests_estimate(vehicle: Vehicle, log: str) -> list[Answer]:
