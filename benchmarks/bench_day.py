@@ -23,7 +23,7 @@ import numpy as np
 from gateway.bus.candump_write import append_candump
 from gateway.bus.frames import merge_frames
 from gateway.config import ESTIMATOR_NAMES
-from gateway.offline.demo_drive import demo_frames
+from gateway.offline.demo_drive import demo_drive, frames_of
 from gateway.offline.wiring import unrelated_traffic
 from gateway.records import Frames
 from gateway.units import NS_PER_S
@@ -34,7 +34,7 @@ CALIBRATION = Path(__file__).parents[1] / "gateway" / "demo" / "paper_van.json"
 
 def busy_drive() -> Frames:
     """One drive of the demo among other traffic."""
-    drive = next(iter(demo_frames()))
+    drive = frames_of(demo_drive())
     duration_s = (int(drive.t_ns[-1]) - int(drive.t_ns[0])) / NS_PER_S
     rng = np.random.default_rng(7)
     n_ids = 57

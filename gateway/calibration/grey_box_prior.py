@@ -24,6 +24,9 @@ GYRATION_PER_WHEELBASE: Final = 0.46
 SLACK: Final = 0.03
 SLOPE_STD_PER_KN: Final = 0.05
 BEND_STD_PER_KN: Final = 0.1
+TRACK_OFFSET_M: Final = 0.03
+NOISE_ACCELERATION_M2PS3: Final = 1e-5  # 300 ug per root hertz
+NOISE_PITCH_RATE_RAD2PS: Final = 1e-8  # 0.006 deg/s per root hertz; steps of 0.25 deg/s at 100 Hz make 3e-8
 
 _LOG_STD: Final = {
     "spring": 0.35,
@@ -36,6 +39,8 @@ _LOG_STD: Final = {
     "payload_mode": 0.6,
     "payload_damping": 0.5,
     "slack": 1.0,
+    "noise": 2.0,
+    "track_offset": 1.0,
 }
 WEIGHED_STD: Final = 0.1  # of an unsprung mass that the campaign gives
 
@@ -72,6 +77,9 @@ def _body(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
         "payload_gyration_m2": (log(0.1), _LOG_STD["payload_gyration"]),
         "payload_mode_hz": (log(25.0), _LOG_STD["payload_mode"]),
         "payload_damping_ratio": (log(0.15), _LOG_STD["payload_damping"]),
+        "noise_acceleration_m2ps3": (log(NOISE_ACCELERATION_M2PS3), _LOG_STD["noise"]),
+        "noise_pitch_rate_rad2ps": (log(NOISE_PITCH_RATE_RAD2PS), _LOG_STD["noise"]),
+        "track_offset_m": (log(TRACK_OFFSET_M), _LOG_STD["track_offset"]),
         "gyro_lag_s": (0.0, 0.01),
         "delay_scale": (0.0, 0.003),
         "rear_lag_s": (0.0, 0.005),

@@ -23,8 +23,9 @@ from gateway.calibration.inspection import Finding, Severity
 from gateway.calibration.inspection_kinds import Kind, found
 from gateway.core.cross_spectra import CrossSpectra, Reading
 from gateway.core.cross_spectrum import COHERENCE_BAND_HZ
-from gateway.core.grey_model import INDEX, Ground, expected_spectra, spectral_model
+from gateway.core.grey_model import INDEX, Ground
 from gateway.core.known_run import KnownRun
+from gateway.core.model_spectra import expected_spectra, spectral_model
 from gateway.core.vehicle import Vehicle
 from gateway.records import C128, F64
 

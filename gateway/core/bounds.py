@@ -14,8 +14,9 @@ import numpy as np
 
 from gateway.core.cross_spectra import CrossSpectra, Reading
 from gateway.core.cross_spectrum import CrossSpectrumCalibration
-from gateway.core.grey_model import INDEX, Ground, expected_spectra, spectral_model
+from gateway.core.grey_model import INDEX, Ground
 from gateway.core.likelihood import Point, Whittle
+from gateway.core.model_spectra import expected_spectra, spectral_model
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import F64
 
@@ -88,6 +89,7 @@ def steady_spectra(reading: Reading, drive: Drive) -> CrossSpectra:
         delay_phase=np.exp(-2j * np.pi * freq_hz * delay_s)[None],
         delay_s=np.array([[delay_s]]),
         n_segments=np.array([[n]]),
+        inverse_power=np.zeros((1, 1)),
         acceleration_rms_mps2=1.0,
         pitch_rate_rms_radps=1.0,
     )

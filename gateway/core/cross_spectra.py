@@ -1,4 +1,4 @@
-"""What the likelihood needs of a drive: cross-spectra of the two sensors, grouped by speed.
+"""What the likelihood needs of a drive: cross-spectra of the two sensors, grouped by speed and roughness.
 
 Segments are short, tapered, detrended, and never cross a masked sample. Each is divided by its own
 power, so that a rough stretch does not drown the others. The road reaches the rear axle later than
@@ -14,7 +14,8 @@ import numpy as np
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import C128, F64, I64, Batch
 
-SPEED_BIN = 0.03  # relative width of a group of segments
+SPEED_BIN = 0.03  # width of a group of segments in the logarithm of speed
+AMPLITUDE_BIN = 0.5  # and in the logarithm of how hard the road shakes: noise counts for more where it is smooth
 SPEED_CHANGE_MAX_MPS2 = 0.3  # braking and pulling away pitch the body without any road
 SPEED_SAMPLE_STEP = 8
 LEAST_SEGMENTS = 6
@@ -36,8 +37,8 @@ class CrossSpectra:
     freq_hz (m + 2,) has one guard frequency at either end; acceleration, pitch_rate (b, m) are
     auto-spectra, cross (b, m) is pitch rate times the conjugate of acceleration; delay_phase
     (b, m + 2) is the mean of exp(-j 2 pi f l / v), delay_s (b, 1) the mean of l / v and n_segments
-    (b, 1) the number of segments in each group. The two root mean squares are of the segments
-    before division, in m/s2 and rad/s within the band.
+    (b, 1) the number of segments in each group. inverse_power (b, 1) is the mean of what segments were
+    multiplied by. The two root mean squares are of the segments before division, in m/s2 and rad/s within the band.
     """
 
     freq_hz: F64
@@ -47,6 +48,7 @@ class CrossSpectra:
     delay_phase: C128
     delay_s: F64
     n_segments: F64
+    inverse_power: F64
     acceleration_rms_mps2: float
     pitch_rate_rms_radps: float
 
@@ -129,31 +131,32 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
     weight = np.hanning(reading.n_segment + 1)[:-1:SPEED_SAMPLE_STEP] ** 2
     weight = weight / weight.sum()
     mean_delay_s = segments.delays_s @ weight
-    phase = np.exp(-2j * np.pi * segments.delays_s[:, :, None] * freq_hz)
-    phase_k = np.einsum("t,ktf->kf", weight, phase)
-    group = np.round(np.log(mean_delay_s) / SPEED_BIN).astype(np.int64)
-    labels, member = np.unique(group, return_inverse=True)
+    a, g = segments.acceleration[:, 1:-1], segments.pitch_rate[:, 1:-1]
+    power_a, power_g = np.mean(np.abs(a) ** 2, axis=1), np.mean(np.abs(g) ** 2, axis=1)
+    divisor = np.maximum(np.sqrt(power_a * power_g), np.finfo(float).tiny)[:, None]
+    width_hz = float(freq_hz[-2] - freq_hz[1])
+    rms_a, rms_g = float(np.sqrt(power_a.mean() * width_hz)), float(np.sqrt(power_g.mean() * width_hz))
+    log_amplitude = 0.5 * np.log(divisor[:, 0] / np.median(divisor))
+    alike = np.round(np.stack([np.log(mean_delay_s) / SPEED_BIN, log_amplitude / AMPLITUDE_BIN], axis=1))
+    _, member = np.unique(alike, axis=0, return_inverse=True)
     n_segments = np.bincount(member).astype(float)[:, None]
 
     def mean(per_segment: C128 | F64) -> C128:
-        total = np.zeros((len(labels), per_segment.shape[1]), np.complex128)
+        total = np.zeros((len(n_segments), per_segment.shape[1]), np.complex128)
         np.add.at(total, member, per_segment)
         total /= n_segments
         return total
 
-    inner = slice(1, -1)
-    a, g = segments.acceleration[:, inner], segments.pitch_rate[:, inner]
-    power_a, power_g = np.mean(np.abs(a) ** 2, axis=1), np.mean(np.abs(g) ** 2, axis=1)
-    divisor = np.maximum(np.sqrt(power_a * power_g), np.finfo(float).tiny)[:, None]
-    width_hz = float(freq_hz[-2] - freq_hz[1])
+    phase = np.exp(-2j * np.pi * segments.delays_s[:, :, None] * freq_hz)
     return CrossSpectra(
         freq_hz=freq_hz,
         acceleration=np.real(mean(np.abs(a) ** 2 / divisor)),
         pitch_rate=np.real(mean(np.abs(g) ** 2 / divisor)),
         cross=mean(g * np.conj(a) / divisor),
-        delay_phase=mean(phase_k),
+        delay_phase=mean(np.einsum("t,ktf->kf", weight, phase)),
         delay_s=np.real(mean(mean_delay_s[:, None])),
         n_segments=n_segments,
-        acceleration_rms_mps2=float(np.sqrt(power_a.mean() * width_hz)),
-        pitch_rate_rms_radps=float(np.sqrt(power_g.mean() * width_hz)),
+        inverse_power=np.real(mean(1.0 / divisor)),
+        acceleration_rms_mps2=rms_a,
+        pitch_rate_rms_radps=rms_g,
     )

@@ -18,14 +18,13 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectra import CrossSpectra
-from gateway.core.grey_model import Ground, expected_spectra, spectral_model
+from gateway.core.grey_model import Ground
+from gateway.core.model_spectra import expected_spectra, spectral_model, spectral_slopes
 from gateway.records import C128, F64
 
 EFFECTIVE_SHARE: Final = 0.5  # neighbouring Hann bins and half-overlapping segments repeat each other
 ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line
 ROAD_SLOPE_STD: Final = 0.3
-STEP: Final = 1e-5
-PAYLOAD_STEP_KG: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +112,10 @@ class Whittle:
             information=level_information + rows @ rows.T,
         )
 
-    def _expected(self, theta: F64, payload_kg: F64, front_share: F64) -> tuple[F64, F64, C128]:
-        model = spectral_model(theta, payload_kg, front_share, self.ground, self.spectra.freq_hz)
-        return expected_spectra(model, self.spectra)
-
     def _whitened(self, point: Point) -> _Whitened:
-        m_aa, m_gg, m_ga = self._expected(point.theta, np.array(point.payload_kg), np.array(point.front_share))
+        load = np.array(point.payload_kg), np.array(point.front_share)
+        model = spectral_model(point.theta, *load, self.ground, self.spectra.freq_hz)
+        m_aa, m_gg, m_ga = expected_spectra(model, self.spectra)
         root_a = np.sqrt(m_aa)
         ratio = m_ga / m_aa
         root_g = np.sqrt(np.maximum(m_gg - np.abs(ratio) ** 2 * m_aa, 1e-12 * m_gg))
@@ -130,21 +127,10 @@ class Whittle:
     def _whitened_derivatives(
         self, point: Point, at: _Whitened, free: list[int], is_load_free: bool
     ) -> tuple[F64, F64, C128]:
-        """Central differences of the model matrix, whitened: three arrays (k, b, m)."""
-        k = len(free) + 2 * is_load_free
-        theta = np.repeat(point.theta[None], 2 * k, axis=0)
-        payload_kg, share = np.full(2 * k, point.payload_kg), np.full(2 * k, point.front_share)
-        step = np.full(k, STEP)
-        for row, entry in enumerate(free):
-            theta[2 * row : 2 * row + 2, entry] += (STEP, -STEP)
-        if is_load_free:
-            payload_kg[2 * k - 4 : 2 * k - 2] += (PAYLOAD_STEP_KG, -PAYLOAD_STEP_KG)
-            share[2 * k - 2 :] += (STEP, -STEP)
-            step[k - 2] = PAYLOAD_STEP_KG
-        per_step = 0.5 / step[:, None, None]
-        m_aa, m_gg, m_ga = self._expected(theta, payload_kg, share)
-        d_aa, d_gg = (m_aa[::2] - m_aa[1::2]) * per_step, (m_gg[::2] - m_gg[1::2]) * per_step
-        return _whiten(at.root_a, at.root_g, at.ratio, d_aa, d_gg, (m_ga[::2] - m_ga[1::2]) * per_step)
+        """Slopes of the model matrix, whitened: three arrays (k, b, m)."""
+        load = (point.payload_kg, point.front_share)
+        d_aa, d_gg, d_ga = spectral_slopes(point.theta, load, self.ground, self.spectra, free, is_load_free)
+        return _whiten(at.root_a, at.root_g, at.ratio, d_aa, d_gg, d_ga)
 
     def _shape_cost(self, z: _Whitened) -> float:
         return float(np.sum(self._n * 2.0 * (np.log(z.trace) + np.log(z.root_a) + np.log(z.root_g))))

@@ -13,7 +13,8 @@ import numpy as np
 
 from gateway.core.cross_spectra import CrossSpectra
 from gateway.core.cross_spectrum import CrossSpectrumCalibration
-from gateway.core.grey_model import INDEX, expected_spectra, spectral_model
+from gateway.core.grey_model import INDEX
+from gateway.core.model_spectra import expected_spectra, spectral_model
 from gateway.records import F64, Bool, Spectra
 
 
@@ -81,6 +82,7 @@ def _as_one_group(seen: Spectra, is_used: Bool, fitted: Fitted) -> CrossSpectra:
         delay_phase=np.exp(-1j * turn * fitted.delay_s - 0.5 * (turn * fitted.delay_std_s) ** 2)[None],
         delay_s=np.array([[fitted.delay_s]]),
         n_segments=np.array([[1.0]]),
+        inverse_power=np.array([[1.0 / np.sqrt(np.mean(a**2) * np.mean(g**2))]]),
         acceleration_rms_mps2=float("nan"),
         pitch_rate_rms_radps=float("nan"),
     )

@@ -16,7 +16,7 @@ from gateway.cli import reproduce as reproduce_command
 from gateway.cli.progress import StatusLine, bar
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.offline.demo_drive import LOAD, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, demo_frames
+from gateway.offline.demo_drive import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, frames_of
 from gateway.reports.reproduce_evidence import Scope
 
 LINE = "({t:.6f}) can1 101#0102030405060708\n"
@@ -179,11 +179,11 @@ def test_the_demos_windows_are_good_and_the_load_comes_between_them() -> None:
     signal_map = load_signal_map("springscale:reference")
     scheduler = Scheduler(BatchSettings(), signal_map.traits)
     decoder = Decoder(signal_map)
-    batches = [batch for frames in demo_frames() for batch in scheduler.feed(decoder.decode(frames))]
-    good = [batch for batch in batches if not batch.rejected]
-    truth = demo_drive().truth
+    driven = demo_drive()
+    good = [batch for batch in scheduler.feed(decoder.decode(frames_of(driven))) if not batch.rejected]
+    truth = driven.truth
     loaded = [batch.t_start_ns > truth.t_ns[1] for batch in good]
     assert loaded == [False] * N_EMPTY_WINDOWS + [True] * N_LOADED_WINDOWS
-    assert truth.payload_kg.tolist() == [0.0, LOAD.mass_kg]
+    assert truth.payload_kg.tolist() == [0.0, LOADS[0].mass_kg]
     assert [batch.usable_share for batch in good] == pytest.approx([1.0] * len(good), abs=0.03)
     assert len({batch.drive_start_ns for batch in good}) == 2

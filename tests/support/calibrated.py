@@ -1,8 +1,11 @@
 """A made-up calibration file of the ratio index."""
 
+import json
+from typing import Any
+
 import numpy as np
 
-from gateway.calibration.file import CalibrationFile, RatioIndexPart
+from gateway.calibration.file import CalibrationFile, RatioIndexPart, content_id
 from gateway.core.ratio_index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.regression import RegressionModel
 
@@ -70,3 +73,12 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
             },
         }
     )
+
+
+def first_version() -> dict[str, Any]:
+    """Today's made-up file as version 1 would have had it."""
+    content: dict[str, Any] = json.loads(calibration_file().to_json())
+    del content["migrated_from"], content["seen"]["roughness_mps2"]
+    content["version"] = 1
+    content["id"] = content_id(content)
+    return content

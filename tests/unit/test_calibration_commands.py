@@ -1,6 +1,8 @@
 """springscale calibration show, diff and verify: what they say of a file, and how they end."""
 
 import json
+import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
-from support.calibrated import calibration_file
+from support.calibrated import calibration_file, first_version
 
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file import CalibrationFile, content_id, load_calibration
@@ -60,9 +62,20 @@ def test_show_json_is_the_file(tmp_path: Path) -> None:
 
 
 def test_half_car_parameters_are_shown_in_their_units() -> None:
-    text = run("show", SHIPPED).output
-    assert "spring_front_npm                   78540 ± 1.1e+03" in text
-    assert "migrated from an older one" in text
+    part = load_calibration(SHIPPED).for_core().cross_spectrum
+    assert part is not None
+    at = part.names.index("spring_front_npm")
+    spring_npm = math.exp(part.parameters[at])
+    std_npm = spring_npm * math.sqrt(part.covariance[at, at])
+    shown = re.search(r"spring_front_npm +(\S+) ± (\S+)", run("show", SHIPPED).output)
+    assert shown is not None
+    assert [float(number) for number in shown.groups()] == pytest.approx([spring_npm, std_npm], rel=0.05)
+
+
+def test_a_file_of_an_older_version_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "old.json"
+    path.write_text(json.dumps(first_version()))
+    assert "migrated from an older one" in run("show", path).output
 
 
 def test_a_parameter_held_as_a_logarithm_has_a_spread_of_first_order() -> None:

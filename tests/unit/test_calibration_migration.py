@@ -2,24 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
-from support.calibrated import calibration_file
+from support.calibrated import first_version
 
-from gateway.calibration.file import VERSION, content_id, load_calibration
+from gateway.calibration.file import VERSION, load_calibration
 from gateway.calibration.file_migration import FIRST_VERSION, MIGRATIONS, migrated
 
 SHIPPED = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
-
-
-def first_version() -> dict[str, Any]:
-    """Today's made-up file as version 1 would have had it."""
-    content: dict[str, Any] = json.loads(calibration_file().to_json())
-    del content["migrated_from"], content["seen"]["roughness_mps2"]
-    content["version"] = 1
-    content["id"] = content_id(content)
-    return content
 
 
 def test_there_is_a_step_from_every_version_to_the_next() -> None:
@@ -74,9 +64,10 @@ def test_the_first_id_is_kept_over_several_migrations() -> None:
     assert migrated(once, VERSION)["migrated_from"] == "sha256:first"
 
 
-def test_the_shipped_calibration_is_of_the_first_version_and_still_loads() -> None:
+def test_the_shipped_calibration_is_of_this_version_and_loads_as_it_is() -> None:
     content = json.loads(SHIPPED.read_text())
-    assert content["version"] == 1
     shipped = load_calibration(SHIPPED)
-    assert shipped.id == content["id"]
+    assert content["version"] == VERSION
+    assert (shipped.id, shipped.migrated_from) == (content["id"], None)
     assert shipped.for_core().cross_spectrum is not None
+    assert shipped.for_core().ratio_index is not None

@@ -19,7 +19,7 @@ LOADED = Fitted(payload_kg=270.0, front_share_pct=47.0, delay_s=DELAY_S)
 
 
 def true_parameters() -> F64:
-    """CAR as the grey model's vector, next to no slack."""
+    """CAR as the grey model's vector, next to no slack or noise."""
     known = {name: getattr(CAR, name) for name in PARAMETERS if hasattr(CAR, name)}
     for end, axle in (("front", CAR.front), ("rear", CAR.rear)):
         known |= {
@@ -30,7 +30,7 @@ def true_parameters() -> F64:
             f"tyre_{end}_npm": axle.tyre_npm,
             f"unsprung_{end}_kg": axle.unsprung_kg,
         }
-    usual = {name: 1e-4 if name.startswith("slack_") else 0.0 for name in PARAMETERS}
+    usual = dict.fromkeys(PARAMETERS, 0.0) | {name: 1e-30 for name in PARAMETERS if is_positive(name)}
     return np.array([np.log(x) if is_positive(name) else x for name, x in (usual | known).items()])
 
 
