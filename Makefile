@@ -36,6 +36,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_reasons.py --check
 	$(BIN)/python docs/make_findings.py --check
 	$(BIN)/python docs/make_calibration_schema.py --check
+	$(BIN)/python docs/make_readme_table.py --check
 
 bench: .venv/.development
 	for bench in benchmarks/bench_*.py; do echo "== $$bench"; $(BIN)/python $$bench || exit 1; done
@@ -68,6 +69,7 @@ docs: .venv/.development
 	$(BIN)/python docs/make_reasons.py
 	$(BIN)/python docs/make_findings.py
 	$(BIN)/python docs/make_calibration_schema.py
+	$(BIN)/python docs/make_readme_table.py
 
 # --no-emit-*: the lock names no package index, so it serves behind any mirror.
 COMPILE = CUSTOM_COMPILE_COMMAND="make lock" .venv-lock/bin/pip-compile --quiet --generate-hashes --strip-extras \

@@ -1,0 +1,86 @@
+"""Writes README.md's table of errors from the numbers beside this file; with --check only tells if it is up to date.
+
+accuracy.json comes from `springscale reproduce`, coverage.json from `springscale study coverage`.
+"""
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.reports.reproduce_table import PAPER_PCT, TITLES
+
+DOCS = Path(__file__).parent
+README = DOCS.parent / "README.md"
+BEGIN: Final = "<!-- errors: python docs/make_readme_table.py -->"
+END: Final = "<!-- end of errors -->"
+PAPERS_DRIVES: Final = (("test1", "validation"), ("test2", "validation"), ("test3", "validation"))
+DRIVES: Final = (*PAPERS_DRIVES, ("experiment", "validation"))
+HEAD: Final = (
+    "| mean error, payload / front share | published | ratio index | cross spectrum | its 95 % intervals hold "
+    "| refused |\n|---|---|---|---|---|---|"
+)
+
+
+def table() -> str:
+    """What stands between the marks."""
+    accuracy = json.loads((DOCS / "accuracy.json").read_text(encoding="utf-8"))["tables"]
+    coverage = json.loads((DOCS / "coverage.json").read_text(encoding="utf-8"))["lines"]
+    rows = [_reproduced(key, accuracy) for key in DRIVES]
+    kinds = dict.fromkeys(line["kind"] for line in coverage if line["kind"] != "all")
+    rows += [_covered(kind, coverage) for kind in kinds]
+    return "\n".join([BEGIN, HEAD, *rows, END])
+
+
+def _reproduced(key: tuple[str, str], tables: list[dict[str, Any]]) -> str:
+    of = {t["method"]: t for t in tables if (t["drive"], t["split"]) == key}
+    ours, index = of["cross spectrum"], of["ratio index"]
+    paper = " / ".join(f"{pct:.1f} %" for pct in PAPER_PCT[key])
+    held = _held(ours["payload"]["coverage95"], ours["front_share"]["coverage95"])
+    refused = f"{ours['n_rejected']} of {ours['n_batches']}"
+    return f"| {TITLES[key]} | {paper} | {_errors(index)} | **{_errors(ours)}** | {held} | {refused} |"
+
+
+def _covered(kind: str, lines: list[dict[str, Any]]) -> str:
+    of = {line["estimator"]: line for line in lines if line["kind"] == kind}
+    ours = of["cross_spectrum"]
+    held = _held(ours["payload_coverage"]["share"], ours["front_share_coverage"]["share"])
+    refused = f"{ours['n_rejected']} of {ours['n_batches']}"
+    title = f"{ours['n_vans']} unlike vans, {kind}"
+    return f"| {title} | | {_pair(of['ratio_index'])} | **{_pair(ours)}** | {held} | {refused} |"
+
+
+def _errors(of: Mapping[str, Any]) -> str:
+    return f"{of['payload']['mean_abs_pct']:.1f} % / {of['front_share']['mean_abs_pct']:.1f} %"
+
+
+def _pair(line: Mapping[str, Any]) -> str:
+    found = [line[f"{what}_mean_abs_pct"] for what in ("payload", "front_share")]
+    return " / ".join("none" if pct is None else f"{pct:.1f} %" for pct in found)
+
+
+def _held(payload: float | None, share: float | None) -> str:
+    return " / ".join("none" if held is None else f"{100.0 * held:.0f} %" for held in (payload, share))
+
+
+def readme() -> str:
+    """README.md with the table as it should be. Raises ValueError where the marks are missing."""
+    text = README.read_text(encoding="utf-8")
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise ValueError(f"{README} lacks the marks {BEGIN} and {END}")
+    return before + table() + after
+
+
+def main() -> None:
+    """Write the table, or compare it."""
+    if "--check" not in sys.argv[1:]:
+        README.write_text(readme(), encoding="utf-8")
+    elif README.read_text(encoding="utf-8") != readme():
+        sys.exit("README.md's table does not say what docs/accuracy.json and docs/coverage.json do: run `make docs`")
+
+
+if __name__ == "__main__":
+    main()
