@@ -22,8 +22,10 @@ TRIES = 4
 DRIVE_S = 45.0  # two batches of 20 s and a rest
 GUEST = Path(__file__).parent / "guest"
 
-# candump writes the very stamps that the service got, in whole microseconds.
-SAME_STAMPS_KG, SAME_STAMPS_PP = 0.1, 0.01
+# Both differences are held to the batch's own standard deviation (about 44 kg for 20 s).
+# candump writes the very stamps that the service got, but in whole microseconds: where a busy host makes frames come in
+# heaps, samples lie so close together that this shows.
+SAME_STAMPS_STDS = 0.05
 # The log's own stamps are others: canplayer sends a frame about a millisecond late, and later where the host lets the
 # emulated machine wait. That jitter is noise of the replay, so its effect is held to the batch's own uncertainty.
 LATE_MS = 3.0
@@ -124,8 +126,9 @@ def drive_once(vehicle: Vehicle, log: str, n_frames: int, measured: Callable[...
     if not all(record["rejected"] for record in told):
         same_kg, same_pp = furthest_apart(told, expected)
         measured(same_stamps_kg=same_kg, same_stamps_pp=same_pp)
-        assert same_kg < SAME_STAMPS_KG
-        assert same_pp < SAME_STAMPS_PP
+        weighed = next(record for record in told if not record["rejected"])
+        assert same_kg < SAME_STAMPS_STDS * weighed["payload_std_kg"]
+        assert same_pp < SAME_STAMPS_STDS * weighed["front_share_std_pct"]
     return told
 
 
