@@ -54,7 +54,7 @@ FIGURES = {
 
 
 def _figures(figures: dict[str, float]) -> str:
-    lines = [f"| {text} | {figures[name]:.3g} |" for name, text in FIGURES.items() if name in figures]
+    lines = [f"| {text} | {figures[name]:.4g} |" for name, text in FIGURES.items() if name in figures]
     return "\n".join(["## Figures of the same run\n", "| | |", "|---|---|", *lines, ""])
 
 
