@@ -10,6 +10,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from generated import keep_up_to_date
+
 DOCS = Path(__file__).parent
 PAGE, MEASURED = DOCS / "faults.md", DOCS / "faults.json"
 ROWS = DOCS.parent / "tests" / "faults.toml"
@@ -96,14 +98,10 @@ def record() -> None:
 
 
 def main() -> None:
-    """Write the page, or with --check exit with 1 where it is out of date."""
+    """Write the page, or compare it."""
     if "--record" in sys.argv[1:]:
         record()
-    page = faults_page()
-    if "--check" not in sys.argv[1:]:
-        PAGE.write_text(page, encoding="utf-8")
-    elif not PAGE.exists() or PAGE.read_text(encoding="utf-8") != page:
-        sys.exit(f"{PAGE} is out of date: make docs")
+    keep_up_to_date(PAGE, faults_page(), "docs/faults.json with tests/faults.toml")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """Writes docs/findings.md from gateway/calibration/inspection_kinds.py; with --check only tells if it is up to date."""
 
-import sys
 from pathlib import Path
+
+from generated import keep_up_to_date
 
 from gateway.calibration.inspection_kinds import EXPLAINED, Topic
 
@@ -35,10 +36,7 @@ def _table(topic: Topic) -> str:
 
 def main() -> None:
     """Write the page, or compare it."""
-    if "--check" not in sys.argv[1:]:
-        PAGE.write_text(findings_page(), encoding="utf-8")
-    elif not PAGE.is_file() or PAGE.read_text(encoding="utf-8") != findings_page():
-        sys.exit("docs/findings.md does not say what gateway/calibration/inspection_kinds.py does: run `make docs`")
+    keep_up_to_date(PAGE, findings_page(), "gateway/calibration/inspection_kinds.py")
 
 
 if __name__ == "__main__":

@@ -4,10 +4,11 @@ accuracy.json comes from `springscale reproduce`, coverage.json from `springscal
 """
 
 import json
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
+
+from generated import keep_up_to_date
 
 from gateway.reports.reproduce_table import PAPER_PCT, TITLES
 
@@ -75,11 +76,8 @@ def readme() -> str:
 
 
 def main() -> None:
-    """Write the table, or compare it."""
-    if "--check" not in sys.argv[1:]:
-        README.write_text(readme(), encoding="utf-8")
-    elif README.read_text(encoding="utf-8") != readme():
-        sys.exit("README.md's table does not say what docs/accuracy.json and docs/coverage.json do: run `make docs`")
+    """Write the page, or compare it."""
+    keep_up_to_date(README, readme(), "docs/accuracy.json with docs/coverage.json")
 
 
 if __name__ == "__main__":

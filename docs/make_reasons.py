@@ -1,7 +1,8 @@
 """Writes docs/reasons.md from gateway/reasons.py; with --check only tells whether it is up to date."""
 
-import sys
 from pathlib import Path
+
+from generated import keep_up_to_date
 
 from gateway.reasons import EXPLANATIONS, Cause
 
@@ -36,10 +37,7 @@ def _table(cause: Cause) -> str:
 
 def main() -> None:
     """Write the page, or compare it."""
-    if "--check" not in sys.argv[1:]:
-        PAGE.write_text(reasons_page(), encoding="utf-8")
-    elif not PAGE.is_file() or PAGE.read_text(encoding="utf-8") != reasons_page():
-        sys.exit("docs/reasons.md does not say what gateway/reasons.py does: run `make docs`")
+    keep_up_to_date(PAGE, reasons_page(), "gateway/reasons.py")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
 """Writes docs/settings.md from gateway/config.py; with --check only tells whether it is up to date."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
+from generated import keep_up_to_date
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -67,10 +67,7 @@ def _default(field: FieldInfo) -> str:
 
 def main() -> None:
     """Write the page, or compare it."""
-    if "--check" not in sys.argv[1:]:
-        PAGE.write_text(settings_page(), encoding="utf-8")
-    elif not PAGE.is_file() or PAGE.read_text(encoding="utf-8") != settings_page():
-        sys.exit("docs/settings.md does not say what gateway/config.py does: run `make docs`")
+    keep_up_to_date(PAGE, settings_page(), "gateway/config.py")
 
 
 if __name__ == "__main__":

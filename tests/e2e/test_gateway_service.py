@@ -14,6 +14,7 @@ from pathlib import Path
 import httpx
 import pytest
 from support.bus_drive import bus_drive
+from support.ports import first_answer, free_port
 
 from gateway.bus.candump_write import write_candump
 from gateway.bus.sink import replay
@@ -104,23 +105,6 @@ def springscale(*arguments: str, **environment: str) -> subprocess.Popen[str]:
     )
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
-def wait_for(url: str) -> httpx.Response:
-    deadline = time.monotonic() + 20.0
-    while True:
-        try:
-            return httpx.get(url)
-        except httpx.TransportError:
-            if time.monotonic() > deadline:
-                raise
-            time.sleep(0.05)
-
-
 def test_the_process_tells_systemd_and_stops_with_exit_code_zero(config: Path, tmp_path: Path) -> None:
     port = free_port()
     address = str(tmp_path / "notify")
@@ -131,7 +115,7 @@ def test_the_process_tells_systemd_and_stops_with_exit_code_zero(config: Path, t
         told = []
         while "READY=1" not in told:
             told += listener.recv(4096).decode().split("\n")
-        latest = wait_for(f"http://127.0.0.1:{port}/api/v1/estimates/latest").json()
+        latest = first_answer(f"http://127.0.0.1:{port}/api/v1/estimates/latest").json()
         assert latest["rejected"] == ["no_estimate_yet"]
         assert latest["payload_kg"] is None
         assert httpx.get(f"http://127.0.0.1:{port}/health/live").status_code == 200

@@ -7,9 +7,9 @@ import sys
 import time
 from pathlib import Path
 
-import httpx
-from support.broker import Listener, free_port, needs_mosquitto, running_broker
+from support.broker import Listener, needs_mosquitto, running_broker
 from support.estimates import make_record
+from support.ports import first_answer, free_port
 
 from gateway.store import Store
 
@@ -39,16 +39,6 @@ def configuration(folder: Path, web_port: int, broker_port: int) -> Path:
     return path
 
 
-def asked(url: str, end_s: float) -> httpx.Response:
-    while True:
-        try:
-            return httpx.get(url)
-        except httpx.TransportError:
-            if time.monotonic() > end_s:
-                raise
-            time.sleep(0.05)
-
-
 def test_the_service_forwards_its_history_and_tells_how_it_goes(tmp_path: Path) -> None:
     records = [make_record(n) for n in range(3)]
     store = Store.open(tmp_path / "state")
@@ -64,8 +54,8 @@ def test_the_service_forwards_its_history_and_tells_how_it_goes(tmp_path: Path) 
         )
         status: dict[str, int] = {}
         while status.get("n_delivered") != len(records) and time.monotonic() < end_s:
-            status = asked(f"http://127.0.0.1:{web_port}/api/v1/status", end_s).json()["uplink"]
-        metrics = asked(f"http://127.0.0.1:{web_port}/metrics", end_s).text
+            status = first_answer(f"http://127.0.0.1:{web_port}/api/v1/status").json()["uplink"]
+        metrics = first_answer(f"http://127.0.0.1:{web_port}/metrics").text
         service.send_signal(signal.SIGTERM)
         assert service.wait(20.0) == 0
         listener.wait_for(5, 10.0)
