@@ -1,7 +1,7 @@
 """Logs in, estimates out: what `springscale estimate` prints."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gateway.bus.logs import motion_of_log
@@ -9,6 +9,7 @@ from gateway.bus.signal_map import SignalMap, load_signal_map
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.tare_file import load_tares
 from gateway.config import Settings
+from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.tare import Tare
@@ -27,11 +28,14 @@ class Setup:
     estimator: str
     identity: Identity
     tare: Tare | None = None
+    calibrated: CalibratedVehicle | None = field(init=False)  # the calibration, as the core knows it
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "calibrated", self.calibration.for_core() if self.calibration else None)
 
     def flow(self, settings: BatchSettings) -> Flow:
         """A fresh pipeline."""
-        calibrated = self.calibration.for_core() if self.calibration else None
-        return Flow(settings, self.signal_map.traits, calibrated, self.estimator, self.identity, self.tare)
+        return Flow(settings, self.signal_map.traits, self.calibrated, self.estimator, self.identity, self.tare)
 
     def with_tare_of(self, path: Path) -> "Setup":
         """With the tare that ``path`` has in use for this calibration and estimator; without any where it has none.

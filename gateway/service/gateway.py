@@ -92,10 +92,9 @@ class Gateway:
         self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board)
         self.uplink = uplink_of(forwarding, setup, self.store)
         self.status = StatusReport(settings, setup, self.source, self.pipeline, self.store, self.board, self.uplink)
-        calibrated = setup.calibration.for_core() if setup.calibration else None
         self.tare = TareDesk(
             settings.store.directory,
-            Subject(calibrated, setup.estimator, setup.identity.vehicle_id),
+            Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id),
             self.pipeline,
             stale_after_s=settings.web.stale_after_s,
             on_event=self.store.write_event,
@@ -104,7 +103,7 @@ class Gateway:
             self.board,
             self.store.reader(),
             self.status,
-            calibrated=calibrated,
+            calibrated=setup.calibrated,
             tokens=tokens,
             tare=self.tare,
             known_loads=known_loads,
@@ -141,7 +140,8 @@ class Gateway:
 
     def run(self) -> None:
         """Serve until SIGTERM or SIGINT. Raises GatewayFailedError with a clear line when a part dies."""
-        asyncio.run(self._serve())
+        with asyncio.Runner(loop_factory=self._server.config.get_loop_factory()) as runner:
+            runner.run(self._serve())
         if self._failure is not None:
             raise GatewayFailedError(self._failure)
 

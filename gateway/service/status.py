@@ -49,6 +49,7 @@ class StatusReport:
         self._store = store
         self._board = board
         self._uplink = uplink
+        self._version = version("springscale")  # read once: it is a file, and a status must not want one
         self._started = time.monotonic()
 
     def __call__(self) -> Status:
@@ -56,7 +57,7 @@ class StatusReport:
         state = self.state()
         not_ready = self._source.reason if state is State.READER_FAULT else None
         return Status(
-            version=version("springscale"),
+            version=self._version,
             state=state,
             uptime_s=time.monotonic() - self._started,
             vehicle_id=self._setup.identity.vehicle_id,

@@ -1,5 +1,7 @@
 """The real service end to end: bus, pipeline, database and web together."""
 
+import asyncio
+import importlib.metadata
 import json
 import os
 import shutil
@@ -59,8 +61,6 @@ def run_with_log(config: Path, log: Path, speed: float | str) -> list[str]:
     settings = load_settings(config)
 
     def on_started(gateway: Gateway) -> None:
-        import asyncio
-
         loop = asyncio.get_running_loop()
 
         def play() -> None:
@@ -211,3 +211,22 @@ def test_a_database_that_cannot_even_be_read_at_the_start_does_not_keep_the_serv
 
     Gateway(settings, setup_of(settings), on_started=on_started).run()
     assert started
+
+
+def test_it_runs_on_the_fast_loop_and_tells_its_status_where_no_file_can_be_opened(
+    config: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The benchmark's loop, which also outlives a flood that takes every file descriptor."""
+    settings, seen = load_settings(config), []
+
+    def refuse(_self: object, name: str) -> str:
+        raise OSError(24, f"Too many open files: {name}")
+
+    def on_started(gateway: Gateway) -> None:
+        monkeypatch.setattr(importlib.metadata.PathDistribution, "read_text", refuse)
+        seen.append((type(asyncio.get_running_loop()).__module__, gateway.status().version))
+        gateway.request_stop()
+
+    version = importlib.metadata.version("springscale")
+    Gateway(settings, setup_of(settings), on_started=on_started).run()
+    assert seen == [("uvloop", version)]
