@@ -48,6 +48,7 @@ FIGURES = {
     "security_score": "`systemd-analyze security springscale` (0 is best, 10 worst)",
     "sustained_frames_per_s": "frames/s of a timed canplayer log without one lost, by candump and by the service",
     "boot_after_power_cut_s": "s from power on to a running system after a power cut",
+    "sectors_lost_at_power_cuts": "sectors of 512 bytes that power cuts lost, none of a committed record",
     "same_stamps_kg": "kg between HTTP and `springscale estimate` on candump's recording of the replay, 20 s batches",
     "late_ms": "ms that canplayer's frames were late at most, 99 of 100, in the replay compared below",
     "reference_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log that canplayer read",

@@ -20,16 +20,18 @@ class Wiring:
 
     image: Path
     disk: Path
+    further_disks: tuple[Path, Path]
     tap: str
     guest_address: str  # with its prefix length
 
 
 @dataclass(frozen=True, slots=True)
 class Backend:
-    """A name, and the command that runs the machine in the foreground, its console on standard output."""
+    """How to run the machine in the foreground, its console on standard output, and what it calls its further disks."""
 
     name: str
     command: Callable[[Wiring], list[str]]
+    further_disks: tuple[str, str]
 
 
 def best_backend() -> Backend | str:
@@ -45,14 +47,15 @@ def best_backend() -> Backend | str:
     wanted = os.environ.get("SPRINGSCALE_VM", present[0] if present else "")
     if wanted not in present:
         return f"a test machine needs {UML} (package user-mode-linux) or {QEMU} (package qemu-system-x86)"
-    return Backend(wanted, _BACKENDS[wanted][1])
+    return _BACKENDS[wanted][1]
 
 
 def _uml(wiring: Wiring) -> list[str]:
     # One CPU: User Mode Linux switches between its kernel and its user process at every system call, and across
     # CPUs that costs many times more.
     return ["taskset", "--cpu-list", str(_own_processor()), UML, "seccomp=on", f"mem={MEMORY_MB}M",
-            f"ubd0={wiring.disk}", "root=/dev/ubda", "rw", "rootfstype=ext4",
+            *(f"ubd{i}={disk}" for i, disk in enumerate((wiring.disk, *wiring.further_disks))),
+            "root=/dev/ubda", "rw", "rootfstype=ext4",
             f"vec0:transport=tap,ifname={wiring.tap},depth=64,gro=1", "con0=null,fd:1", "con=null",
             *_common("vec0", wiring)]  # fmt: skip
 
@@ -70,7 +73,8 @@ def _qemu(wiring: Wiring) -> list[str]:
     accelerator = ["-accel", "kvm", "-cpu", "host"] if has_kvm else ["-accel", "tcg,thread=multi", "-cpu", "max"]
     return [QEMU, *accelerator, "-smp", "2", "-m", str(MEMORY_MB), "-display", "none", "-nodefaults", "-no-reboot",
             "-serial", "stdio", "-kernel", str(wiring.image / "vmlinuz"), "-initrd", str(wiring.image / "initrd.img"),
-            "-drive", f"file={wiring.disk},if=virtio,format=raw,cache=writeback",
+            *(part for disk in (wiring.disk, *wiring.further_disks)
+              for part in ("-drive", f"file={disk},if=virtio,format=raw,cache=writeback")),
             "-netdev", f"tap,id=net,ifname={wiring.tap},script=no,downscript=no",
             "-device", "virtio-net-pci,netdev=net,romfile=", "-device", "virtio-rng-pci",
             "-append", " ".join(["root=/dev/vda rw console=ttyS0 net.ifnames=0 panic=-1", *_common("eth0", wiring)])
@@ -81,4 +85,7 @@ def _common(interface: str, wiring: Wiring) -> list[str]:
     return ["quiet", "systemd.show_status=0", f"springscale.network={interface},{wiring.guest_address}"]
 
 
-_BACKENDS: Final[Mapping[str, tuple[str, Callable[[Wiring], list[str]]]]] = {"uml": (UML, _uml), "qemu": (QEMU, _qemu)}
+_BACKENDS: Final[Mapping[str, tuple[str, Backend]]] = {
+    "uml": (UML, Backend("uml", _uml, ("/dev/ubdb", "/dev/ubdc"))),
+    "qemu": (QEMU, Backend("qemu", _qemu, ("/dev/vdb", "/dev/vdc"))),
+}

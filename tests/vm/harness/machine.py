@@ -16,6 +16,7 @@ from vm.harness.image import kept_image
 AGENT_PORT: Final = 9999
 BOOT_S: Final = 240.0
 SHUTDOWN_S: Final = 60.0
+FURTHER_DISK: Final = "256M"  # sparse
 
 
 class GuestError(RuntimeError):
@@ -23,7 +24,7 @@ class GuestError(RuntimeError):
 
 
 class Machine:
-    """One guest with a disk of its own, which survives power cuts and reboots until :meth:`close`.
+    """One guest with disks of its own, one with its system, two empty; they survive power cuts until :meth:`close`.
 
     Host and guest share a network of two addresses that nobody else sees.
     """
@@ -35,8 +36,12 @@ class Machine:
         number = os.getpid() % 256
         self.host_address, self.address = f"198.18.{number}.1", f"198.18.{number}.2"
         image = kept_image(backend.name)
-        self._wiring = Wiring(image, folder / "root.img", f"springscale{number}", f"{self.address}/30")
+        self.further_disks = (folder / "second.img", folder / "third.img")
+        tap, address = f"springscale{number}", f"{self.address}/30"
+        self._wiring = Wiring(image, folder / "root.img", self.further_disks, tap, address)
         subprocess.run(["cp", "--sparse=always", image / "root.img", self._wiring.disk], check=True)
+        for disk in self.further_disks:
+            subprocess.run(["truncate", "--size", FURTHER_DISK, disk], check=True)
         self._make_network()
         self._process: subprocess.Popen[bytes] | None = None
         self._last_breath = -1
@@ -105,7 +110,8 @@ class Machine:
         """End it and throw its disk and network away."""
         self.cut_power()
         subprocess.run(["ip", "link", "delete", self._wiring.tap], check=False)
-        self._wiring.disk.unlink(missing_ok=True)
+        for disk in (self._wiring.disk, *self.further_disks):
+            disk.unlink(missing_ok=True)
 
     def run(self, command: str, *, timeout_s: float = 60.0, check: bool = True) -> str:
         """Output of a shell command in the guest. Raises GuestError where it fails, OSError without an answer."""

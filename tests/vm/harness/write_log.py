@@ -1,0 +1,120 @@
+"""What device-mapper's log-writes target recorded of a disk, and the disk as a power cut might have left it.
+
+The target writes down every write once it is known to be stable: the writes that a flush covers, then that flush; a
+write that bypasses the disk's cache (FUA) as soon as it is done. What stands behind the last flush was still in the
+cache of the disk, which may keep, lose or tear it. Layout: drivers/md/dm-log-writes.c of the Linux kernel.
+"""
+
+import random
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntFlag
+from pathlib import Path
+from typing import BinaryIO, Final
+
+SECTOR_BYTES: Final = 512
+MAGIC: Final = 0x6A73_6677_7368_72
+SUPERBLOCK: Final = struct.Struct("<QQQI")  # magic, version, number of entries, bytes in a sector
+HEADER: Final = struct.Struct("<QQQQ")  # first sector, number of sectors, flags, bytes of a mark's name
+
+
+class Flag(IntFlag):
+    """Kinds of entries."""
+
+    FLUSH = 1
+    FUA = 2
+    DISCARD = 4
+    MARK = 8
+    METADATA = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One entry; its content lies at ``content_at`` in the log."""
+
+    sector: int
+    n_sectors: int
+    flags: Flag
+    content_at: int
+    mark: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """What a power cut did to the writes that no flush had covered, in sectors."""
+
+    n_lost: int
+    n_kept: int
+
+
+def entries_of(log: Path) -> list[Entry]:
+    """Every entry that the log's first sector vouches for; none before the target has begun."""
+    found: list[Entry] = []
+    with log.open("rb") as file:
+        magic, _, n_entries, sector_bytes = SUPERBLOCK.unpack(file.read(SUPERBLOCK.size).ljust(SUPERBLOCK.size, b"\0"))
+        if magic != MAGIC:
+            return found
+        assert sector_bytes == SECTOR_BYTES, f"{log} has sectors of {sector_bytes} bytes"
+        at = SECTOR_BYTES
+        for _ in range(n_entries):
+            file.seek(at)
+            sector, n_sectors, flags, name_bytes = HEADER.unpack(file.read(HEADER.size))
+            mark = file.read(name_bytes).rstrip(b"\0").decode() if flags & Flag.MARK else ""
+            found.append(Entry(sector, n_sectors, Flag(flags), at + SECTOR_BYTES, mark))
+            at += SECTOR_BYTES * (1 + (0 if flags & Flag.DISCARD else n_sectors))
+    return found
+
+
+def cut(disk: Path, log: Path, since: str, moments: random.Random) -> Damage:
+    """Make ``disk``, as it was when the log began, what a power cut after the mark ``since`` leaves of it.
+
+    The moment is any at which writes wait for their flush. All before the last flush is on the disk; of what waits,
+    each write is kept, lost or torn between its sectors.
+    """
+    entries = entries_of(log)
+    moment = moments.choice(_moments(entries, since))
+    n_flushed = _n_flushed(entries, moment)
+    n_lost = n_kept = 0
+    with disk.open("r+b") as target, log.open("rb") as source:
+        for i, entry in enumerate(entries[:moment]):
+            waits = i >= n_flushed and not entry.flags & Flag.FUA
+            arrived = _surviving(entry.n_sectors, moments) if waits else range(entry.n_sectors)
+            _write(entry, arrived, source, target)
+            n_lost += (entry.n_sectors - len(arrived)) * waits
+            n_kept += len(arrived) * waits
+    return Damage(n_lost, n_kept)
+
+
+def _moments(entries: Sequence[Entry], since: str) -> list[int]:
+    """Numbers of entries done when the power may go: behind the mark, with a write that waits for its flush."""
+    marked = next(i for i, entry in enumerate(entries) if entry.mark == since)
+    found = [n for n in range(marked + 1, len(entries) + 1) if _is_waiting(entries[_n_flushed(entries, n) : n])]
+    assert found, f"nothing was written after {since}"
+    return found
+
+
+def _n_flushed(entries: Sequence[Entry], moment: int) -> int:
+    """How many of the first ``moment`` entries the last flush among them covers."""
+    return max((i + 1 for i, entry in enumerate(entries[:moment]) if entry.flags & Flag.FLUSH), default=0)
+
+
+def _is_waiting(entries: Sequence[Entry]) -> bool:
+    return any(entry.n_sectors and not entry.flags & (Flag.FUA | Flag.DISCARD) for entry in entries)
+
+
+def _surviving(n_sectors: int, moments: random.Random) -> Sequence[int]:
+    """Which sectors of a write arrive: all, none, or any of them."""
+    fate = moments.choice(("kept", "lost", "torn"))
+    if fate == "torn":
+        return [i for i in range(n_sectors) if moments.random() < 0.5]
+    return range(n_sectors if fate == "kept" else 0)
+
+
+def _write(entry: Entry, arrived: Sequence[int], source: BinaryIO, target: BinaryIO) -> None:
+    if entry.flags & (Flag.DISCARD | Flag.MARK):
+        return
+    for i in arrived:
+        source.seek(entry.content_at + i * SECTOR_BYTES)
+        target.seek((entry.sector + i) * SECTOR_BYTES)
+        target.write(source.read(SECTOR_BYTES))
