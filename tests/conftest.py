@@ -1,10 +1,25 @@
-"""In continuous integration nothing that was promised may be left out: such a skip fails the run."""
+"""No test depends on the machine's speed; what continuous integration promised and left out fails the run."""
 
 import os
+from collections.abc import Iterator
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 PROMISED = ("chromium", "playwright", "mosquitto", "a test machine", "recorded drives")  # the last beside the checkout
+
+settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any machine")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _unhurried() -> Iterator[None]:
+    """Parts of the service wait for one another as long as tests do."""
+    from support.unhurried import unhurry
+
+    with pytest.MonkeyPatch.context() as patch:
+        unhurry(patch)
+        yield
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -11,6 +11,7 @@ from contextlib import closing
 import can
 import numpy as np
 import pytest
+from support.patience import PATIENCE_S
 
 from gateway.bus.candump_write import write_candump
 from gateway.bus.decode import Decoder
@@ -164,9 +165,9 @@ def test_a_replayed_log_gives_the_same_motion(suffix, tmp_path, drive, truth, si
 
 
 def collect(source, n_rows, signal_map) -> Motion:
-    """Drain until the expected rows are there (or a generous time is up), then stop."""
+    """Drain until the expected rows are there (or patience ends), then stop."""
     decoder, parts, n = Decoder(signal_map), [], 0
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + PATIENCE_S
     while n < n_rows and time.monotonic() < deadline:
         frames = source.inbox.drain(0.2)
         if frames is not None:

@@ -13,6 +13,8 @@ from support.web import Client, Gateway
 from gateway.records import Why
 from gateway.web import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
 
+JSON = "application/json"
+
 
 @pytest.fixture
 def gateway(tmp_path: Path) -> Iterator[Gateway]:
@@ -108,8 +110,46 @@ def test_what_is_not_there_is_a_problem(client: Client) -> None:
         assert answer.headers["content-type"] == "application/problem+json"
         assert answer.json()["status"] == 404
     answer = client.request("DELETE", "/api/v1/status")
-    assert (answer.status_code, answer.headers["allow"]) == (405, "GET")
+    assert (answer.status_code, answer.headers["allow"]) == (405, "GET, HEAD")
     assert answer.json()["title"] == "Method Not Allowed"
+
+
+def test_a_question_is_told_in_words_how_to_mend_it(client: Client) -> None:
+    assert "send a next_cursor or last_cursor" in client.get("/api/v1/estimates?cursor=nonsense").json()["detail"]
+    assert "query.sinc: this is not known here" in client.get("/api/v1/estimates?sinc=x").json()["detail"]
+    form = client.request("POST", "/api/v1/calibration/tare", content=b"is_empty=true")
+    assert form.json()["detail"] == "body: send a JSON object, with Content-Type: application/json"
+    broken = client.request("POST", "/api/v1/calibration/tare", content=b"{", headers={"Content-Type": JSON})
+    assert broken.json()["errors"] == [{"where": "body.1", "what": "this is no JSON"}]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/",
+        "/assets/icon.svg",
+        "/api/v1/estimates/latest",
+        "/api/v1/export.csv",
+        "/api/v1/stream",
+        "/api/v1/nothing",
+        "/health/ready",
+    ],
+)
+def test_head_is_answered_as_get_without_the_body(gateway: Gateway, client: Client, path: str) -> None:
+    gateway.publish(make_record(0))
+    head = client.request("HEAD", path)
+    gateway.board.close()  # so that the stream ends for GET
+    asked = client.get(path)
+    assert head.content == b""
+    assert asked.content
+    assert (head.status_code, head.headers) == (asked.status_code, asked.headers)
+
+
+def test_head_is_of_the_status_that_get_would_have(gateway: Gateway, client: Client) -> None:
+    gateway.publish(make_record(0))
+    etag = client.get("/api/v1/estimates/latest").headers["etag"]
+    known = client.request("HEAD", "/api/v1/estimates/latest", headers={"if-none-match": etag})
+    assert known.status_code == 304
 
 
 def test_an_unforeseen_error_is_a_problem_without_its_inside(gateway: Gateway, client: Client) -> None:

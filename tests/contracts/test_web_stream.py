@@ -10,13 +10,12 @@ from typing import Any
 import httpx
 import pytest
 from support.estimates import make_record
+from support.patience import PATIENCE_S
 from support.web import Client, Gateway, Server, serving
 
 from gateway.records import Why
 from gateway.web import WebSettings
 from gateway.web.fanout import QUEUE, Fanout, StreamEvent
-
-LIMIT_S = 20.0
 
 
 class Listener:
@@ -30,7 +29,7 @@ class Listener:
         """The next event; StopAsyncIteration where the stream has ended. Comments and retry are skipped."""
         fields: dict[str, str] = {}
         while True:
-            line = await asyncio.wait_for(anext(self._lines), LIMIT_S)
+            line = await asyncio.wait_for(anext(self._lines), PATIENCE_S)
             if not line and "data" in fields:
                 return fields.get("id"), fields["event"], json.loads(fields["data"])
             if line and not line.startswith(":"):
@@ -46,14 +45,14 @@ class Listener:
 async def listening(server: Server, last_event_id: str | None = None) -> AsyncIterator[Listener]:
     headers = {} if last_event_id is None else {"Last-Event-ID": last_event_id}
     async with (
-        httpx.AsyncClient(timeout=LIMIT_S) as client,
+        httpx.AsyncClient(timeout=PATIENCE_S) as client,
         client.stream("GET", f"{server.url}/api/v1/stream", headers=headers) as response,
     ):
         yield Listener(response)
 
 
 async def until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(LIMIT_S):
+    async with asyncio.timeout(PATIENCE_S):
         while not condition():
             await asyncio.sleep(0.005)
 
@@ -100,7 +99,7 @@ def test_a_quiet_stream_is_kept_alive_by_comments(tmp_path: Path) -> None:
         async def scenario(server: Server) -> None:
             async with listening(server) as listener:
                 lines = listener.response.aiter_lines()
-                seen = [await asyncio.wait_for(anext(lines), LIMIT_S) for _ in range(6)]
+                seen = [await asyncio.wait_for(anext(lines), PATIENCE_S) for _ in range(6)]
                 assert seen == ["retry: 3000", "", ": keep-alive", "", ": keep-alive", ""]
 
         run(gateway, scenario)
@@ -138,7 +137,7 @@ def test_closing_the_board_ends_the_streams_and_lets_the_server_stop(tmp_path: P
                     assert (await each.event())[1] == "closing"
                     with pytest.raises(StopAsyncIteration):
                         await each.event()
-                await asyncio.to_thread(server.thread.join, LIMIT_S)
+                await asyncio.to_thread(server.thread.join, PATIENCE_S)
                 assert not server.thread.is_alive()
 
         run(gateway, scenario)

@@ -16,6 +16,7 @@ from pathlib import Path
 import httpx
 import pytest
 from support.bus_drive import bus_drive
+from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
 
 from gateway.bus.candump_write import write_candump
@@ -65,11 +66,7 @@ def run_with_log(config: Path, log: Path, speed: float | str) -> list[str]:
 
         def play() -> None:
             report = replay(log, "virtual", settings.bus.channel, speed=speed)
-            deadline = time.monotonic() + 60.0
-            while time.monotonic() < deadline and not (
-                gateway.source.counts().frames >= report.frames and gateway.has_caught_up
-            ):
-                time.sleep(0.02)
+            wait_until(lambda: gateway.source.counts().frames >= report.frames and gateway.has_caught_up)
             loop.call_soon_threadsafe(gateway.request_stop)
 
         threading.Thread(target=play, daemon=True).start()
@@ -110,7 +107,7 @@ def test_the_process_tells_systemd_and_stops_with_exit_code_zero(config: Path, t
     address = str(tmp_path / "notify")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         listener.bind(address)
-        listener.settimeout(20.0)
+        listener.settimeout(PATIENCE_S)
         process = springscale("run", "--config", str(config), SPRINGSCALE_WEB__PORT=str(port), NOTIFY_SOCKET=address)
         told = []
         while "READY=1" not in told:
@@ -121,7 +118,7 @@ def test_the_process_tells_systemd_and_stops_with_exit_code_zero(config: Path, t
         assert httpx.get(f"http://127.0.0.1:{port}/health/live").status_code == 200
         asked = time.monotonic()
         process.send_signal(signal.SIGTERM)
-        _, errors = process.communicate(timeout=20)
+        _, errors = process.communicate(timeout=PATIENCE_S)
         while "STOPPING=1" not in told:
             told += listener.recv(4096).decode().split("\n")
     assert process.returncode == 0, errors
@@ -135,7 +132,7 @@ def test_a_taken_port_is_one_clear_line(config: Path) -> None:
         taken.listen()
         port = taken.getsockname()[1]
         process = springscale("run", "--config", str(config), SPRINGSCALE_WEB__PORT=str(port))
-        _, errors = process.communicate(timeout=30)
+        _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     assert "Traceback" not in errors
     assert f"127.0.0.1:{port}" in errors.strip().splitlines()[-1]
@@ -157,7 +154,7 @@ def test_a_wrong_configuration_ends_with_code_2_and_names_the_fault(
     for command in ("run", "check-config"):
         arguments = ["--config", str(config)] if command == "run" else [str(config)]
         process = springscale(command, *arguments)
-        _, errors = process.communicate(timeout=30)
+        _, errors = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 2, errors
         assert named in errors
         assert "Traceback" not in errors
@@ -169,7 +166,7 @@ def test_a_tampered_calibration_is_refused(config: Path) -> None:
     content["vehicle"]["empty_mass_kg"] += 100.0
     calibration.write_text(json.dumps(content))
     process = springscale("check-config", str(config))
-    _, errors = process.communicate(timeout=30)
+    _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 2
     assert "does not match its id" in errors
 

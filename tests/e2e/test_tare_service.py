@@ -3,7 +3,6 @@
 import asyncio
 import json
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from support.calibrated import calibration_file
+from support.patience import wait_until
 
 from gateway.bus.candump_write import write_candump
 from gateway.bus.encode import Encoder
@@ -84,12 +84,9 @@ class Running:
         """Send a log; return when all of it was worked through."""
         before = self.gateway.source.counts().frames
         sent = replay(log, "virtual", self._channel, speed="max").frames
-        deadline = time.monotonic() + 60.0
-        while time.monotonic() < deadline:
-            if self.gateway.source.counts().frames >= before + sent and self.gateway.has_caught_up:
-                return
-            time.sleep(0.02)
-        raise TimeoutError(f"{log} was not worked through")
+        gateway = self.gateway
+        is_through = wait_until(lambda: gateway.source.counts().frames >= before + sent and gateway.has_caught_up)
+        assert is_through, f"{log} was not worked through"
 
     def tare(self, *arguments: str) -> Result:
         """springscale calibration tare ... against this service."""

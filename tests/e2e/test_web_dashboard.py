@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from support.dashboard import CONTRASTS, STATUS, Watched, furnished
 from support.estimates import make_record
+from support.patience import PATIENCE_S
 from support.web import Gateway, serving
 
 from gateway.records import Why
@@ -18,7 +19,7 @@ playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
 expect = playwright.expect
-expect.set_options(timeout=20_000)  # as long as a busy machine may need
+expect.set_options(timeout=1000 * PATIENCE_S)
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA
 
 

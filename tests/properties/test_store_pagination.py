@@ -9,6 +9,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.estimates import make_record
+from support.patience import PATIENCE_S
 
 from gateway.records import Why
 from gateway.store import Store
@@ -58,7 +59,7 @@ def test_two_readers_beside_a_writer_see_the_same_once(tmp_path: Path) -> None:
     for n in range(n_rows):
         store.write_estimate(make_record(n))
     for thread in threads:
-        thread.join(30.0)
+        thread.join(PATIENCE_S)
     store.close()
     assert followers == [list(range(n_rows))] * 2
 

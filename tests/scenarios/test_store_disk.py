@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from support.estimates import make_record, texts
+from support.patience import PATIENCE_S
 
 from gateway.errors import StoreError
 from gateway.store import Retention, Store, StoreReader, StoreState, schema
@@ -21,7 +22,7 @@ def test_a_full_disk_degrades_to_memory_and_heals(tmp_path: Path) -> None:
         capture_output=True,
         check=False,
         text=True,
-        timeout=60.0,
+        timeout=PATIENCE_S,
         cwd=Path(__file__).parents[1],
     )
     assert run.returncode == 0, run.stderr

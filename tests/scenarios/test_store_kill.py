@@ -11,6 +11,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from support.patience import PATIENCE_S
 
 from gateway.store import Store
 
@@ -39,7 +40,7 @@ def write_until_killed(directory: Path, first: int, after_s: float) -> list[int]
     committed = [int(writer.stdout.readline())]
     time.sleep(after_s)
     writer.send_signal(signal.SIGKILL)
-    rest, _ = writer.communicate(timeout=10.0)
+    rest, _ = writer.communicate(timeout=PATIENCE_S)
     return committed + [int(line) for line in rest.splitlines(keepends=True) if line.endswith("\n")]
 
 

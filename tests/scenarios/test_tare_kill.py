@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+from support.patience import PATIENCE_S
 
 from gateway.calibration.tare_file import FILE_NAME, MOST_ENTRIES, load_tares
 
@@ -40,7 +41,7 @@ def test_a_kill_loses_no_tare_that_was_answered(tmp_path: Path, seed: int) -> No
     answered = [tarer.stdout.readline()]
     time.sleep(random.Random(seed).uniform(0.0, 0.15))
     tarer.send_signal(signal.SIGKILL)
-    rest, _ = tarer.communicate(timeout=10.0)
+    rest, _ = tarer.communicate(timeout=PATIENCE_S)
     answered += [line for line in rest.splitlines(keepends=True) if line.endswith("\n")]
     kept = [entry.id for entry in load_tares(tmp_path / FILE_NAME).entries]
     known = [line.strip() for line in answered][1 - MOST_ENTRIES :]  # one more may have been kept, unanswered

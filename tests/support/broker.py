@@ -5,7 +5,6 @@ import shutil
 import socket
 import subprocess
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -16,6 +15,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
+from support.patience import PATIENCE_S, wait_until
 from support.ports import free_port
 
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin:/usr/bin:/usr/local/bin")
@@ -40,18 +40,18 @@ class Broker:
         self._process = subprocess.Popen(
             [MOSQUITTO, "-c", str(self._configuration)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-        end_s = time.monotonic() + 10.0
-        while time.monotonic() < end_s:
-            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1.0):
-                return
-            time.sleep(0.02)
-        raise AssertionError("mosquitto did not start")
+        assert wait_until(self._answers), "mosquitto did not start"
+
+    def _answers(self) -> bool:
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1.0):
+            return True
+        return False
 
     def stop(self) -> None:
         """As systemd would: it saves what its sessions still have to get."""
         if self._process is not None:
             self._process.terminate()
-            self._process.wait(10.0)
+            self._process.wait(PATIENCE_S)
             self._process = None
 
 
@@ -70,13 +70,11 @@ class Listener:
         session.SessionExpiryInterval = 3600
         self._client.connect("127.0.0.1", port, clean_start=False, properties=session)
         self._client.loop_start()
-        assert subscribed.wait(10.0)
+        assert subscribed.wait(PATIENCE_S)
 
-    def wait_for(self, n: int, timeout_s: float) -> None:
-        """Until ``n`` messages came or the time is out."""
-        end_s = time.monotonic() + timeout_s
-        while len(self.heard) < n and time.monotonic() < end_s:
-            time.sleep(0.01)
+    def wait_for(self, n: int) -> bool:
+        """True as soon as ``n`` messages came, False when patience ends."""
+        return wait_until(lambda: len(self.heard) >= n)
 
     def close(self) -> None:
         self._client.disconnect()

@@ -12,6 +12,7 @@ from gateway.records import Estimate, Why, estimate_to_json
 from gateway.web import BusStatus, KnownLoad, SignalHealth, State, Status, StoreStatus
 from support.estimates import WINDOW_NS, make_estimate
 from support.half_car_road import batch_over_road
+from support.patience import PATIENCE_S
 from support.web import Gateway
 
 STATUS = Status(
@@ -72,7 +73,7 @@ class Watched:
 
     def __init__(self, browser: Any, **options: Any) -> None:
         self.page = browser.new_page(locale="en-GB", timezone_id="UTC", **options)
-        self.page.set_default_timeout(20_000)
+        self.page.set_default_timeout(1000 * PATIENCE_S)
         self.addresses: list[str] = []
         self.complaints: list[str] = []
         self.page.on("request", lambda request: self.addresses.append(request.url))

@@ -5,6 +5,8 @@ import time
 
 import httpx
 
+from support.patience import PATIENCE_S
+
 
 def free_port() -> int:
     with socket.socket() as probe:
@@ -12,9 +14,9 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def first_answer(url: str, timeout_s: float = 20.0) -> httpx.Response:
-    """What ``url`` says as soon as anybody listens there. Raises httpx.TransportError when the time is out."""
-    end_s = time.monotonic() + timeout_s
+def first_answer(url: str) -> httpx.Response:
+    """What ``url`` says as soon as anybody listens there. Raises httpx.TransportError when patience ends."""
+    end_s = time.monotonic() + PATIENCE_S
     while True:
         try:
             return httpx.get(url)

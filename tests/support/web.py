@@ -17,6 +17,7 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, State, Status, TokenFile, WebSettings, create_app, server_config
 from gateway.web.tare import TareDesk
+from support.patience import PATIENCE_S
 
 
 class Gateway:
@@ -114,10 +115,10 @@ def serving(app: FastAPI, config: uvicorn.Config | None = None, port: int = 0) -
     """A running server; stopped at the end if the test has not done so."""
     server = Server(config or server_config(app, "127.0.0.1", port), port)
     server.thread.start()
-    assert server.is_up.wait(20.0)
+    assert server.is_up.wait(PATIENCE_S)
     try:
         yield server
     finally:
         server.uvicorn.should_exit = True
-        server.thread.join(20.0)
+        server.thread.join(PATIENCE_S)
         assert not server.thread.is_alive()

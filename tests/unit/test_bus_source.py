@@ -7,6 +7,7 @@ import time
 import can
 import numpy as np
 import pytest
+from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus import source as source_module
 from gateway.bus.frames import empty_frames
@@ -16,7 +17,6 @@ from gateway.bus.source import LiveSource, SourceState
 from gateway.errors import BusError
 from gateway.records import Frames
 
-PATIENCE_S = 10.0
 MAP = load_signal_map("springscale:reference")
 
 
@@ -92,10 +92,7 @@ def listen():
 
 
 def wait_for(condition):
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.002)
+    assert wait_until(condition), "waited in vain"
 
 
 def test_frames_arrive_in_the_inbox_and_are_counted(listen):

@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from support.patience import PATIENCE_S
 
 WITHOUT = """
 import sys
@@ -17,7 +18,7 @@ main(sys.argv[1:])
 def springscale(*arguments: str) -> subprocess.CompletedProcess[str]:
     """The command line of a vehicle."""
     command = [sys.executable, "-c", WITHOUT, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
 
 
 def test_a_command_of_the_workbench_names_its_package() -> None:

@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from support.patience import PATIENCE_S
 
 from gateway.config import load_settings
 from gateway.web import Scope, TokenFile
@@ -49,7 +50,7 @@ def test_the_sandbox_scores_below_one_and_a_half_and_what_remains_is_explained()
         ["systemd-analyze", "security", "--no-pager", "--offline=true", str(DEPLOY / "springscale.service")],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE_S,
         check=True,
     ).stdout
     score = re.search(r"exposure level for springscale.service: ([\d.]+)", report)

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from support.estimates import make_record
+from support.patience import PATIENCE_S, wait_until
 
 from gateway.config import UplinkSection, VehicleSection
 from gateway.errors import ConfigurationError
@@ -69,20 +70,18 @@ def fill(store: Store, n: int) -> list[str]:
     records = [make_record(i) for i in range(n)]
     for record in records:
         store.write_estimate(record)
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     return [record["id"] for record in records]
 
 
 def deliver(store: Store, broker: FakeBroker, is_done: Callable[[Uplink], bool]) -> Uplink:
-    """Runs an uplink until ``is_done`` (10 s at most) and stops it."""
+    """Runs an uplink until ``is_done`` and stops it."""
     uplink = Uplink(SETTINGS, Outbox(store.reader(), store, "fleet"), {}, broker, BackOff(0.001, 0.002))
     uplink.start()
-    end_s = time.monotonic() + 10.0
-    while not is_done(uplink) and time.monotonic() < end_s:
-        time.sleep(0.002)
+    wait_until(lambda: is_done(uplink))
     uplink.stop()
     assert not uplink.is_alive()
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     return uplink
 
 

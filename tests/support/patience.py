@@ -1,0 +1,15 @@
+"""How long a test waits for what must come: a limit costs time only where a test fails, and machines are busy."""
+
+import time
+from collections.abc import Callable
+from typing import Final
+
+PATIENCE_S: Final = 120.0
+
+
+def wait_until(holds: Callable[[], bool]) -> bool:
+    """True as soon as ``holds`` is true, False when patience ends."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not (is_true := holds()) and time.monotonic() < end_s:
+        time.sleep(0.005)
+    return is_true
