@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 import pytest
+from support.patience import PATIENCE_S
 
 from gateway.bus.inbox import Inbox
 from gateway.records import Frames
@@ -47,15 +48,15 @@ def test_what_is_drained_makes_room_again():
 def test_a_drain_waits_for_a_put():
     inbox = Inbox(5, 8)
     threading.Timer(0.05, inbox.put, [burst(7, 1)]).start()
-    assert inbox.drain(10.0).t_ns.tolist() == [7]
+    assert inbox.drain(PATIENCE_S).t_ns.tolist() == [7]
 
 
 def test_a_closed_inbox_gives_what_it_holds_and_waits_no_more():
     inbox = Inbox(5, 8)
     inbox.put(burst(0, 2))
     inbox.close()
-    assert len(inbox.drain(60.0)) == 2
-    assert inbox.drain(60.0) is None
+    assert len(inbox.drain(PATIENCE_S)) == 2
+    assert inbox.drain(PATIENCE_S) is None
 
 
 @pytest.mark.parametrize("n_bursts", [1, 40])
@@ -65,7 +66,7 @@ def test_a_sender_that_can_wait_loses_nothing(n_bursts):
     sender.start()
     drained = []
     while len(drained) < 10 * n_bursts:
-        frames = inbox.drain(10.0)
+        frames = inbox.drain(PATIENCE_S)
         assert frames is not None
         drained += frames.t_ns.tolist()
     sender.join()
@@ -79,5 +80,5 @@ def test_closing_frees_a_sender_that_waits():
     sender = threading.Thread(target=inbox.put, args=[burst(1, 1)])
     sender.start()
     inbox.close()
-    sender.join(10.0)
+    sender.join(PATIENCE_S)
     assert not sender.is_alive()

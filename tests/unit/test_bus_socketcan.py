@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from support.patience import PATIENCE_S
 
 from gateway.bus.mapping import exact_filter, j1939_filter
 from gateway.bus.receiver import error_class_names
@@ -54,7 +55,7 @@ def test_frames_come_in_order_with_kernel_stamps(wire):
     before_ns = time.time_ns()
     for i in range(20):
         send(classic(0x100 + i, bytes([i] * (i % 9))))
-    burst = receiver.receive(5.0)
+    burst = receiver.receive(PATIENCE_S)
     assert burst.frames.can_id.tolist() == [0x100 + i for i in range(20)]
     assert burst.frames.length.tolist() == [i % 9 for i in range(20)]
     assert burst.frames.payload[10].tolist() == [10, 0, 0, 0, 0, 0, 0, 0]
@@ -66,7 +67,7 @@ def test_frames_come_in_order_with_kernel_stamps(wire):
 def test_bytes_beyond_the_length_are_zero(wire):
     send, make_receiver, _ = wire
     send(struct.pack("=IB3x8s", 0x100, 2, b"\xff" * 8))
-    assert make_receiver().receive(5.0).frames.payload.tolist() == [[255, 255, 0, 0, 0, 0, 0, 0]]
+    assert make_receiver().receive(PATIENCE_S).frames.payload.tolist() == [[255, 255, 0, 0, 0, 0, 0, 0]]
 
 
 def test_error_and_remote_frames_are_counted_not_handed_on(wire):
@@ -74,7 +75,7 @@ def test_error_and_remote_frames_are_counted_not_handed_on(wire):
     send(classic(0x20000000 | 0x040 | 0x004, bytes(8)))
     send(classic(0x40000000 | 0x100, b""))
     send(classic(0x12345678 | EXTENDED_ID, b"\1"))
-    burst = make_receiver().receive(5.0)
+    burst = make_receiver().receive(PATIENCE_S)
     assert burst.frames.can_id.tolist() == [0x12345678 | EXTENDED_ID]
     assert (burst.error_frames, burst.remote_frames) == (1, 1)
     assert burst.error_classes == {"bus_off": 1, "controller": 1}
@@ -85,7 +86,7 @@ def test_can_fd_frames_among_classic_ones(width, kept, wire):
     send, make_receiver, _ = wire
     send(classic(0x100, b"\1\2"))
     send(can_fd(0x101, b"\7" * 12))
-    frames = make_receiver(width).receive(5.0).frames
+    frames = make_receiver(width).receive(PATIENCE_S).frames
     assert frames.length.tolist() == [2, 12]
     assert frames.payload.shape == (2, width)
     assert frames.payload[1].tolist() == [7] * kept + [0] * (width - kept)
@@ -102,9 +103,9 @@ def test_the_kernels_count_of_lost_frames_is_kept(wire):
     n_sent = 200
     for _ in range(n_sent):
         send(classic(0x100, bytes(8)))
-    n_received = len(receiver.receive(5.0).frames)
+    n_received = len(receiver.receive(PATIENCE_S).frames)
     send(classic(0x100, bytes(8)))  # the count travels with the next frame
-    n_received += len(receiver.receive(5.0).frames)
+    n_received += len(receiver.receive(PATIENCE_S).frames)
     assert receiver.dropped_kernel > 0
     assert n_received + receiver.dropped_kernel == n_sent + 1
 
@@ -114,7 +115,7 @@ def test_without_kernel_stamps_frames_are_stamped_on_receipt_and_counted(wire):
     receiving.setsockopt(socket.SOL_SOCKET, 35, 0)
     before_ns = time.time_ns()
     send(classic(0x100, b"\1"))
-    burst = make_receiver().receive(5.0)
+    burst = make_receiver().receive(PATIENCE_S)
     assert burst.stamped_at_receipt == 1
     assert before_ns <= burst.frames.t_ns[0] <= time.time_ns()
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import trustme
+from support.patience import PATIENCE_S
 from support.web import Gateway, Server, serving
 
 from gateway.config import Settings, load_settings
@@ -49,7 +50,7 @@ def trusts(authority: trustme.CA, server: Server) -> bool:
     address = server.socket.getsockname()
     try:
         with (
-            socket.create_connection(address, timeout=10.0) as plain,
+            socket.create_connection(address, timeout=PATIENCE_S) as plain,
             context.wrap_socket(plain, server_hostname="127.0.0.1"),
         ):
             return True

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from support.estimates import WINDOW_NS, make_record, texts
+from support.patience import PATIENCE_S
 
 from gateway.errors import StoreError
 from gateway.records import Why
@@ -23,7 +24,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 def write(store: Store, *records: dict[str, Any]) -> list[str]:
     cursors = [store.write_estimate(record) for record in records]
-    assert store.flush(5.0)
+    assert store.flush(PATIENCE_S)
     return cursors
 
 
@@ -107,7 +108,7 @@ def test_events_and_calibrations_are_kept(store: Store) -> None:
     store.write_event("bus_lost", {"channel": "can0"})
     store.write_calibration("sha256:ab", '{"a":1}')
     store.write_calibration("sha256:ab", '{"a":1}')
-    assert store.flush(5.0)
+    assert store.flush(PATIENCE_S)
     assert [event.kind for event in store.reader().events()] == ["bus_lost", "started"]
     assert store.reader().calibration("sha256:ab") == '{"a":1}'
     assert store.reader().calibration("sha256:cd") is None
@@ -169,7 +170,7 @@ def test_the_oldest_go_when_the_size_is_reached(tmp_path: Path) -> None:
     while store.health().n_pruned == 0:
         record = {**make_record(n), "ballast": "x" * 50_000}
         store.write_estimate(record)
-        assert store.flush(5.0)
+        assert store.flush(PATIENCE_S)
         n += 1
         assert n < 40
     assert store.close() == 0
