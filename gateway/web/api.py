@@ -1,12 +1,13 @@
 """/api/v1: the latest estimate, the history, the stream, the status."""
 
 import asyncio
+import re
 from collections.abc import Callable
 from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Header, Query, Request
 from fastapi.exceptions import RequestValidationError
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
@@ -23,7 +24,20 @@ from gateway.web.stream import EVENT_SCHEMA, EventStream
 
 PREFIX: Final = "/api/v1"
 JSON: Final = "application/json"
-Cursor = Annotated[str, Field(pattern=r"^[0-9a-z]{1,32}-[0-9]{1,18}$", examples=["3f2a9c1e-1048577"])]
+_CURSOR: Final = r"^[0-9a-z]{1,32}-[0-9]{1,18}$"
+
+
+def _as_it_was_given(text: str) -> str:
+    if re.fullmatch(_CURSOR, text, re.ASCII) is None:
+        raise ValueError("send a next_cursor or last_cursor of an earlier answer, or an id of the stream, as it is")
+    return text
+
+
+Cursor = Annotated[
+    str,
+    AfterValidator(_as_it_was_given),
+    Field(json_schema_extra={"pattern": _CURSOR}, examples=["3f2a9c1e-1048577"]),
+]
 
 
 class EstimatesQuery(BaseModel):

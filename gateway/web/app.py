@@ -14,7 +14,7 @@ from gateway.web.api import api_router
 from gateway.web.board import Board
 from gateway.web.export import export_router
 from gateway.web.guard import Failures, Guard, describe_guard
-from gateway.web.headers import SecurityHeaders
+from gateway.web.headers import AnswersHead, SecurityHeaders
 from gateway.web.health import health_router
 from gateway.web.j1939 import j1939_router
 from gateway.web.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
@@ -64,7 +64,7 @@ def create_app(
 
     failures = Failures(chosen.n_wrong_tokens_per_min)
     app = _Application(
-        wrap=lambda inner: SecurityHeaders(Guard(LatestFirst(inner, board), tokens, failures), responses),
+        wrap=lambda inner: SecurityHeaders(AnswersHead(Guard(LatestFirst(inner, board), tokens, failures)), responses),
         title="Springscale",
         version=API_VERSION,
         description=_DESCRIPTION,

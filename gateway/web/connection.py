@@ -1,13 +1,18 @@
 """A connection that gives nobody more than a fair share of time, memory and places."""
 
 import asyncio
+from http import HTTPStatus
 from typing import Final
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from gateway.web.headers import SECURITY_HEADERS
+from gateway.web.problems import problem_response
+
 REQUEST_S: Final = 10.0  # from a connection's or a request's first byte to its last
 HEAD_BYTES: Final = 32_768  # request line and headers
-BODY_BYTES: Final = 65_536  # no route needs one
+BODY_BYTES: Final = 32_768  # no route needs a tenth of it
+LINGER_S: Final = 1.0  # for a refused client to read why; closed at once, its unread bytes would reset the answer away
 CONNECTIONS: Final = 512  # below the usual 1024 file descriptors of a process
 CONNECTIONS_PER_ADDRESS: Final = 128
 
@@ -15,15 +20,15 @@ CONNECTIONS_PER_ADDRESS: Final = 128
 class GuardedConnection(HttpToolsProtocol):
     """uvicorn's HTTP/1.1 protocol with the limits it leaves out.
 
-    A request that is not complete in time ends its connection (slow loris), a head or body that is too
-    long as well, and a connection too many is closed before it costs anything. Answers under way,
-    streams among them, may take as long as they like.
+    A request that is not complete in time ends its connection (slow loris). A head or body that is too long and
+    what is no HTTP are answered with a problem and end it too; a connection too many is closed before it costs
+    anything. Answers under way, streams among them, may take as long as they like.
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as in uvicorn
         super().connection_made(transport)
         self._n_head_bytes = self._n_body_bytes = 0
-        self._is_in_head = True
+        self._is_in_head = self._is_refused = False
         self._deadline: asyncio.TimerHandle | None = self.loop.call_later(REQUEST_S, transport.abort)
         if len(self.connections) > CONNECTIONS or self._n_from_same_address() > CONNECTIONS_PER_ADDRESS:
             transport.abort()
@@ -33,36 +38,68 @@ class GuardedConnection(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        if self._is_in_head:
-            self._n_head_bytes += len(data)
-        if self._n_head_bytes > HEAD_BYTES:
-            self.send_400_response("the head of a request may not be longer than 32 KiB")
+        if self._is_refused:
             return
         super().data_received(data)
+        if self._is_in_head:
+            self._n_head_bytes += len(data)
+            self._refuse_long_head()
 
     def on_message_begin(self) -> None:
         super().on_message_begin()
         self._is_in_head = True
-        self._n_body_bytes = 0
+        self._n_head_bytes = self._n_body_bytes = 0
         self._disarm()
         self._deadline = self.loop.call_later(REQUEST_S, self.transport.abort)
 
     def on_headers_complete(self) -> None:
         self._is_in_head = False
-        self._n_head_bytes = 0
-        super().on_headers_complete()
+        self._n_head_bytes = len(self.url) + sum(len(name) + len(text) for name, text in self.headers)
+        self._refuse_long_head()
+        if not self._is_refused:
+            super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
         self._n_body_bytes += len(body)
-        if self._n_body_bytes > BODY_BYTES:
-            self.transport.abort()
-            return
-        super().on_body(body)
+        if self._n_body_bytes > BODY_BYTES and self.cycle.response_complete:
+            self._hear_no_more()  # it was answered before its end
+        elif self._n_body_bytes > BODY_BYTES:
+            self._refuse(413, "the body of a request may not be longer than 32 KiB")
+        if not self._is_refused:
+            super().on_body(body)
 
     def on_message_complete(self) -> None:
+        if not self._is_refused:
+            self._disarm()
+            super().on_message_complete()
+
+    def send_400_response(self, msg: str) -> None:
+        """uvicorn's answer to what it cannot read."""
+        self._refuse(400, "this is no request that HTTP knows")
+
+    def _refuse_long_head(self) -> None:
+        if self._n_head_bytes > HEAD_BYTES:
+            self._refuse(431, "the head of a request may not be longer than 32 KiB")
+
+    def _refuse(self, status: int, detail: str) -> None:
+        """Answer once, unless the application has begun to, and close."""
+        if self._is_refused:
+            return
+        self._hear_no_more()
+        if self.cycle is not None and not self.cycle.response_complete:
+            if self.cycle.response_started:
+                self.transport.abort()  # no second answer into the first
+                return
+            self.cycle.disconnected = True  # the application's own answer comes too late
+            self.cycle.message_event.set()
+        self.transport.write(_on_the_wire(status, detail))
+        if self.transport.can_write_eof():  # TLS cannot
+            self.transport.write_eof()
+
+    def _hear_no_more(self) -> None:
+        self._is_refused = True
         self._disarm()
-        self._is_in_head = True
-        super().on_message_complete()
+        self._deadline = self.loop.call_later(LINGER_S, self.transport.close)
 
     def _n_from_same_address(self) -> int:
         mine = self.client and self.client[0]
@@ -73,3 +110,11 @@ class GuardedConnection(HttpToolsProtocol):
         if self._deadline is not None:
             self._deadline.cancel()
             self._deadline = None
+
+
+def _on_the_wire(status: int, detail: str) -> bytes:
+    """A whole answer for where there is no application: problem details under the headers that all answers carry."""
+    problem = problem_response(status, detail)
+    head = [*problem.raw_headers, *SECURITY_HEADERS, (b"cache-control", b"no-store"), (b"connection", b"close")]
+    lines = [b"HTTP/1.1 %d %s" % (status, HTTPStatus(status).phrase.encode()), *(b": ".join(pair) for pair in head)]
+    return b"\r\n".join(lines) + b"\r\n\r\n" + bytes(problem.body)

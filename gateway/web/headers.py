@@ -1,5 +1,6 @@
-"""Headers every answer carries, and a count of the answers."""
+"""Headers every answer carries, a count of the answers, and answers of headers alone."""
 
+import asyncio
 from collections import Counter
 from typing import Final
 
@@ -54,3 +55,32 @@ class SecurityHeaders:
             await send(message)
 
         await self._app(scope, receive, send_with_headers)
+
+
+class AnswersHead:
+    """ASGI middleware: HEAD is answered as GET is, without the body (RFC 9110, 9.3.2).
+
+    What would go on, a stream or a file, is told that the client is gone.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self._app(scope, receive, send)
+            return
+        answered = asyncio.Event()
+
+        async def send_head(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                await send(message)
+            elif not answered.is_set():
+                answered.set()
+                await send({"type": "http.response.body", "body": b""})
+
+        async def gone() -> Message:
+            await answered.wait()
+            return {"type": "http.disconnect"}
+
+        await self._app({**scope, "method": "GET"}, gone, send_head)

@@ -2,7 +2,7 @@
 
 import http
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -12,18 +12,23 @@ from starlette.responses import JSONResponse, Response
 from gateway.errors import StoreError
 from gateway.web.schemas import Fault, Problem
 
-MEDIA_TYPE = "application/problem+json"
+MEDIA_TYPE: Final = "application/problem+json"
+_PLAINER: Final = {  # than pydantic says it
+    "extra_forbidden": "this is not known here: /docs lists what is",
+    "model_attributes_type": "send a JSON object, with Content-Type: application/json",
+    "json_invalid": "this is no JSON",
+}
 
 
 def problem_response(
     status: int,
     detail: str,
-    instance: str,
+    instance: str | None = None,
     errors: Sequence[Fault] | None = None,
     reason: str | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """A problem as it goes over the wire."""
+    """A problem as it goes over the wire; ``instance`` is the path that was asked for, where it is known."""
     problem = Problem(
         title=http.HTTPStatus(status).phrase,
         status=status,
@@ -61,14 +66,22 @@ async def _http(request: Request, error: Exception) -> Response:
         detail = "there is nothing at this address: /openapi.json lists what there is"
     elif error.status_code == 405:
         detail = f"{request.method} is not possible here"
-    return problem_response(error.status_code, detail, request.url.path, headers=error.headers)
+    return problem_response(error.status_code, detail, request.url.path, headers=_with_head(error.headers))
+
+
+def _with_head(headers: Mapping[str, str] | None) -> Mapping[str, str] | None:
+    """Where GET is allowed, HEAD is (headers.AnswersHead), which the routes do not know."""
+    if headers is None or "GET" not in (allowed := headers.get("Allow", "").split(", ")) or "HEAD" in allowed:
+        return headers
+    return {**headers, "Allow": ", ".join([*allowed, "HEAD"])}
 
 
 async def _invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     said: dict[str, str] = {}
     for fault in error.errors():  # all parameters are flat; deeper places are pydantic's own branches
-        said.setdefault(".".join(map(str, fault["loc"][:2])), fault["msg"].removeprefix("Value error, "))
+        what = _PLAINER.get(fault["type"], fault["msg"].removeprefix("Value error, "))
+        said.setdefault(".".join(map(str, fault["loc"][:2])), what)
     detail = "; ".join(f"{where}: {what}" for where, what in said.items())
     faults = [Fault(where=where, what=what) for where, what in said.items()]
     status = 400 if request.url.path.startswith("/rfms/") else 422  # rFMS knows no 422

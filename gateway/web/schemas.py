@@ -110,7 +110,7 @@ class Problem(BaseModel):
     title: str = Field(examples=["Unprocessable Content"])
     status: int = Field(examples=[422])
     detail: str = Field(examples=["query.limit: Input should be less than or equal to 1000"])
-    instance: str = Field(examples=["/api/v1/estimates"])
+    instance: str | None = Field(None, examples=["/api/v1/estimates"])
     reason: str | None = Field(None, description="for programs, where a person could mend it", examples=["stale"])
     errors: list[Fault] | None = None
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from support.estimates import make_record, texts
+from support.patience import PATIENCE_S
 from support.web import Client, Gateway
 
 from gateway.records import Why
@@ -163,7 +164,7 @@ def test_an_unforeseen_error_is_a_problem_without_its_inside(gateway: Gateway, c
 
 def test_a_store_that_cannot_be_read_is_503(gateway: Gateway, client: Client, tmp_path: Path) -> None:
     gateway.publish(make_record(0))
-    assert gateway.store.flush(10.0)
+    assert gateway.store.flush(PATIENCE_S)
     gateway.store.close()
     (tmp_path / "springscale.db").write_bytes(b"no database at all" * 1000)
     answer = client.get("/api/v1/estimates")

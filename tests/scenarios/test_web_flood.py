@@ -1,17 +1,18 @@
 """Connections that mean no good: slow, endless, too many. Others are answered all the while."""
 
 import asyncio
+import json
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from support.patience import PATIENCE_S
 from support.web import Gateway, Server, serving
 
 from gateway.web import connection
 
-LIMIT_S = 20.0
 STRANGER = "127.0.0.2"  # another address of this machine
 
 Connection = tuple[asyncio.StreamReader, asyncio.StreamWriter]
@@ -26,15 +27,24 @@ async def ended(connection: Connection) -> bytes:
     """What the server said before it ended the connection."""
     reader, writer = connection
     try:
-        said = await asyncio.wait_for(reader.read(), LIMIT_S)
+        said = await asyncio.wait_for(reader.read(), PATIENCE_S)
     except ConnectionResetError:
         said = b""
     writer.transport.abort()
     return said
 
 
+def assert_problem(said: bytes, status: int) -> None:
+    """One whole answer that says what is wrong, in the form and under the headers of all others."""
+    head, _, body = said.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 %d " % status)
+    assert b"\r\ncontent-type: application/problem+json\r\n" in head
+    assert b"\r\nx-content-type-options: nosniff\r\n" in head
+    assert json.loads(body)["status"] == status
+
+
 async def assert_others_are_answered(server: Server) -> None:
-    async with httpx.AsyncClient(timeout=LIMIT_S) as client:
+    async with httpx.AsyncClient(timeout=PATIENCE_S) as client:
         assert (await client.get(f"{server.url}/api/v1/estimates/latest")).status_code == 200
 
 
@@ -81,7 +91,7 @@ def test_more_connections_than_one_address_may_have_are_closed(tmp_path: Path, m
         await assert_others_are_answered(server)
         for _, writer in flood[:10]:
             writer.transport.abort()
-        async with asyncio.timeout(LIMIT_S):
+        async with asyncio.timeout(PATIENCE_S):
             while len(server.uvicorn.server_state.connections) > 0:
                 await asyncio.sleep(0.005)
         reader, writer = await connect(server)  # places are given back
@@ -100,23 +110,52 @@ def test_an_endless_head_is_refused(tmp_path: Path, head: bytes) -> None:
     async def scenario(server: Server) -> None:
         stranger = await connect(server)
         stranger[1].write(head)
-        said = await ended(stranger)
-        assert said == b"" or said.startswith(b"HTTP/1.1 400")  # the reset may overtake the answer
+        assert_problem(await ended(stranger), 431)
         await assert_others_are_answered(server)
 
     run(tmp_path, scenario)
 
 
-@pytest.mark.parametrize("kind", [b"Content-Length: 100000000", b"Transfer-Encoding: chunked"])
-def test_an_endless_body_is_cut_off(tmp_path: Path, kind: bytes) -> None:
+ENDLESS_BODY = (b"8000\r\n" + b"x" * 0x8000 + b"\r\n") * 8
+ENDLESS = [b"Content-Length: 100000000", b"Transfer-Encoding: chunked"]
+
+
+@pytest.mark.parametrize("kind", ENDLESS)
+def test_an_endless_body_is_refused(tmp_path: Path, kind: bytes) -> None:
     async def scenario(server: Server) -> None:
         stranger = await connect(server)
-        _, writer = stranger
-        writer.write(b"POST /api/v1/status HTTP/1.1\r\nHost: localhost\r\n" + kind + b"\r\n\r\n")
-        writer.write((b"10000\r\n" + b"x" * 0x10000 + b"\r\n") * 16)
-        said = await ended(stranger)
-        assert said == b"" or said.startswith(b"HTTP/1.1 4")
+        head = b"POST /api/v1/calibration/tare HTTP/1.1\r\nHost: localhost\r\n" + kind + b"\r\n\r\n"
+        stranger[1].write(head + ENDLESS_BODY)
+        assert_problem(await ended(stranger), 413)
         await assert_others_are_answered(server)
+
+    run(tmp_path, scenario)
+
+
+@pytest.mark.parametrize("kind", ENDLESS)
+def test_an_endless_body_after_the_answer_is_cut_off(
+    tmp_path: Path, kind: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connection, "LINGER_S", 0.05)
+
+    async def scenario(server: Server) -> None:
+        reader, writer = stranger = await connect(server)
+        writer.write(b"POST /api/v1/status HTTP/1.1\r\nHost: localhost\r\n" + kind + b"\r\n\r\n")
+        assert (await reader.readuntil(b"}")).startswith(b"HTTP/1.1 405")
+        writer.write(ENDLESS_BODY)
+        assert await ended(stranger) == b""
+        await assert_others_are_answered(server)
+
+    run(tmp_path, scenario)
+
+
+def test_many_requests_in_one_breath_are_no_long_head(tmp_path: Path) -> None:
+    async def scenario(server: Server) -> None:
+        reader, writer = await connect(server)
+        writer.write(b"GET /health/live HTTP/1.1\r\nHost: localhost\r\n\r\n" * 1000)
+        for _ in range(1000):
+            assert (await reader.readuntil(b'{"is_alive":true}')).startswith(b"HTTP/1.1 200")
+        writer.transport.abort()
 
     run(tmp_path, scenario)
 
@@ -135,7 +174,7 @@ def test_what_is_no_request_ends_with_400(tmp_path: Path, request_text: bytes) -
     async def scenario(server: Server) -> None:
         stranger = await connect(server)
         stranger[1].write(request_text)
-        assert (await ended(stranger)).startswith(b"HTTP/1.1 400")
+        assert_problem(await ended(stranger), 400)
         await assert_others_are_answered(server)
 
     run(tmp_path, scenario)
