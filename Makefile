@@ -55,9 +55,10 @@ vcan: .venv/.package
 soak: .venv/.development
 	$(BIN)/python benchmarks/soak.py --output build/soak.json
 
-# Debian packages in build/, for this machine's architecture; dpkg-deb must be there, root need not.
+# Debian packages in build/, for this machine's architecture or another, such as `make deb ARCHITECTURE=arm64`; dpkg-deb
+# must be there, root need not.
 deb: .venv/.package
-	$(BIN)/python deploy/deb/build.py
+	$(BIN)/python deploy/deb/build.py $(if $(ARCHITECTURE),--architecture $(ARCHITECTURE))
 
 # The pictures in README.md; needs chromium.
 screenshots: .venv/.development

@@ -4,12 +4,11 @@ springscale            what a vehicle needs: the service, its tools, estimators 
 springscale-workbench  what only a desk needs: simulator, demo, reproduction, figures (numba, matplotlib)
 
 Both hold one relocatable tree, /usr/lib/springscale, with every dependency at its locked version: nothing of the
-system's Python packages is used. Wheels are chosen by pip for the machine that builds: an arm64 package is built on
-arm64 (or in its container), from the same files.
+system's Python packages is used. Wheels are chosen for Debian 12 on the architecture asked for, and all else is the
+same on every processor, so any machine builds the package of any other.
 """
 
 import argparse
-import gzip
 import os
 import shutil
 import subprocess
@@ -20,6 +19,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
+from documents import document, normal_name, write_gzipped
+from machine_code import PROCESSORS, require_own_code, wheel_options
+
 HERE: Final = Path(__file__).resolve().parent
 PROJECT: Final = HERE.parents[1]
 DEPLOY: Final = PROJECT / "deploy"
@@ -27,8 +29,9 @@ TREE: Final = Path("usr/lib/springscale")
 PYTHON: Final = f"python{sys.version_info.major}.{sys.version_info.minor}"
 
 WORKBENCH: Final = frozenset(  # distributions that only the workbench's commands import
-    ("contourpy", "cycler", "fonttools", "kiwisolver", "llvmlite", "matplotlib", "numba", "pillow", "pyparsing")
-)
+    ("contourpy", "cycler", "fonttools", "kiwisolver", "llvmlite", "matplotlib", "narwhals", "numba", "pillow",
+     "plotly", "pyparsing")
+)  # fmt: skip
 SOURCES: Final = ("gateway", "dbc", "pyproject.toml", "README.md", "LICENSE")
 
 # (source below the project, target in the package)
@@ -41,6 +44,7 @@ FILES: Final = (
     ("deploy/network", "usr/share/springscale/network"),
     ("deploy/grafana", "usr/share/springscale/grafana"),
     ("deploy/prometheus", "usr/share/springscale/prometheus"),
+    ("CHANGELOG.md", "usr/share/doc/springscale/CHANGELOG.md"),
 )
 
 LAUNCHER: Final = f"""\
@@ -70,14 +74,16 @@ VEHICLE: Final = {
     "depends": f"{PYTHON}, libc6, libstdc++6, systemd",
     "further": "Recommends: can-utils, iproute2\nSuggests: springscale-workbench\n",
     "summary": """weighs a vehicle by listening to its springs
- Reads vertical acceleration, pitch rate and speed from a CAN bus and gives the payload and the front axle's share,
- each with its 95 % interval, over HTTP. Listens only. A systemd service with its tools.""",
+ Reads vertical acceleration, pitch rate and speed from a CAN bus and gives the
+ payload and the front axle's share, each with its 95 % interval, over HTTP.
+ Listens only. A systemd service with its tools.""",
 }
 DESK: Final = {
     "depends": "springscale (= {version})",
     "further": "",
     "summary": """simulator, demonstration and figures of Springscale
- What a desk needs and a vehicle does not: the commands demo, simulate and reproduce, and figures in reports.""",
+ What a desk needs and a vehicle does not: the commands demo, simulate and
+ reproduce, and figures in reports.""",
 }
 
 
@@ -85,20 +91,22 @@ def main() -> None:
     """Both packages into the output folder; prints their names and sizes."""
     arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     arguments.add_argument("--output", type=Path, default=PROJECT / "build")
-    output: Path = arguments.parse_args().output
+    arguments.add_argument("--architecture", choices=PROCESSORS, help="by default this machine's")
+    asked = arguments.parse_args()
+    output: Path = asked.output
+    architecture = asked.architecture or subprocess.check_output(["dpkg", "--print-architecture"], text=True).strip()
     output.mkdir(parents=True, exist_ok=True)
     os.environ.setdefault("SOURCE_DATE_EPOCH", last_change_s())
     with TemporaryDirectory(dir=output, prefix="deb-") as folder:
         vehicle, desk = Path(folder) / "springscale", Path(folder) / "springscale-workbench"
-        install(vehicle / TREE)
+        install(vehicle / TREE, architecture)
         part(vehicle / TREE, desk / TREE)
-        for root in (vehicle, desk):
-            compile_all(root)
         furnish(vehicle)
-        for root in (vehicle, desk):
-            copy(PROJECT / "LICENSE", root / "usr/share/doc" / root.name / "copyright")
         for root, fields in ((vehicle, VEHICLE), (desk, DESK)):
-            package = pack(root, fields, output)
+            require_own_code(root / TREE, architecture)
+            compile_all(root)
+            document(root, root / TREE, version())
+            package = pack(root, fields, architecture, output)
             print(f"{package}: {package.stat().st_size / 1e6:.0f} MB, {installed_kib(root) / 1e3:.0f} MB installed")
 
 
@@ -109,17 +117,22 @@ def last_change_s() -> str:
     return asked.stdout.strip() or str(int((PROJECT / "pyproject.toml").stat().st_mtime))
 
 
-def install(tree: Path) -> None:
+def install(tree: Path, architecture: str) -> None:
     """The locked requirements and the package itself into ``tree``."""
     pip = [sys.executable, "-m", "pip", "install", "-qq", "--no-compile", "--no-deps", "--target", str(tree)]
     pip.append("--disable-pip-version-check")
-    subprocess.run([*pip, "--require-hashes", "-r", str(PROJECT / "requirements.txt")], check=True)
+    locked = ["--require-hashes", "-r", str(PROJECT / "requirements.txt")]
+    subprocess.run([*pip, *wheel_options(architecture), *locked], check=True)
     with TemporaryDirectory() as folder:  # setuptools leaves its traces beside what it builds
         for name in SOURCES:
             copy(PROJECT / name, Path(folder) / name)
         subprocess.run([*pip, "--upgrade", folder], check=True)
     for leftover in ("bin", "share"):  # launchers of libraries, manual pages
         shutil.rmtree(tree / leftover, ignore_errors=True)
+    for tests in [folder for folder in tree.rglob("tests") if folder.is_dir()]:  # the libraries' own: nobody runs them
+        shutil.rmtree(tests, ignore_errors=True)  # some lie within others
+    for library in tree.rglob("*.so*"):
+        library.chmod(0o644)
 
 
 def part(tree: Path, desk: Path) -> None:
@@ -146,11 +159,6 @@ def remove_empty(folder: Path, tree: Path) -> None:
         folder = folder.parent
 
 
-def normal_name(found: Distribution) -> str:
-    """Name as package indexes compare it."""
-    return found.metadata["Name"].lower().replace("_", "-").replace(".", "-")
-
-
 def compile_all(root: Path) -> None:
     """Byte code made now, never checked again: the first start is as quick as the hundredth, on read-only disks too."""
     options = ["-q", "-j", "0", "--invalidation-mode", "unchecked-hash", "-s", str(root), "-p", "/"]
@@ -165,21 +173,21 @@ def furnish(root: Path) -> None:
     launcher.parent.mkdir(parents=True)
     launcher.write_text(LAUNCHER)
     launcher.chmod(0o755)
-    documents = root / "usr/share/doc/springscale"
-    documents.mkdir(parents=True)
     for page in sorted((PROJECT / "docs").glob("*.md")):
-        copy(page, documents / page.name)
-    with gzip.GzipFile(documents / "changelog.gz", "wb", mtime=0) as changelog:
-        changelog.write((PROJECT / "CHANGELOG.md").read_bytes())
+        copy(page, root / "usr/share/doc/springscale" / page.name)
+    write_gzipped(root / "usr/share/man/man1/springscale.1.gz", (HERE / "springscale.1").read_text())
 
 
-def pack(root: Path, fields: dict[str, str], output: Path) -> Path:
+def version() -> str:
+    """Of the project."""
+    return str(tomllib.loads((PROJECT / "pyproject.toml").read_text())["project"]["version"])
+
+
+def pack(root: Path, fields: dict[str, str], architecture: str, output: Path) -> Path:
     """The .deb of one tree; scripts and conffiles belong to the vehicle's package alone."""
-    version = tomllib.loads((PROJECT / "pyproject.toml").read_text())["project"]["version"]
-    architecture = subprocess.check_output(["dpkg", "--print-architecture"], text=True).strip()
-    filled = {key: text.format(version=version) if "{version}" in text else text for key, text in fields.items()}
+    filled = {key: text.format(version=version()) if "{version}" in text else text for key, text in fields.items()}
     control = CONTROL.format(
-        name=root.name, version=version, architecture=architecture, size_kib=installed_kib(root), **filled
+        name=root.name, version=version(), architecture=architecture, size_kib=installed_kib(root), **filled
     )
     (root / "DEBIAN").mkdir()
     (root / "DEBIAN/control").write_text(control)
@@ -188,7 +196,7 @@ def pack(root: Path, fields: dict[str, str], output: Path) -> Path:
         for script in ("postinst", "prerm", "postrm"):
             copy(HERE / script, root / "DEBIAN" / script)
             (root / "DEBIAN" / script).chmod(0o755)
-    package = output / f"{root.name}_{version}_{architecture}.deb"
+    package = output / f"{root.name}_{version()}_{architecture}.deb"
     subprocess.run(
         ["dpkg-deb", "--root-owner-group", "-Zzstd", "-z12", "--build", str(root), str(package)],
         check=True,

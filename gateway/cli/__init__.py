@@ -36,7 +36,8 @@ _COMMANDS = {
 }
 
 
-_WORKBENCH = frozenset({"matplotlib", "numba"})  # the vehicle's Debian package leaves these to a package for desks
+# The vehicle's Debian package leaves these to a package for desks.
+_WORKBENCH = frozenset({"matplotlib", "numba", "plotly"})
 
 
 class _Lazy(click.Group):

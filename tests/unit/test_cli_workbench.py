@@ -1,4 +1,4 @@
-"""A vehicle has no numba and no matplotlib: what needs them says where they are, the rest works without."""
+"""A vehicle has no numba, matplotlib or plotly: what needs them says where they are, the rest works without."""
 
 import subprocess
 import sys
@@ -8,7 +8,7 @@ from support.patience import PATIENCE_S
 
 WITHOUT = """
 import sys
-for name in ("numba", "matplotlib"):
+for name in ("numba", "matplotlib", "plotly"):
     sys.modules[name] = None
 from gateway.cli import main
 main(sys.argv[1:])

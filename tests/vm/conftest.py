@@ -20,8 +20,8 @@ _FINDINGS = pytest.StashKey[dict[str, dict[str, object]]]()
 
 
 def _package() -> Path:
-    """The package under test: what `make deb` left, unless SPRINGSCALE_DEB names another."""
-    found = list(BUILD.glob("springscale_*.deb"))
+    """The package under test: what `make deb` left for such a machine, unless SPRINGSCALE_DEB names another."""
+    found = list(BUILD.glob("springscale_*_amd64.deb"))
     named = os.environ.get("SPRINGSCALE_DEB")
     if named is None and not found:
         pytest.skip("no package to test: make deb")
