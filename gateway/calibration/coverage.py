@@ -33,11 +33,6 @@ class Coverage:
     low: float
     high: float
 
-    @property
-    def falls_short(self) -> bool:
-        """True where the limits lie wholly outside 90 to 99 %: too narrow intervals, or too wide ones."""
-        return self.high < PROMISED[0] or self.low > PROMISED[1]
-
 
 def coverage_of(covered: Sequence[bool], cluster: Sequence[Hashable]) -> Coverage:
     """Pooled over all; ``cluster`` (n,) tells which tries belong together.

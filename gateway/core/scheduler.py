@@ -43,11 +43,6 @@ class Scheduler:
         """Of the drive that is under way; None between drives. Safe from any thread."""
         return None if self._newest_ns is None else self._drive_start_ns
 
-    @property
-    def collected_s(self) -> float:
-        """How much of the current window has been seen, in seconds."""
-        return 0.0 if self._newest_ns is None else (self._newest_ns - self._window_start_ns) / NS_PER_S
-
     def feed(self, motion: Motion) -> Iterator[Batch]:
         """Take rows in order of arrival; yield the batches that end with them."""
         begin = 0

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-from gateway.units import STANDARD_GRAVITY_MPS2
-
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
@@ -55,9 +53,3 @@ def payload_position_m(vehicle: Vehicle, payload_kg: float, share_pct: float) ->
     total_kg = vehicle.empty_mass_kg + payload_kg
     front_kg = share_pct / 100.0 * total_kg - vehicle.empty_front_share_pct / 100.0 * vehicle.empty_mass_kg
     return vehicle.wheelbase_m * (1.0 - front_kg / payload_kg)
-
-
-def axle_loads_n(vehicle: Vehicle, payload_kg: float, share_pct: float) -> tuple[float, float]:
-    """Static weight of the sprung mass on the front and the rear axle, in newtons."""
-    weight_n = (vehicle.empty_mass_kg + payload_kg) * STANDARD_GRAVITY_MPS2
-    return weight_n * share_pct / 100.0, weight_n * (1.0 - share_pct / 100.0)

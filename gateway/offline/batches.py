@@ -1,6 +1,5 @@
 """Logs in, batches out: the same decoder and scheduler as the live service, without its clock and threads."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,16 +11,6 @@ from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.records import Batch, Motion
 from gateway.units import NS_PER_S
-
-
-def batches_of_log(log: Path, signal_map: SignalMap, settings: BatchSettings) -> Iterator[Batch]:
-    """Every batch of one log, in order. Raises LogUnreadableError where nothing in it can be read."""
-    scheduler = Scheduler(settings, signal_map.traits)
-    motions, report, _ = motion_of_log(log, signal_map)
-    for motion in motions:
-        yield from scheduler.feed(motion)
-    report.require_frames()
-    yield from scheduler.flush()
 
 
 def motion_of_whole_log(log: Path, signal_map: SignalMap) -> Motion:

@@ -72,12 +72,6 @@ class TareDesk:
         self._drop_others()
         self._use()
 
-    @property
-    def active_id(self) -> str | None:
-        """Of the tare in use; None: the factory zero."""
-        active = self._active()
-        return None if active is None else active.id
-
     def told(self) -> str:
         """JSON: the tare in use, what another would be made from now, and the history, newest first."""
         active = self._active()

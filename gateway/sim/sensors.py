@@ -133,5 +133,3 @@ CANMOD: Final = Sensors(  # resolutions of CSS Electronics' CANmod.gps as its DB
     clock=Clock(error_ppm=50.0, jitter_mean_s=3e-4, lost_share=1e-4),
     engine=Engine(level_mps2=0.25),
 )
-
-SENSOR_SETS: Final = {"ideal": IDEAL, "reference": REFERENCE, "canmod": CANMOD}

@@ -49,12 +49,6 @@ def test_the_limits_hold_the_true_share_when_runs_differ() -> None:
     assert n_naive < n_held
 
 
-@pytest.mark.parametrize(("n_misses", "falls_short"), [(0, False), (10, False), (40, True)])
-def test_only_limits_wholly_outside_what_is_promised_fall_short(n_misses: int, falls_short: bool) -> None:
-    covered = [i >= n_misses for i in range(200)]
-    assert coverage_of(covered, list(range(200))).falls_short is falls_short
-
-
 def test_one_run_tells_nothing_of_how_runs_scatter() -> None:
     with pytest.raises(ValueError, match="at least two runs"):
         coverage_of([True, False], ["a", "a"])

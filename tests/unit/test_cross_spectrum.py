@@ -7,7 +7,7 @@ import pytest
 
 from gateway.calibration.grey_box import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum
 from gateway.core.cross_spectrum import CrossSpectrum, CrossSpectrumCalibration
-from gateway.core.grey_model import PARAMETERS, in_units
+from gateway.core.grey_model import INDEX, PARAMETERS
 from gateway.core.known_run import KnownRun
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import Batch, Estimate, Why
@@ -33,11 +33,11 @@ def weigh(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
 def test_calibration_finds_the_vehicle(calibration: CrossSpectrumCalibration) -> None:
     theta = calibration.parameters
     assert calibration.names == PARAMETERS
-    assert in_units(theta, "spring_front_npm") == pytest.approx(CAR.front.spring_npm, rel=0.05)
-    assert in_units(theta, "spring_rear_npm") == pytest.approx(CAR.rear.spring_npm, rel=0.05)
-    assert in_units(theta, "damper_rear_nspm") == pytest.approx(CAR.rear.damper_nspm, rel=0.05)
-    assert in_units(theta, "pitch_inertia_kgm2") == pytest.approx(CAR.pitch_inertia_kgm2, rel=0.02)
-    assert in_units(theta, "sensor_position_m") == pytest.approx(CAR.sensor_position_m, abs=0.02)
+    assert np.exp(theta[INDEX["spring_front_npm"]]) == pytest.approx(CAR.front.spring_npm, rel=0.05)
+    assert np.exp(theta[INDEX["spring_rear_npm"]]) == pytest.approx(CAR.rear.spring_npm, rel=0.05)
+    assert np.exp(theta[INDEX["damper_rear_nspm"]]) == pytest.approx(CAR.rear.damper_nspm, rel=0.05)
+    assert np.exp(theta[INDEX["pitch_inertia_kgm2"]]) == pytest.approx(CAR.pitch_inertia_kgm2, rel=0.02)
+    assert theta[INDEX["sensor_position_m"]] == pytest.approx(CAR.sensor_position_m, abs=0.02)
     assert calibration.warnings == ()
 
 

@@ -1,10 +1,10 @@
-"""Front share, payload position and axle loads: statics of the sprung mass."""
+"""Front share and payload position: statics of the sprung mass."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.core.vehicle import Vehicle, axle_loads_n, front_share_pct, payload_position_m
+from gateway.core.vehicle import Vehicle, front_share_pct, payload_position_m
 
 vehicles = st.builds(
     Vehicle,
@@ -32,18 +32,12 @@ def test_share_and_position_are_inverse(van: Vehicle, load_kg: float, position_m
 
 @given(van=vehicles, load_kg=loads_kg)
 def test_a_load_over_an_axle_rests_on_it_alone(van: Vehicle, load_kg: float) -> None:
-    empty_front_n, empty_rear_n = axle_loads_n(van, 0.0, van.empty_front_share_pct)
-    front_n, rear_n = axle_loads_n(van, load_kg, front_share_pct(van, load_kg, 0.0))
-    assert front_n - empty_front_n == pytest.approx(9.80665 * load_kg, rel=1e-6)
-    assert rear_n == pytest.approx(empty_rear_n, rel=1e-9)
-    _, rear_n = axle_loads_n(van, load_kg, front_share_pct(van, load_kg, van.wheelbase_m))
-    assert rear_n - empty_rear_n == pytest.approx(9.80665 * load_kg, rel=1e-6)
+    def front_kg(payload_kg: float, position_m: float) -> float:
+        return front_share_pct(van, payload_kg, position_m) / 100.0 * (van.empty_mass_kg + payload_kg)
 
-
-@given(van=vehicles, load_kg=loads_kg, share_pct=st.floats(30.0, 70.0))
-def test_axle_loads_add_up_to_the_weight(van: Vehicle, load_kg: float, share_pct: float) -> None:
-    front_n, rear_n = axle_loads_n(van, load_kg, share_pct)
-    assert front_n + rear_n == pytest.approx((van.empty_mass_kg + load_kg) * 9.80665, rel=1e-12)
+    empty_kg = front_kg(0.0, 0.0)
+    assert front_kg(load_kg, 0.0) - empty_kg == pytest.approx(load_kg, rel=1e-6)
+    assert front_kg(load_kg, van.wheelbase_m) == pytest.approx(empty_kg, rel=1e-9)
 
 
 @given(van=vehicles)
