@@ -1,5 +1,6 @@
 """The campaign file: which known-load drives were recorded, with which vehicle."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,9 +10,10 @@ from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CampaignError
 from gateway.toml_file import load_toml
 
-Percent = Annotated[float, Field(gt=0.0, lt=100.0)]
-Kilograms = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Metres = Annotated[float, Field(allow_inf_nan=False)]
+# Bounds that no road vehicle reaches, so that a fraction for percent, millimetres or tonnes are named at once
+Percent = Annotated[float, Field(ge=1.0, le=99.0)]
+Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0)]
+Metres = Annotated[float, Field(ge=-10.0, le=30.0)]
 
 
 class _Table(BaseModel):
@@ -22,14 +24,14 @@ class VehicleTable(_Table):
     """[vehicle]: masses and share are of the sprung mass."""
 
     name: str = Field(min_length=1)
-    empty_mass_kg: float = Field(gt=0.0)
-    wheelbase_m: float = Field(gt=0.0)
+    empty_mass_kg: float = Field(ge=100.0, le=100_000.0)
+    wheelbase_m: float = Field(ge=0.8, le=20.0)
     empty_front_share_pct: Percent = 50.0
     sensor_position_m: Metres
     payload_range_kg: tuple[Kilograms, Kilograms] = (0.0, 450.0)
     front_share_range_pct: tuple[Percent, Percent] = (40.0, 60.0)
-    sensor_position_std_m: float = Field(0.1, gt=0.0)
-    empty_front_share_std_pct: float = Field(0.5, gt=0.0)
+    sensor_position_std_m: float = Field(0.1, gt=0.0, le=10.0)
+    empty_front_share_std_pct: float = Field(0.5, gt=0.0, le=50.0)
     sensor_offset_left_m: Metres = 0.0
     unsprung_front_kg: float | None = Field(None, gt=0.0)
     unsprung_rear_kg: float | None = Field(None, gt=0.0)
@@ -107,13 +109,22 @@ class Campaign:
 
 
 def load_campaign(path: Path) -> Campaign:
-    """Raises CampaignError naming every fault of the file, and every log that is not there."""
+    """Raises CampaignError naming every fault of the file, every log that is not there and every load that cannot be."""
     campaign = Campaign(path, load_toml(path, CampaignTable, CampaignError))
-    missing = [
-        f"{path}: runs[{i}].log: {run.log}: no such file"
-        for i, run in enumerate(campaign.runs, 1)
-        if not campaign.log_of(run).is_file()
+    faults = [
+        f"{path}: runs[{i}].{fault}" for i, run in enumerate(campaign.runs, 1) for fault in _faults(campaign, run)
     ]
-    if missing:
-        raise CampaignError("\n".join(missing))
+    if faults:
+        raise CampaignError("\n".join(faults))
     return campaign
+
+
+def _faults(campaign: Campaign, run: RunTable) -> Iterator[str]:
+    if not campaign.log_of(run).is_file():
+        yield f"log: {run.log}: no such file"
+    share_pct = campaign.front_share_pct(run)
+    if not 0.0 < share_pct < 100.0:
+        yield (
+            f"payload_position_m: {run.payload_kg:g} kg at {run.payload_position_m:g} m would put {share_pct:.0f} % of "
+            "the weight on the front axle and lift the other; it is measured from the front axle rearwards"
+        )
