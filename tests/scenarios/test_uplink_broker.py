@@ -11,7 +11,7 @@ import pytest
 import trustme
 from support.broker import CuttableLink, Listener, needs_mosquitto, running_broker
 from support.estimates import make_record
-from support.patience import wait_until
+from support.patience import PATIENCE_S, wait_until
 
 from gateway.store import Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings
@@ -87,7 +87,7 @@ def _stored_beforehand(state: Path) -> list[str]:
         ids.append(record["id"])
         store.write_estimate(record)
         if n % 1000 == 999:  # what waits in memory is bounded
-            assert store.flush(30.0)
+            assert store.flush(PATIENCE_S)
     store.close()
     return ids
 
@@ -110,9 +110,9 @@ def test_a_message_says_what_it_is(tmp_path: Path) -> None:
         record = make_record(1)
         store.write_estimate(record)
         uplink = started(store, settings_of(broker.port))
-        listener.wait_for(2, 10.0)
+        listener.wait_for(2)
         uplink.stop()
-        listener.wait_for(3, 10.0)
+        listener.wait_for(3)
         listener.close()
         store.close()
     birth, estimate, farewell = listener.heard
@@ -189,9 +189,9 @@ def test_a_killed_vehicle_is_announced_by_its_will(tmp_path: Path, monkeypatch: 
         listener = Listener(broker.port, "springscale/van-17/status")
         store = Store.open(tmp_path / "state")
         uplink = started(store, settings_of(link.port))
-        listener.wait_for(1, 10.0)
+        listener.wait_for(1)
         link.cut_for_good()
-        listener.wait_for(2, 10.0)
+        listener.wait_for(2)
         uplink.stop()
         listener.close()
         store.close()
