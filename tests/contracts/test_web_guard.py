@@ -8,6 +8,7 @@ from pathlib import Path
 import httpx
 import pytest
 import trustme
+from support.patience import PATIENCE_S
 from support.web import Client, Gateway, serving
 
 from gateway.errors import ConfigurationError
@@ -175,9 +176,9 @@ def test_tls_and_client_certificates(tmp_path: Path) -> None:
         address = server.url.replace("http://127.0.0.1", "https://localhost") + "/health/live"
         client_side = ssl.create_default_context(cafile=str(tmp_path / "authority.pem"))
         with pytest.raises(httpx.TransportError):
-            httpx.get(address, verify=client_side)
+            httpx.get(address, verify=client_side, timeout=PATIENCE_S)
         authority.issue_cert("fleet@example.org").configure_cert(client_side)
-        assert httpx.get(address, verify=client_side).json() == {"is_alive": True}
+        assert httpx.get(address, verify=client_side, timeout=PATIENCE_S).json() == {"is_alive": True}
 
 
 def test_tls_files_that_cannot_be_used_are_said(tmp_path: Path) -> None:

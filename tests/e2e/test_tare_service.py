@@ -7,12 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import httpx
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from support.calibrated import calibration_file
 from support.patience import wait_until
+from support.ports import first_answer
 
 from gateway.bus.candump_write import write_candump
 from gateway.bus.encode import Encoder
@@ -170,7 +170,7 @@ def test_a_tare_counts_from_the_next_batch_survives_a_restart_and_is_undone(conf
         assert (offer["zero"]["payload_kg"], offer["zero"]["n_batches"]) == (12.0, 2)
         made.update(service.told("set", "--empty", "--note", "yard"))
         assert "+12.0" in service.tare("show").output
-        assert httpx.get(f"{service.gateway.url}/api/v1/status").json()["tare_id"] == made["id"]
+        assert first_answer(f"{service.gateway.url}/api/v1/status").json()["tare_id"] == made["id"]
         service.play(logs[1])
 
     def second_run(service: Running) -> None:

@@ -53,9 +53,9 @@ def test_a_directory_that_cannot_be_made_is_waited_for(tmp_path: Path) -> None:
     assert reader.latest().estimate == texts(make_record(0))[0]
 
     directory.parent.unlink()
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     store.write_estimate(make_record(1))
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     assert store.health().state is StoreState.OK
     assert reader.estimates(cursor=held_cursor).items == texts(make_record(1))
     assert store.close() == 0
@@ -73,7 +73,7 @@ def test_what_is_held_goes_behind_what_an_earlier_run_stored(tmp_path: Path) -> 
     (tmp_path / "volume").rename(tmp_path / "arrived")
     directory.parent.mkdir()
     (tmp_path / "arrived").rename(directory)
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     assert store.reader().estimates().items == texts(make_record(0), make_record(1))
     # the cursor was of the memory alone: rather all again than a row missed
     assert len(store.reader().estimates(cursor=cursor).items) == 2
@@ -92,11 +92,11 @@ def test_memory_is_bounded_and_what_gives_way_is_counted(tmp_path: Path) -> None
 def test_a_database_deleted_under_the_running_store_begins_anew(tmp_path: Path) -> None:
     store = Store.open(tmp_path)
     cursor = store.write_estimate(make_record(0))
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     for leftover in tmp_path.glob("springscale.db*"):
         leftover.unlink()
     store.write_estimate(make_record(1))
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     assert store.reader().estimates(cursor=cursor).items == texts(make_record(1))
     assert store.close() == 0
     assert (tmp_path / "springscale.db").exists()
@@ -123,7 +123,7 @@ def test_a_damaged_database_is_set_aside(tmp_path: Path, how: str) -> None:
 
     store = Store.open(tmp_path)
     store.write_estimate(make_record(1))
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     health = store.health()
     assert health.state is StoreState.OK
     assert health.set_aside is not None
@@ -135,14 +135,14 @@ def test_a_damaged_database_is_set_aside(tmp_path: Path, how: str) -> None:
 def test_damage_found_while_reading_sets_the_file_aside_and_keeps_the_numbering(tmp_path: Path) -> None:
     store = Store.open(tmp_path)
     cursors = [store.write_estimate(make_record(n)) for n in range(50)]
-    assert store.flush(10.0)
-    with closing(sqlite3.connect(tmp_path / "springscale.db")) as other:
-        other.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    assert store.flush(PATIENCE_S)
+    with closing(sqlite3.connect(tmp_path / "springscale.db", timeout=PATIENCE_S)) as other:
+        assert other.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[0] == 0
     damage(tmp_path / "springscale.db")
     with pytest.raises(StoreError, match="cannot be read"):
         store.reader().estimates()
     store.write_estimate(make_record(50))
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     assert store.health().set_aside is not None
     assert store.reader().estimates(cursor=cursors[-1]).items == texts(make_record(50))
     store.close()
@@ -198,7 +198,7 @@ def test_a_question_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     store = Store.open(tmp_path)
     for n in range(5000):
         store.write_estimate(make_record(n))
-    assert store.flush(20.0)
+    assert store.flush(PATIENCE_S)
     reader = StoreReader(
         tmp_path / "springscale.db", held=lambda: ("ab", ()), clock_ns=lambda: 0, on_damage=lambda: None, limit_s=-1.0
     )

@@ -19,13 +19,14 @@ WRITER = """
 import itertools, pathlib, sys
 from gateway.store import Store
 from support.estimates import make_record
+from support.patience import PATIENCE_S
 
 store = Store.open(pathlib.Path(sys.argv[1]))
 first = int(sys.argv[2])
 for n in itertools.count(first):
     record = make_record(n, with_spectra=True)
     store.write_estimate(record)
-    if n % 3 == 0 and store.flush(10.0):  # groups of three: a kill also falls between accept and commit
+    if n % 3 == 0 and store.flush(PATIENCE_S):  # groups of three: a kill also falls between accept and commit
         print(n, flush=True)
 """
 

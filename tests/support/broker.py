@@ -43,7 +43,7 @@ class Broker:
         assert wait_until(self._answers), "mosquitto did not start"
 
     def _answers(self) -> bool:
-        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1.0):
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), PATIENCE_S):
             return True
         return False
 
@@ -122,7 +122,7 @@ class CuttableLink:
             except OSError:
                 return
             try:
-                far = socket.create_connection(("127.0.0.1", self._broker_port), 1.0)
+                far = socket.create_connection(("127.0.0.1", self._broker_port))
             except OSError:  # the broker is away
                 near.close()
                 continue

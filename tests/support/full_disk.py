@@ -6,25 +6,27 @@ import resource
 import sys
 from pathlib import Path
 
-from gateway.store import Store
+from gateway.store import Store, StoreState
 from support.estimates import make_record
+from support.patience import PATIENCE_S, wait_until
 
 
 def main(directory: Path) -> None:
     store = Store.open(directory)
     for n in range(3):
         store.write_estimate(make_record(n))
-    is_written = store.flush(10.0)
+    is_written = store.flush(PATIENCE_S)
 
     _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1, hard))
     for n in range(3, 9):
         store.write_estimate(make_record(n))
-    is_written_while_full = store.flush(1.0)
+    wait_until(lambda: store.health().state is StoreState.DEGRADED)
+    is_written_while_full = store.flush(0.0)
     full, seen_while_full = store.health(), store.reader().estimates().items
 
     resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
-    is_written_afterwards = store.flush(10.0)
+    is_written_afterwards = store.flush(PATIENCE_S)
     healed, seen_afterwards = store.health(), store.reader().estimates().items
     sys.stdout.write(
         json.dumps(
@@ -32,7 +34,7 @@ def main(directory: Path) -> None:
                 "is_written": [is_written, is_written_while_full, is_written_afterwards],
                 "full": dataclasses.asdict(full),
                 "healed": dataclasses.asdict(healed),
-                "n_lost": store.close(),
+                "n_lost": store.close(PATIENCE_S),
                 "seen_while_full": seen_while_full,
                 "seen_afterwards": seen_afterwards,
             }

@@ -78,7 +78,7 @@ def deliver(store: Store, broker: FakeBroker, is_done: Callable[[Uplink], bool])
     """Runs an uplink until ``is_done`` and stops it."""
     uplink = Uplink(SETTINGS, Outbox(store.reader(), store, "fleet"), {}, broker, BackOff(0.001, 0.002))
     uplink.start()
-    wait_until(lambda: is_done(uplink))
+    assert wait_until(lambda: is_done(uplink)), uplink.report()
     uplink.stop()
     assert not uplink.is_alive()
     assert store.flush(PATIENCE_S)
@@ -180,11 +180,11 @@ def test_what_retention_removes_undelivered_is_counted(tmp_path: Path) -> None:
     deliver(store, broker, lambda uplink: uplink.report().n_delivered == 2)
     for n in range(10, 13):
         store.write_estimate(make_record(n))
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     now_ns[0] += 120 * 10**9
     store.write_estimate(make_record(20))  # a write looks at age
-    assert store.flush(10.0)
-    store.close(timeout_s=30.0)  # the writer looks at age after it has told of the write
+    assert store.flush(PATIENCE_S)
+    store.close()  # the writer looks at age after it has told of the write
     assert store.reader().delivery("fleet").n_pruned == 3  # the two delivered ones were removed as well
     assert store.reader().delivery("fleet").n_waiting == 1
 
@@ -195,7 +195,7 @@ def test_a_database_that_was_replaced_is_delivered_from_its_first_row(tmp_path: 
     outbox = Outbox(store.reader(), store, "fleet")
     for letter in outbox.next_letters(10):
         outbox.delivered(letter)
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     store.close()
     other = Store.open(tmp_path / "b")
     ids = fill(other, 2)
@@ -207,7 +207,7 @@ def test_a_database_that_was_replaced_is_delivered_from_its_first_row(tmp_path: 
 def test_a_cursor_of_another_database_is_not_remembered(store: Store) -> None:
     fill(store, 1)
     assert not store.write_delivery("fleet", "00000000-5")
-    assert store.flush(10.0)
+    assert store.flush(PATIENCE_S)
     assert store.reader().delivery("fleet").cursor is None
 
 
