@@ -10,11 +10,11 @@ from typing import Any
 import httpx
 import pytest
 from support.estimates import make_record
-from support.patience import PATIENCE_S
+from support.patience import PATIENCE_S, until
 from support.web import Client, Gateway, Server, serving
 
 from gateway.records import Why
-from gateway.web import WebSettings
+from gateway.web import WebSettings, stream
 from gateway.web.fanout import QUEUE, Fanout, StreamEvent
 
 
@@ -49,12 +49,6 @@ async def listening(server: Server, last_event_id: str | None = None) -> AsyncIt
         client.stream("GET", f"{server.url}/api/v1/stream", headers=headers) as response,
     ):
         yield Listener(response)
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(PATIENCE_S):
-        while not condition():
-            await asyncio.sleep(0.005)
 
 
 def run(gateway: Gateway, scenario: Callable[[Server], Coroutine[Any, Any, None]]) -> None:
@@ -123,7 +117,10 @@ def test_more_streams_than_allowed_are_refused(tmp_path: Path) -> None:
         run(gateway, scenario)
 
 
-def test_closing_the_board_ends_the_streams_and_lets_the_server_stop(tmp_path: Path) -> None:
+def test_closing_the_board_ends_the_streams_and_lets_the_server_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stream, "GRACE_S", PATIENCE_S)
     with Gateway(tmp_path) as gateway:
 
         async def scenario(server: Server) -> None:
@@ -143,7 +140,8 @@ def test_closing_the_board_ends_the_streams_and_lets_the_server_stop(tmp_path: P
         run(gateway, scenario)
 
 
-def test_a_client_that_does_not_read_is_left_behind_alone(tmp_path: Path) -> None:
+def test_a_client_that_does_not_read_is_left_behind_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream, "GRACE_S", 0.0)
     with Gateway(tmp_path) as gateway:
         fanout = gateway.board.fanout
         bulky = {**make_record(0), "ballast": "x" * 1_000_000}  # more than the sockets hold

@@ -1,5 +1,6 @@
 """How long a test waits for what must come: a limit costs time only where a test fails, and machines are busy."""
 
+import asyncio
 import time
 from collections.abc import Callable
 from typing import Final
@@ -13,3 +14,10 @@ def wait_until(holds: Callable[[], bool]) -> bool:
     while not (is_true := holds()) and time.monotonic() < end_s:
         time.sleep(0.005)
     return is_true
+
+
+async def until(holds: Callable[[], bool]) -> None:
+    """Return as soon as ``holds`` is true, in an event loop; TimeoutError when patience ends."""
+    async with asyncio.timeout(PATIENCE_S):
+        while not holds():
+            await asyncio.sleep(0.005)

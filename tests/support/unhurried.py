@@ -20,6 +20,7 @@ CONSTANTS = (
     (calibration_tare, "TIMEOUT_S"),
     (link, "CONNECT_TIMEOUT_S"),
     (connection, "REQUEST_S"),
+    (connection, "LINGER_S"),
 )
 ONLY_DEFAULT = (source.LiveSource.stop, Pipeline.stop, Uplink.stop, Store.close, StoreReader.__init__)
 

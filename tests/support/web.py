@@ -95,6 +95,7 @@ class Server:
     def __init__(self, config: uvicorn.Config, port: int = 0) -> None:
         self.socket = socket.create_server(("127.0.0.1", port))
         self.url = f"http://127.0.0.1:{self.socket.getsockname()[1]}"
+        config.timeout_graceful_shutdown = round(PATIENCE_S)
         self.uvicorn = uvicorn.Server(config)
         self.is_up = threading.Event()
         self.thread = threading.Thread(target=self._run)
