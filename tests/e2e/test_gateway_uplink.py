@@ -10,6 +10,7 @@ from support.broker import Listener, needs_mosquitto, running_broker
 from support.estimates import make_record
 from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
+from support.process import running_service
 
 from gateway.store import Store
 
@@ -48,19 +49,18 @@ def test_the_service_forwards_its_history_and_tells_how_it_goes(tmp_path: Path) 
     web_port = free_port()
     with running_broker(tmp_path) as broker:
         listener = Listener(broker.port, "springscale/van-17/#")
-        service = subprocess.Popen(
-            [sys.executable, "-m", "gateway", "run", "--config", str(configuration(tmp_path, web_port, broker.port))]
-        )
+        with running_service(configuration(tmp_path, web_port, broker.port)) as service:
 
-        def uplink_now() -> dict[str, int]:
-            told: dict[str, int] = first_answer(f"http://127.0.0.1:{web_port}/api/v1/status").json()["uplink"]
-            return told
+            def uplink_now() -> dict[str, int]:
+                told: dict[str, int] = first_answer(f"http://127.0.0.1:{web_port}/api/v1/status").json()["uplink"]
+                return told
 
-        wait_until(lambda: uplink_now()["n_delivered"] == len(records))
-        status = uplink_now()
-        metrics = first_answer(f"http://127.0.0.1:{web_port}/metrics").text
-        service.send_signal(signal.SIGTERM)
-        assert service.wait(PATIENCE_S) == 0
+            wait_until(lambda: uplink_now()["n_delivered"] == len(records))
+            status = uplink_now()
+            metrics = first_answer(f"http://127.0.0.1:{web_port}/metrics").text
+            service.send_signal(signal.SIGTERM)
+            _, errors = service.communicate(timeout=PATIENCE_S)
+            assert service.returncode == 0, errors
         listener.wait_for(5)
         listener.close()
     assert status["n_delivered"] == len(records)
