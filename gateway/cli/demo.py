@@ -3,7 +3,6 @@
 import asyncio
 import json
 import threading
-import time
 from importlib.resources import as_file, files
 from itertools import count, takewhile
 from pathlib import Path
@@ -28,7 +27,6 @@ from gateway.web import KnownLoad
 CHANNEL: Final = "springscale-demo"
 ROUND_NS: Final = 1800 * NS_PER_S  # from the start of one drive to the start of the next
 N_QUICK_ROUNDS: Final = 1  # driven at full speed, so that there is a history to look at
-QUIET_S: Final = 0.5  # no new frame for this long: the service has taken all that was sent
 
 
 @click.command("demo")
@@ -66,6 +64,7 @@ class _Driver:
         self._speed = speed
         self._is_endless = is_endless
         self._thread: threading.Thread | None = None
+        self._n_sent = 0
         self._known_loads: tuple[KnownLoad, ...] = ()
 
     def known_loads(self) -> tuple[KnownLoad, ...]:
@@ -104,13 +103,13 @@ class _Driver:
         driven = demo_drive(seed, START_NS + (seed - 1) * ROUND_NS)
         self._known_loads += _told(driven.truth)
         speed: float | Literal["max"] = "max" if seed <= N_QUICK_ROUNDS else self._speed
-        replay_frames([frames_of(driven)], sink, speed, None, self._stop)
+        self._n_sent += replay_frames([frames_of(driven)], sink, speed, None, self._stop)
 
     def _wait_until_taken(self, gateway: Gateway) -> None:
-        n, since = -1, time.monotonic()
-        while not self._stop.wait(0.05) and time.monotonic() - since < QUIET_S:
-            if (now := gateway.source.counts().frames) != n or not gateway.has_caught_up:
-                n, since = now, time.monotonic()
+        """Until the service has worked through every frame that was sent: it maps them all."""
+        while gateway.source.counts().frames < self._n_sent or not gateway.has_caught_up:
+            if self._stop.wait(0.05):
+                return
 
 
 def _told(truth: Truth) -> tuple[KnownLoad, ...]:
