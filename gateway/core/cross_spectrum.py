@@ -5,8 +5,9 @@
 Both sensors ride on one vehicle over one road, so their ratio at each frequency and speed does not
 depend on the road. The half-car calibrated by known-load drives is held against the batch's
 cross-spectra; payload and share are what fits best, together with small changes of dampers and of
-the wheelbase delay. The posterior gives the interval, widened by what left-out runs showed in
-calibration. docs/method.md has the derivation.
+the wheelbase delay, and with how firmly the payload stands on the floor. The posterior gives the
+interval, widened by what left-out runs showed in calibration and by how vehicles change from day to
+day. docs/method.md has the derivation.
 """
 
 import math
@@ -16,14 +17,13 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
+from gateway.core.drift import DRIFT_STD, DRIFTING, STEADY, drift_covariance
 from gateway.core.grey_model import INDEX, PARAMETERS, Ground
 from gateway.core.likelihood import Curvature, Point, Whittle
 from gateway.core.map_fit import Found, most_probable
 from gateway.core.reach import beyond
 from gateway.records import F64, Batch, Estimate, Why
 
-DRIFT_STD: Final = {"damper_front_nspm": 0.02, "damper_rear_nspm": 0.02, "delay_scale": 0.003}
-DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
 START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
 LEAST_START_SHARE: Final = 0.33
 STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rate bends
@@ -85,10 +85,14 @@ class CrossSpectrumCalibration:
 
 @dataclass(frozen=True, slots=True)
 class Located:
-    """The best point of a batch with its covariance of (payload in kg, front share 0..1), not yet inflated."""
+    """The best point of a batch with its covariance of (payload in kg, front share 0..1), not yet inflated.
+
+    drift_covariance is what a change of the vehicle since its calibration adds; no inflation is due on it.
+    """
 
     point: Point
     load_covariance: F64
+    drift_covariance: F64
     misfit: float
     is_reversed: bool
 
@@ -115,13 +119,28 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
     whittle = Whittle(spectra, calibration.ground)
     found = _fit_load(whittle, calibration)
     point = _point(found.x, calibration)
-    reverse = Whittle(spectra.with_pitch_reversed(), calibration.ground)
+    moves = _moves(whittle, point, found)
+    misfit = whittle.misfit(point)
     return Located(
         point=point,
-        load_covariance=_load_covariance(whittle, point, found, calibration),
-        misfit=whittle.misfit(point),
-        is_reversed=reverse.cost(point) < whittle.cost(point),
+        load_covariance=_load_covariance(found, moves, calibration),
+        drift_covariance=drift_covariance(found.covariance, moves)[-2:, -2:],
+        misfit=misfit,
+        is_reversed=_is_reversed(whittle, point, misfit, calibration),
     )
+
+
+def _is_reversed(whittle: Whittle, point: Point, misfit: float, calibration: CrossSpectrumCalibration) -> bool:
+    """True where the pitch rate fits better with the other sign: at this load or, if this fits badly, at any start.
+
+    Spectra with the wrong sign may drive the search to where neither sign fits.
+    """
+    reverse = Whittle(whittle.spectra.with_pitch_reversed(), calibration.ground)
+    tried = [point]
+    if not misfit <= calibration.misfit_limit:
+        usual = calibration.parameters[DRIFTING]
+        tried += [_point(np.r_[usual, load], calibration) for load in _starting_loads(calibration)]
+    return min(reverse.cost(one) for one in tried) < whittle.cost(point)
 
 
 def _point(x: F64, calibration: CrossSpectrumCalibration) -> Point:
@@ -159,17 +178,20 @@ def _starting_loads(calibration: CrossSpectrumCalibration) -> list[tuple[float, 
     return loads
 
 
-def _load_covariance(whittle: Whittle, point: Point, found: Found, calibration: CrossSpectrumCalibration) -> F64:
-    """Covariance (2, 2) of payload and share: the batch's own, and what calibration left open.
+def _moves(whittle: Whittle, point: Point, found: Found) -> F64:
+    """By how much drifting parameters and load (k,) move with each of the STEADY ones: (k, s).
 
-    With x the fitted and t the other parameters, x moves by -C I_xt for each t: the calibration's
-    covariance of t comes in through that.
+    With x the fitted and t the other parameters, x moves by -C I_xt for each t.
     """
     fitted = [*DRIFTING, len(PARAMETERS), len(PARAMETERS) + 1]
-    others = [i for i in range(len(PARAMETERS)) if i not in DRIFTING]
     information = whittle.curvature(point, list(range(len(PARAMETERS))), is_load_free=True).information
-    moves = found.covariance @ information[np.ix_(fitted, others)]
-    covariance = found.covariance + moves @ calibration.covariance[np.ix_(others, others)] @ moves.T
+    moves: F64 = -found.covariance @ information[np.ix_(fitted, STEADY)]
+    return moves
+
+
+def _load_covariance(found: Found, moves: F64, calibration: CrossSpectrumCalibration) -> F64:
+    """Covariance (2, 2) of payload and share: the batch's own, and what calibration left open."""
+    covariance = found.covariance + moves @ calibration.covariance[np.ix_(STEADY, STEADY)] @ moves.T
     return covariance[-2:, -2:]
 
 
@@ -202,12 +224,13 @@ def _judged(
 ) -> Estimate:
     payload_kg, share_pct = located.point.payload_kg, 100.0 * located.point.front_share
     payload_var, share_var = np.diag(located.load_covariance)
+    payload_drift_var, share_drift_var = np.diag(located.drift_covariance)
     unseen = _unseen_inflation(blank.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
     reach = beyond((payload_kg, share_pct), calibration.known_loads, calibration.empty_mass_kg)
     of_payload = calibration.payload_inflation * (1.0 + calibration.payload_inflation_per_reach * reach)
     of_share = calibration.front_share_inflation * (1.0 + calibration.front_share_inflation_per_reach * reach)
-    payload_std_kg = unseen * of_payload * math.sqrt(payload_var)
-    share_std_pct = unseen * of_share * 100.0 * math.sqrt(share_var)
+    payload_std_kg = math.sqrt((unseen * of_payload) ** 2 * payload_var + payload_drift_var)
+    share_std_pct = 100.0 * math.sqrt((unseen * of_share) ** 2 * share_var + share_drift_var)
     diagnostics = {
         "reach": reach,
         "misfit": located.misfit,
@@ -215,6 +238,7 @@ def _judged(
         "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
         "damper_rear_ratio": _ratio(located, calibration, "damper_rear_nspm"),
         "delay_scale": float(located.point.theta[INDEX["delay_scale"]]),
+        "payload_mode_hz": math.exp(located.point.theta[INDEX["payload_mode_hz"]]),
         "delay_s": spectra.delay_mean_s,
         "delay_std_s": spectra.delay_std_s,
     }

@@ -33,6 +33,7 @@ class Fitted:
     damper_front_ratio: float = 1.0
     damper_rear_ratio: float = 1.0
     delay_scale: float | None = None
+    payload_mode_hz: float | None = None
 
 
 def modelled_spectra(seen: Spectra, calibration: CrossSpectrumCalibration, fitted: Fitted) -> Spectra:
@@ -63,6 +64,8 @@ def _parameters(calibration: CrossSpectrumCalibration, fitted: Fitted) -> F64:
     theta[INDEX["damper_rear_nspm"]] += np.log(fitted.damper_rear_ratio)
     if fitted.delay_scale is not None:
         theta[INDEX["delay_scale"]] = fitted.delay_scale
+    if fitted.payload_mode_hz is not None:
+        theta[INDEX["payload_mode_hz"]] = np.log(fitted.payload_mode_hz)
     return theta
 
 

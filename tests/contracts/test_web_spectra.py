@@ -44,7 +44,7 @@ def weighed(calibrated: CalibratedVehicle, seen: Spectra) -> Estimate:
         front_share_pct=47.0,
         mean_speed_mps=SPEED_MPS,
         spectra=seen,
-        diagnostics={"damper_front_ratio": 1.02, "delay_s": 0.2, "delay_std_s": 0.004, "delay_scale": 1.001},
+        diagnostics={"damper_front_ratio": 1.02, "delay_s": 0.2, "delay_std_s": 0.004, "payload_mode_hz": 15.0},
     )
 
 
@@ -72,7 +72,7 @@ def test_the_model_is_that_of_what_was_weighed(
     answer = told(client)
     assert (answer["estimator"], answer["payload_kg"], answer["front_share_pct"]) == ("cross_spectrum", 270.0, 47.0)
     assert calibrated.cross_spectrum is not None
-    fitted = Fitted(270.0, 47.0, 0.2, 0.004, damper_front_ratio=1.02, delay_scale=1.001)
+    fitted = Fitted(270.0, 47.0, 0.2, 0.004, damper_front_ratio=1.02, payload_mode_hz=15.0)
     expected = modelled_spectra(seen, calibrated.cross_spectrum, fitted)
     model = spectra_from_json(answer["model"])
     for name in Spectra.__slots__:

@@ -52,6 +52,27 @@ def test_it_weighs_at_any_speed_loads_it_never_saw(
     assert found.front_share_pct == pytest.approx(share_pct, abs=0.5)
 
 
+@pytest.mark.parametrize(("payload_kg", "share_pct"), [(250.0, 55.0), (400.0, 44.0)])
+@pytest.mark.parametrize("mode_hz", [13.0, 17.0])
+def test_a_payload_on_pallets_is_weighed_and_its_mode_found(
+    calibration: CrossSpectrumCalibration, payload_kg: float, share_pct: float, mode_hz: float
+) -> None:
+    """Calibration saw it ring at 28 Hz; at 8 Hz one that rings at 13 Hz weighs half as much again."""
+    on_pallets = replace(CAR, payload_mode_hz=mode_hz)
+    found = weigh(batch_over_road(payload_kg, share_pct, seed=31, car=on_pallets), calibration)
+    assert found.payload_kg == pytest.approx(payload_kg, abs=25.0)
+    assert found.front_share_pct == pytest.approx(share_pct, abs=0.6)
+    assert found.diagnostics["payload_mode_hz"] == pytest.approx(mode_hz, rel=0.1)
+
+
+@pytest.mark.parametrize("firmer", [0.96, 1.04])
+def test_tyres_of_another_day_stay_within_the_interval(calibration: CrossSpectrumCalibration, firmer: float) -> None:
+    today = replace(CAR, rear=replace(CAR.rear, tyre_npm=firmer * CAR.rear.tyre_npm))
+    found = weigh(batch_over_road(200.0, 50.0, seed=3, car=today), calibration)
+    assert found.payload_interval95_kg[0] <= 200.0 <= found.payload_interval95_kg[1]
+    assert found.front_share_interval95_pct[0] <= 50.0 <= found.front_share_interval95_pct[1]
+
+
 @pytest.mark.parametrize("waviness", [1.6, 2.4])
 def test_the_road_drops_out(calibration: CrossSpectrumCalibration, waviness: float) -> None:
     found = weigh(batch_over_road(300.0, 48.0, seed=5, waviness=waviness), calibration)
@@ -90,7 +111,7 @@ def test_another_roughness_widens_the_interval(calibration: CrossSpectrumCalibra
     unseen = weigh(batch_over_road(200.0, 50.0, seed=3), on_other_roads)
     assert unseen.payload_kg == seen.payload_kg
     assert unseen.payload_std_kg > 1.5 * seen.payload_std_kg
-    assert unseen.front_share_std_pct > 1.5 * seen.front_share_std_pct
+    assert unseen.front_share_std_pct > 1.2 * seen.front_share_std_pct  # what drift adds is the same on any road
 
 
 def test_one_empty_run_is_enough_and_says_so() -> None:

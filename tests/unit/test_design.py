@@ -17,7 +17,8 @@ from gateway.calibration.grey_box_prior import prior_of
 from gateway.core.bounds import Drive, cramer_rao, expected_of, steady_spectra
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectra import cross_spectra_of
-from gateway.core.cross_spectrum import DRIFT_STD, CrossSpectrumCalibration, locate
+from gateway.core.cross_spectrum import CrossSpectrumCalibration, locate
+from gateway.core.drift import DRIFT_STD
 from gateway.core.known_run import KnownRun
 from gateway.core.likelihood import Point
 from gateway.core.vehicle import front_share_pct

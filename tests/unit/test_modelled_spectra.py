@@ -90,6 +90,16 @@ def test_it_lies_over_the_spectra_of_the_same_vehicle(seen: Spectra, calibration
     assert np.abs(modelled.coherence - beside.coherence).mean() < 0.08
 
 
+def test_a_payload_on_pallets_is_drawn_as_it_was_found(calibration: CrossSpectrumCalibration) -> None:
+    car = replace(CAR, payload_mode_hz=14.0)
+    ringing = spectra_of(batch_over_road(270.0, 47.0, seed=3, speed_mps=SPEED_MPS, noise=0.0, car=car))
+    assert ringing is not None
+    as_found = modelled_spectra(ringing, calibration, replace(LOADED, payload_mode_hz=14.0))
+    assert amplitude_misfit(ringing, as_found) < 0.08
+    as_calibrated = modelled_spectra(ringing, calibration, LOADED)
+    assert amplitude_misfit(ringing, as_calibrated) > 1.1 * amplitude_misfit(ringing, as_found)
+
+
 @pytest.mark.parametrize(("payload_kg", "front_share_pct"), [(0.0, 52.0), (270.0, 52.0), (420.0, 47.0)])
 def test_another_load_lies_beside_them(
     seen: Spectra, calibration: CrossSpectrumCalibration, payload_kg: float, front_share_pct: float

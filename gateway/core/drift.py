@@ -1,0 +1,56 @@
+"""What of a vehicle is not as it was when it was calibrated: from day to day, and from load to load.
+
+The search for a load leaves a few of these free, near the calibration. The others, and what of these lies
+further off than the search believes, cannot be told from the load in one batch: they widen the interval.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from gateway.core.grey_model import INDEX, PARAMETERS
+from gateway.records import F64
+
+DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
+    {"damper_front_nspm": 0.02, "damper_rear_nspm": 0.02, "delay_scale": 0.003, "payload_mode_hz": 0.3}
+)
+"""What the search leaves free, and how far off: standard deviations, of logarithms where quantities are positive.
+
+Narrower than nature, for the minutes of a batch repeat one error of the model: less evidence than they seem.
+"""
+
+NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "spring_front_npm": 0.01,  # rubber in parallel with steel, over 10 K
+        "spring_rear_npm": 0.01,
+        "tyre_front_npm": 0.03,  # goes with its pressure, and that with the absolute temperature: 10 K are 3.4 %
+        "tyre_rear_npm": 0.03,
+        "damper_front_nspm": 0.05,  # the oil's viscosity, as far as valves let it through
+        "damper_rear_nspm": 0.05,
+        "payload_mode_hz": 0.6,  # on the floor, on pallets, in a rack
+    }
+)
+"""How far vehicle and packing really lie from their calibration; each axle its own."""
+
+DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
+STEADY: Final = [i for i in range(len(PARAMETERS)) if i not in DRIFTING]
+
+
+def drift_covariance(found: F64, moves: F64) -> F64:
+    """What nature adds to the covariance ``found`` (k, k) of the drifting parameters and the load: (k, k) again.
+
+    ``moves`` (k, s) is by how much these move with each of the STEADY parameters. A parameter that drifts
+    further than the search believed pulls the answer by the share that the prior holds of it: found / std^2
+    (S. F. Schmidt's consider covariance, Adv. Control Syst. 3, 1966).
+    """
+    believed_var = np.array(list(DRIFT_STD.values())) ** 2
+    pulls = found[:, : len(DRIFTING)] / believed_var
+    more_var = np.maximum(0.0, _nature_var(DRIFTING) - believed_var)
+    added: F64 = (moves * _nature_var(STEADY)) @ moves.T + (pulls * more_var) @ pulls.T
+    return added
+
+
+def _nature_var(entries: list[int]) -> F64:
+    return np.array([NATURE_STD.get(PARAMETERS[i], 0.0) ** 2 for i in entries])
