@@ -94,6 +94,8 @@ class Watched:
         raise AssertionError(f"in 10 s it did not come true that {condition}")
 
 
+LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA
+
 # Every text that can be seen: [contrast (WCAG 2.2, 1.4.3), text], its colour over the grounds below it.
 CONTRASTS = """() => {
   const channels = (colour) => { const [r, g, b, a = 1] = colour.match(/[\\d.]+/g).map(Number); return [r, g, b, a]; };

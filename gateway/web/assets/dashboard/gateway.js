@@ -1,13 +1,15 @@
 // How the pages ask the gateway: with the token of this session, if one was entered.
 
 const TOKEN = "springscale-token";
+export const TARE = "/api/v1/calibration/tare";
 
 export class Refused extends Error {}
 
 export const setToken = (text) => sessionStorage.setItem(TOKEN, text.trim());
 
-export function headers() {
-  const token = sessionStorage.getItem(TOKEN);
+export const hasToken = () => sessionStorage.getItem(TOKEN) !== null;
+
+function headers(token = sessionStorage.getItem(TOKEN)) {
   return token ? { Authorization: `Bearer ${token}` } : {};
 }
 
@@ -20,3 +22,13 @@ export async function ask(path, more = {}) {
 }
 
 export const load = async (path) => (await ask(path)).json();
+
+/** Asks for a change, with another token where one is given; returns the state after it. Throws the gateway's own words. */
+export async function change(method, path, token, claim) {
+  const said = { ...headers(token || undefined), "Content-Type": "application/json" };
+  const response = await fetch(path, { method, body: claim && JSON.stringify(claim), headers: said }).catch(() => {
+    throw new Error("The gateway did not answer. Look whether anything changed before you try again.");
+  });
+  if (!response.ok) throw new Error((await response.json()).detail);
+  return load(TARE);
+}

@@ -32,7 +32,7 @@ show(({ status }) => {
   );
 }, "status");
 
-show(({ vehicle, latest }) => {
+show(({ vehicle }) => {
   if (vehicle === null) return;
   const { calibration, figures } = vehicle;
   const pairs = [pair("Vehicle", vehicle.vehicle_id ?? figures?.name ?? "unnamed")];
@@ -49,9 +49,8 @@ show(({ vehicle, latest }) => {
       pair("Calibration", calibration.id.replace("sha256:", "").slice(0, 12)),
     );
   }
-  if (latest?.tare_payload_kg != null) pairs.push(pair("Taken off by re-zeroing", figure(latest.tare_payload_kg, 0, "kg")));
   element("calibrated").replaceChildren(...pairs);
-}, "vehicle", "latest");
+}, "vehicle");
 
 /** Names of settings stand in backquotes: as code on the page. */
 function withCode(text) {

@@ -8,6 +8,7 @@ export const known = {
   vehicle: null,
   weights: null,
   spectra: null,
+  tare: null, // GET /calibration/tare
   reasons: new Map(), // reason -> {happened, advice}
   batches: [], // newest first, rejections included
   early: null, // the provisional estimate of the batch under way

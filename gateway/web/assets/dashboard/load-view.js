@@ -2,7 +2,7 @@
 
 import { ageNow, known, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { ago, between, clock, figure, kmh, withStd, words } from "/assets/dashboard/words.js";
+import { ago, between, clock, figure, kmh, signed, withStd, words } from "/assets/dashboard/words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : `95 %: ${between(bounds, digits, unit)}`);
 
@@ -70,6 +70,8 @@ show(({ latest, vehicle }) => {
   write("age-at", latest.t_end ? `(batch until ${clock(latest.t_end)})` : "");
   write("epoch", epoch(latest));
   write("speed", kmh(latest.mean_speed_mps));
+  element("tared").hidden = latest.tare_payload_kg == null;
+  if (latest.tare_payload_kg != null) write("tared-by", `${signed(latest.tare_payload_kg, 0, "kg")}, ${signed(latest.tare_front_share_pct, 1, "points")}`);
   element("latest").classList.toggle("stale", latest.is_stale);
   say("note", notes(latest));
   document.title = latest.payload_kg == null ? "Springscale" : `${figure(latest.payload_kg, 0, "kg")} – Springscale`;

@@ -16,6 +16,12 @@ export const between = (bounds, digits, unit) =>
 export const withStd = (x, std, digits, unit) =>
   x == null ? UNKNOWN : `${number(x, digits)}${std == null ? "" : ` ± ${number(1.96 * std, digits)}`}${GLUE}${unit}`;
 
+const plus = (x, digits) => (Number(x.toFixed(digits)) > 0 ? "+" : "");
+
+export const signed = (x, digits, unit) => plus(x, digits) + figure(x, digits, unit);
+
+export const signedWithStd = (x, std, digits, unit) => plus(x, digits) + withStd(x, std, digits, unit);
+
 export const kmh = (mps) => figure(mps == null ? null : mps * 3.6, 0, "km/h");
 
 export const clock = (iso) => new Date(iso).toLocaleString(undefined, { dateStyle: "short", timeStyle: "short" });

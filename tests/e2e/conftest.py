@@ -1,0 +1,29 @@
+"""A real browser, for the tests of the dashboard."""
+
+import shutil
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from support.dashboard import Watched
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        pytest.skip("needs Debian's chromium")
+    with playwright.sync_playwright() as running:
+        opened = running.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def watched(browser: Any) -> Iterator[Watched]:
+    """A page to which the charts' library does not come: quick, and everything but the charts must be there."""
+    made = Watched(browser, color_scheme="dark")
+    made.page.route("**/plotly-*", lambda route: route.abort())
+    yield made
+    made.page.close()
