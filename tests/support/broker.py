@@ -84,6 +84,8 @@ class Listener:
 class CuttableLink:
     """A TCP relay to the broker: what goes through it can be cut off at any byte."""
 
+    n_connections = 0
+
     def __init__(self, broker_port: int) -> None:
         self._broker_port = broker_port
         self._listening = socket.create_server(("127.0.0.1", 0))
@@ -126,6 +128,7 @@ class CuttableLink:
             except OSError:  # the broker is away
                 near.close()
                 continue
+            self.n_connections += 1
             self._pairs.append((near, far))
             for source, sink in ((near, far), (far, near)):
                 threading.Thread(target=_pump, args=(source, sink), daemon=True).start()
