@@ -11,7 +11,7 @@ import uvicorn
 
 from gateway.bus.decode import Decoder
 from gateway.bus.source import LiveSource, OpenReceiver
-from gateway.config import Settings
+from gateway.config import BusSection, Settings, StoreSection
 from gateway.errors import SpringscaleError, StoreError
 from gateway.offline.estimates import Setup
 from gateway.service.forwarding import uplink_of
@@ -45,6 +45,25 @@ class _Server(uvicorn.Server):
         yield
 
 
+def _store_of(wanted: StoreSection) -> Store:
+    keep = Retention(
+        max_age_s=wanted.max_age_days * SECONDS_PER_DAY, max_bytes=round(wanted.max_size_mb * BYTES_PER_MB)
+    )
+    return Store.open(wanted.directory, keep)
+
+
+def _source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:
+    return LiveSource(
+        wanted.interface,
+        wanted.channel,
+        setup.signal_map,
+        options=wanted.options,
+        inbox_frames=wanted.inbox_frames,
+        silence_s=wanted.silence_s,
+        open_receiver=open_receiver,
+    )
+
+
 class Gateway:
     """One vehicle's service. :meth:`run` returns when it was asked to stop, and raises when a part died."""
 
@@ -68,26 +87,12 @@ class Gateway:
         tokens = token_file if token_file.tokens() else None
         refuse_open_address(settings.web.host, has_tokens=tokens is not None)
         forwarding = uplink_settings(settings.uplink, settings.vehicle)
-        self.store = Store.open(
-            settings.store.directory,
-            Retention(
-                max_age_s=settings.store.max_age_days * SECONDS_PER_DAY,
-                max_bytes=round(settings.store.max_size_mb * BYTES_PER_MB),
-            ),
-        )
+        self.store = _store_of(settings.store)
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
         self.board = Board(stale_after_s=settings.web.stale_after_s)
         self._restore_board()
-        self.source = LiveSource(
-            settings.bus.interface,
-            settings.bus.channel,
-            setup.signal_map,
-            options=settings.bus.options,
-            inbox_frames=settings.bus.inbox_frames,
-            silence_s=settings.bus.silence_s,
-            open_receiver=open_receiver,
-        )
+        self.source = _source_of(settings.bus, setup, open_receiver)
         flow = setup.flow(settings.batch.for_core(is_live=True))
         self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board)
         self.uplink = uplink_of(forwarding, setup, self.store)
