@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from fnmatch import fnmatch
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -32,6 +33,7 @@ WORKBENCH: Final = frozenset(  # distributions that only the workbench's command
     ("contourpy", "cycler", "fonttools", "kiwisolver", "llvmlite", "matplotlib", "narwhals", "numba", "pillow",
      "plotly", "pyparsing")
 )  # fmt: skip
+STAYING: Final = ("plotly/package_data/plotly.min.js", "plotly-*.dist-info/*")  # what the dashboard shows of them
 SOURCES: Final = ("gateway", "dbc", "pyproject.toml", "README.md", "LICENSE")
 
 # (source below the project, target in the package)
@@ -143,9 +145,11 @@ def part(tree: Path, desk: Path) -> None:
 
 
 def move(found: Distribution, tree: Path, desk: Path) -> None:
-    """The files of one distribution, wherever it recorded them."""
+    """The files of one distribution, wherever it recorded them, but for those that stay."""
     for file in found.files or ():
         source = tree / file
+        if any(fnmatch(str(file), pattern) for pattern in STAYING):
+            continue
         if source.is_file() and tree in source.resolve().parents:
             (desk / file).parent.mkdir(parents=True, exist_ok=True)
             source.rename(desk / file)
