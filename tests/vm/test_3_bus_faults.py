@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from vm.harness.drives import loaded_drive, log_of
-from vm.harness.vehicle import Answer, Vehicle
+from vm.harness.vehicle import PLAY, Answer, Vehicle
 
 Recovered = Callable[[float], None]
 WATCHDOG_S = 20.0
@@ -137,12 +137,12 @@ def test_estimates_from_before_the_clock_was_set_are_kept(vehicle: Vehicle, tmp_
     try:
         vehicle.run("date --set @86400")
         for _ in range(2):
-            vehicle.run(f"canplayer -I {pulse}; sleep 3.5")
+            vehicle.run(f"{PLAY} {pulse}; sleep 3.5")
         vehicle.wait_for(lambda: any(record["t_end"].startswith("1970") for record in vehicle.stored()))
     finally:
         vehicle.run(f"date --set @{today_s + 30}")
     n_before = len(vehicle.stored())
     for _ in range(2):
-        vehicle.run(f"canplayer -I {pulse}; sleep 3.5")
+        vehicle.run(f"{PLAY} {pulse}; sleep 3.5")
     vehicle.wait_for(lambda: len(vehicle.stored()) > n_before + 1)
     assert any(record["t_end"].startswith("1970") for record in vehicle.stored())

@@ -12,7 +12,7 @@ from pathlib import Path
 import httpx
 import pytest
 from vm.harness.drives import loaded_drive, log_of
-from vm.harness.vehicle import CONFIG, SETTINGS, STATE, Answer, Vehicle
+from vm.harness.vehicle import CONFIG, PLAY, SETTINGS, STATE, Answer, Vehicle
 
 Recovered = Callable[[float], None]
 N_KILLS = int(os.environ.get("SPRINGSCALE_KILLS", "20"))
@@ -41,12 +41,14 @@ def test_killed_again_and_again_it_loses_and_doubles_nothing(many_records: Vehic
     vehicle, moments = many_records, random.Random(4)
     n_restarts = vehicle.n_restarts()
     vehicle.wait_for(lambda: len(vehicle.stored()) > 2)
-    n_first = len(vehicle.stored())
+    committed = ids(vehicle.stored())
+    n_first = len(committed)
     for _ in range(N_KILLS):
-        committed = ids(vehicle.stored())
         vehicle.run("systemctl kill --signal KILL springscale")
         time.sleep(moments.uniform(1.0, 8.0))
-        assert ids(vehicle.stored())[: len(committed)] == committed
+        found = ids(vehicle.stored())
+        assert found[: len(committed)] == committed
+        committed = found
     vehicle.run("systemctl kill --signal KILL springscale || true")
     recovered(vehicle.wait_until(lambda status: status["bus"]["state"] == "receiving"))
     assert vehicle.n_restarts() - n_restarts >= N_KILLS // 2  # the other signals found it waiting to be restarted
@@ -95,7 +97,7 @@ def test_floods_and_slow_clients_cost_no_frame(vehicle: Vehicle, tmp_path: Path)
             slow.sendall(b"GET /api/v1/status HTTP/1.1\r\nHost: ")
         for thread in threads:
             thread.start()
-        vehicle.run(f"canplayer -I {vehicle.put_log(log_of(frames, tmp_path / 'drive.log'))}")
+        vehicle.run(f"{PLAY} {vehicle.put_log(log_of(frames, tmp_path / 'drive.log'))}")
         over.set()
         for thread in threads:
             thread.join()

@@ -34,6 +34,6 @@ def faster(frames: Frames, times: float) -> Frames:
 
 
 def log_of(frames: Frames, path: Path) -> Path:
-    """A candump log for vcan0."""
-    write_candump(frames, "vcan0", path)
+    """A candump log of can0."""
+    write_candump(frames, "can0", path)
     return path

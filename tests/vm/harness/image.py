@@ -91,6 +91,8 @@ def _settle(root: Path) -> None:
     (root / "etc/fstab").write_text("")
     (root / "etc/systemd/journald.conf.d").mkdir(exist_ok=True)
     (root / "etc/systemd/journald.conf.d/test.conf").write_text("[Journal]\nStorage=volatile\nRuntimeMaxUse=64M\n")
+    # No power cut comes before the tests have called sync; without this dpkg would, after every file.
+    (root / "etc/dpkg/dpkg.cfg.d/test").write_text("force-unsafe-io\n")
     shutil.copyfile(GUEST / "agent.py", root / "usr/local/sbin/agent")
     shutil.copyfile(GUEST / "agent.service", root / "etc/systemd/system/agent.service")
     for unit in MASKED:

@@ -31,6 +31,7 @@ NO_START_LIMIT: Final = "[Unit]\nStartLimitIntervalSec=0\n"
 WAIT_S: Final = 90.0
 POLL_S: Final = 0.25
 AT_ONCE: Final = "--property CPUSchedulingPolicy=fifo --property CPUSchedulingPriority=10"
+PLAY: Final = "canplayer vcan0=can0 -I"  # as docs/deployment.md tells: what a log has of can0 goes onto vcan0
 HEARD: Final = "/root/heard.log"  # in the guest
 
 Answer = dict[str, Any]
@@ -168,11 +169,11 @@ class Vehicle:
 
         The player comes before everything else on the guest's one processor: a sensor would not wait either.
         """
-        self.run(f"systemd-run --quiet --collect --unit player {AT_ONCE} canplayer -I {log}")
+        self.run(f"systemd-run --quiet --collect --unit player {AT_ONCE} {PLAY} {log}")
 
     def play_pulses(self, log: str, pause_s: float) -> None:
         """Begin to send a short log again and again, with silence between."""
-        loop = f"while :; do canplayer -I {log}; sleep {pause_s}; done"
+        loop = f"while :; do {PLAY} {log}; sleep {pause_s}; done"
         self.run(f"systemd-run --quiet --collect --unit player {AT_ONCE} sh -c '{loop}'")
 
     def listen(self) -> None:
