@@ -34,6 +34,8 @@ class _Service:
     url: str | None
     token: str | None
     ca: Path | None
+    certificate: Path | None
+    key: Path | None
 
 
 @click.group("tare")
@@ -45,11 +47,26 @@ def _service(command: Command) -> Command:
     """The options that say which service is asked; handed to ``command`` as one."""
 
     @functools.wraps(command)
-    def asking(config_path: Path | None, url: str | None, token: str | None, ca: Path | None, **others: Any) -> None:
-        command(_Service(config_path, url, token, ca), **others)
+    def asking(
+        config_path: Path | None,
+        url: str | None,
+        token: str | None,
+        ca: Path | None,
+        certificate: Path | None,
+        key: Path | None,
+        **others: Any,
+    ) -> None:
+        command(_Service(config_path, url, token, ca, certificate, key), **others)
 
     decorated: Command = asking
     for option in (
+        click.option("--key", type=FILE, default=None, help="PEM file of its key, where that is a file of its own"),
+        click.option(
+            "--certificate",
+            type=FILE,
+            default=None,
+            help="PEM file of our certificate, for a service that wants one",
+        ),
         click.option("--ca", type=FILE, default=None, help="PEM file of the authority that signed its certificate"),
         click.option("--token", envvar="SPRINGSCALE_TOKEN", default=None, help="token, if the service wants one"),
         click.option("--url", default=None, help="address of the service, such as http://127.0.0.1:8000"),
@@ -121,7 +138,7 @@ def _asked(service: _Service, method: str, query: str = "", body: dict[str, Any]
     content = None if body is None else json_line(body).encode()
     request = urllib.request.Request(address + query, content, headers, method=method)
     try:
-        with _opener(service.ca).open(request, timeout=TIMEOUT_S) as answer:
+        with _opener(service).open(request, timeout=TIMEOUT_S) as answer:
             found: dict[str, Any] = json.load(answer)
             return found
     except urllib.error.HTTPError as refusal:
@@ -132,12 +149,19 @@ def _asked(service: _Service, method: str, query: str = "", body: dict[str, Any]
         ) from None
 
 
-def _opener(ca: Path | None) -> urllib.request.OpenerDirector:
-    """Straight to the service, past any proxy; certificates are checked."""
+def _opener(service: _Service) -> urllib.request.OpenerDirector:
+    """Straight to the service, past any proxy; certificates are checked, and ours is shown where there is one."""
     try:
-        context = ssl.create_default_context(cafile=ca)
+        context = ssl.create_default_context(cafile=service.ca)
     except OSError as fault:
-        raise ConfigurationError(f"{ca}: no certificate of an authority: {fault}") from None
+        raise ConfigurationError(f"{service.ca}: no certificate of an authority: {fault}") from None
+    if service.certificate is None and service.key is not None:
+        raise click.UsageError("--key is the key of a --certificate: give both, or neither")
+    if service.certificate is not None:
+        try:
+            context.load_cert_chain(service.certificate, service.key)
+        except OSError as fault:  # ssl.SSLError is one
+            raise ConfigurationError(f"{service.certificate}: no certificate with its key: {fault}") from None
     return urllib.request.build_opener(urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=context))
 
 
@@ -177,8 +201,12 @@ def _tare_text(entry: dict[str, Any]) -> str:
 def _zero_text(zero: dict[str, Any]) -> str:
     return (
         f"{zero['payload_kg']:+.1f} ± {zero['payload_std_kg']:.1f} kg and "
-        f"{zero['front_share_pct']:+.2f} ± {zero['front_share_std_pct']:.2f} pp from {zero['n_batches']} batches"
+        f"{zero['front_share_pct']:+.2f} ± {zero['front_share_std_pct']:.2f} pp from {_batches(zero['n_batches'])}"
     )
+
+
+def _batches(n: int) -> str:
+    return "one batch" if n == 1 else f"{n} batches"
 
 
 def _end_text(ended: dict[str, Any] | None) -> str:

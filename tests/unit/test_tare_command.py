@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import trustme
 from click.testing import CliRunner, Result
 from support.calibrated import calibration_file
 from support.tare import FakePipeline
@@ -13,7 +14,7 @@ from support.web import Gateway, serving
 from gateway.cli.calibration import calibration_commands
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.service.tare_desk import Subject, TareDesk
-from gateway.web import Scope, TokenFile
+from gateway.web import Scope, Tls, TokenFile, server_config
 
 
 def run(*arguments: str, **environment: str) -> Result:
@@ -46,7 +47,7 @@ def test_set_show_and_undo_with_a_token_from_the_environment(
     token = tokens.create("workshop", Scope.OPERATE)
     made = run("set", "--empty", "--note", "yard", "--url", url, SPRINGSCALE_TOKEN=token)
     assert made.exit_code == 0, made.exception
-    assert "+12.0 ± 5.0 kg and +1.00 ± 0.40 pp from 1 batches, set " in made.output
+    assert "+12.0 ± 5.0 kg and +1.00 ± 0.40 pp from one batch, set " in made.output
     assert "by workshop (yard)" in made.output
     shown = run("show", "--url", url + "/", "--token", token)
     assert shown.output.splitlines()[0] == "in use: " + made.output.strip()
@@ -75,6 +76,38 @@ def test_a_refusal_comes_in_the_services_own_words(url: str, tokens: TokenFile, 
         assert fault.exit_code == 1
         assert said in str(fault)
     assert "no tare now (offset_too_large)" in run("show", "--url", url, "--token", token).output
+
+
+@pytest.fixture
+def mutual(tmp_path: Path) -> Iterator[str]:
+    """A service that wants the certificate of its clients; authority, certificate and key lie beside it."""
+    authority = trustme.CA()
+    authority.cert_pem.write_to_path(str(tmp_path / "ca.pem"))
+    for name, host in (("server", "localhost"), ("client", "workshop.example")):
+        issued = authority.issue_cert(host)
+        issued.cert_chain_pems[0].write_to_path(str(tmp_path / f"{name}.pem"))
+        issued.private_key_pem.write_to_path(str(tmp_path / f"{name}.key"))
+        issued.private_key_and_cert_chain_pem.write_to_path(str(tmp_path / f"{name}-whole.pem"))
+    tls = Tls(tmp_path / "server.pem", tmp_path / "server.key", client_ca=tmp_path / "ca.pem")
+    with Gateway(tmp_path / "store") as gateway:
+        config = server_config(gateway.app, "127.0.0.1", 0, tls)
+        with serving(gateway.app, config) as server:
+            yield server.url.replace("http://127.0.0.1", "https://localhost")
+
+
+def test_a_service_that_asks_for_a_certificate_is_shown_one(mutual: str, tmp_path: Path) -> None:
+    asked = ("show", "--url", mutual, "--ca", str(tmp_path / "ca.pem"))
+    pem = {name: str(tmp_path / name) for name in ("client.pem", "client.key", "client-whole.pem", "server.key")}
+    assert isinstance(run(*asked).exception, SpringscaleError)
+    for shown in (
+        ("--certificate", pem["client.pem"], "--key", pem["client.key"]),
+        ("--certificate", pem["client-whole.pem"]),
+    ):
+        assert "in use: the zero of the calibration" in run(*asked, *shown).output
+    fault = run(*asked, "--certificate", pem["client.pem"], "--key", pem["server.key"]).exception
+    assert isinstance(fault, ConfigurationError)
+    assert "client.pem: no certificate with its key" in str(fault)
+    assert run(*asked, "--key", pem["client.key"]).exit_code == 2
 
 
 def test_where_nobody_answers_that_is_said() -> None:
