@@ -58,11 +58,15 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """How far an uplink has delivered. ``n_pruned`` estimates were removed by retention before it could."""
+    """How far an uplink has delivered. ``n_pruned`` estimates were removed by retention before it could.
+
+    ``waiting_age_s`` is the age of the oldest that waits, since its receipt; None where none waits.
+    """
 
     cursor: str | None
     n_pruned: int
     n_waiting: int
+    waiting_age_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,8 +177,11 @@ class StoreReader:
             epoch = connection.execute("SELECT id FROM epochs").fetchone()
             found = connection.execute("SELECT seq, n_pruned FROM uplinks WHERE name = ?", (uplink,)).fetchone()
             seq, n_pruned = found or (-1, 0)
-            n_waiting = connection.execute("SELECT count(*) FROM estimates WHERE seq > ?", (seq,)).fetchone()[0]
-        return Delivery(f"{epoch[0]}-{seq}" if found and epoch else None, n_pruned, n_waiting)
+            n_waiting, oldest_ns = connection.execute(
+                "SELECT count(*), min(received_ns) FROM estimates WHERE seq > ?", (seq,)
+            ).fetchone()
+        age_s = None if oldest_ns is None else max(0.0, (self._clock_ns() - oldest_ns) / NS_PER_S)
+        return Delivery(f"{epoch[0]}-{seq}" if found and epoch else None, n_pruned, n_waiting, age_s)
 
     def _ask(self, sql: str, parameters: tuple[Any, ...]) -> list[tuple[Any, ...]]:
         with self._connection() as connection:

@@ -5,6 +5,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
@@ -25,10 +26,9 @@ FIRST_PAUSE_S: Final = 1.0
 
 @dataclass(frozen=True, slots=True)
 class UplinkReport:
-    """How the uplink is. ``n_waiting`` and ``n_pruned`` are the store's figures of a few seconds ago.
+    """How the uplink is: what ``gateway.web.UplinkStatus`` describes to clients, field by field.
 
-    Delivered: acknowledged by the broker since the start. Refused: given up because the broker will
-    never take them. Pruned: removed by retention before they could be delivered.
+    The figures of the store (waiting, pruned) are of a few seconds ago, whether there is a link or not.
     """
 
     broker: str
@@ -36,8 +36,10 @@ class UplinkReport:
     n_delivered: int = 0
     n_refused: int = 0
     n_waiting: int = 0
+    waiting_age_s: float | None = None
     n_pruned: int = 0
     n_connections: int = 0
+    n_cuts: int = 0
     last_fault: str | None = None
 
 
@@ -99,7 +101,18 @@ class Uplink:
             except (LinkError, ConfigurationError, StoreError, TimeoutError, OSError) as fault:
                 self._note(str(fault))
                 self._outbox.rewind()
-                self._stop.wait(self._back_off.next_s())
+                self._pause(self._back_off.next_s())
+
+    def _pause(self, pause_s: float) -> None:
+        """Until it is time to try again; what waits meanwhile is still counted."""
+        end_s = time.monotonic() + pause_s
+        while not self._stop.is_set():
+            with suppress(StoreError, TimeoutError, OSError):  # told where letters are asked for
+                self._look()
+            left_s = end_s - time.monotonic()
+            if left_s <= 0.0:
+                return
+            self._stop.wait(min(left_s, LOOK_S))
 
     def _one_connection(self) -> None:
         """Deliver until asked to stop, or until LinkError."""
@@ -112,6 +125,7 @@ class Uplink:
             self._deliver(link)
             link.close()
         except BaseException:
+            self._report = replace(self._report, n_cuts=self._report.n_cuts + 1)
             link.abandon()
             raise
         finally:
@@ -161,7 +175,9 @@ class Uplink:
             return
         self._looked_s = time.monotonic()
         found = self._outbox.look()
-        self._report = replace(self._report, n_waiting=found.n_waiting, n_pruned=found.n_pruned)
+        self._report = replace(
+            self._report, n_waiting=found.n_waiting, waiting_age_s=found.waiting_age_s, n_pruned=found.n_pruned
+        )
 
     def _note(self, fault: str) -> None:
         if fault != self._report.last_fault:

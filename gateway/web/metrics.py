@@ -139,7 +139,12 @@ def _store(now: Status) -> Iterator[Metric]:
 def _uplink(uplink: UplinkStatus) -> Iterator[Metric]:
     yield _gauge("springscale_uplink_connected", "1 while connected to the broker.", float(uplink.is_connected))
     yield _gauge("springscale_uplink_waiting_rows", "Rows still to be delivered.", uplink.n_waiting)
+    if uplink.waiting_age_s is not None:
+        yield _gauge(
+            "springscale_uplink_oldest_waiting_age_seconds", "Of the oldest of these rows.", uplink.waiting_age_s
+        )
     yield _counter("springscale_uplink_connections_total", "Times the broker was reached.", uplink.n_connections)
+    yield _counter("springscale_uplink_cuts_total", "Times an established link broke.", uplink.n_cuts)
     yield _labelled(
         "springscale_uplink_rows_total",
         "Rows by what became of them.",

@@ -98,8 +98,10 @@ class UplinkStatus(_Told):
     n_delivered: int = Field(0, description="acknowledged by the broker")
     n_refused: int = Field(0, description="given up: the broker will never take them")
     n_waiting: int = Field(0, description="in the store, still to be delivered; as of a few seconds ago")
+    waiting_age_s: float | None = Field(None, description="of the oldest of them, since its receipt; null: none waits")
     n_pruned: int = Field(0, description="removed by retention before they could be delivered")
     n_connections: int = 0
+    n_cuts: int = Field(0, description="times an established link broke")
     last_fault: str | None = None
 
 

@@ -44,7 +44,7 @@ def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set
             decode=(DecodeCount(signal="speed", reason="ok", n=7),),
             signals=(SignalHealth(signal="speed", rate_hz=5.0, last_age_s=0.1, rejected_share=0.0),),
             batches=BatchCounts(n_estimates=1, n_rejected=2, rejected_by_reason={"gap": 2}),
-            uplink=UplinkStatus(broker="fleet.example:8883"),
+            uplink=UplinkStatus(broker="fleet.example:8883", waiting_age_s=7.0),
         )
         gateway.publish({**make_record(0), "front_share_std_pct": 0.5})
         calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0))

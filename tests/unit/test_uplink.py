@@ -114,7 +114,8 @@ def test_after_a_break_only_the_letter_under_way_comes_again(store: Store) -> No
         return accepted(n, letter)
 
     broker = FakeBroker(answer)
-    deliver(store, broker, lambda uplink: uplink.report().n_delivered >= 40)
+    uplink = deliver(store, broker, lambda uplink: uplink.report().n_delivered >= 40)
+    assert uplink.report().n_cuts == len(breaks)
     came = [letter.id for letter in broker.taken]
     assert list(dict.fromkeys(came)) == ids
     assert len(came) - len(ids) == len(breaks)
@@ -163,6 +164,39 @@ def test_nothing_leaves_before_the_letter_ahead_is_answered(store: Store) -> Non
     assert len(sent) == 1
     assert uplink.report().n_delivered == 0
     assert store.reader().delivery("fleet").n_waiting == 3
+
+
+def test_what_waits_is_counted_while_there_is_no_link(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.uplink.uplink.LOOK_S", 0.01)
+    fill(store, 3)
+
+    def unreachable(_settings: UplinkSettings, _birth: Any) -> FakeBroker:
+        raise LinkError("no route to host")
+
+    uplink = Uplink(SETTINGS, Outbox(store.reader(), store, "fleet"), {}, unreachable, BackOff(60.0, 60.0))
+    uplink.start()
+    assert wait_until(lambda: uplink.report().n_waiting == 3)
+    store.write_estimate(make_record(9))
+    assert wait_until(lambda: uplink.report().n_waiting == 4)
+    uplink.stop()
+    assert not uplink.is_alive()
+    assert uplink.report().waiting_age_s is not None
+    assert (uplink.report().n_connections, uplink.report().n_cuts) == (0, 0)
+
+
+def test_the_age_of_what_waits_is_that_of_the_oldest(tmp_path: Path) -> None:
+    now_ns = [1_790_000_000 * 10**9]
+    store = Store.open(tmp_path, clock_ns=lambda: now_ns[0])
+    for n, pause_s in enumerate((40, 20, 5)):
+        store.write_estimate(make_record(n))
+        assert store.flush(PATIENCE_S)
+        now_ns[0] += pause_s * 10**9
+    assert store.reader().delivery("fleet").waiting_age_s == 65.0
+    for cursor, age_s in zip(store.reader().estimates().cursors, (25.0, 5.0, None), strict=True):
+        store.write_delivery("fleet", cursor)
+        assert store.flush(PATIENCE_S)
+        assert store.reader().delivery("fleet").waiting_age_s == age_s
+    store.close()
 
 
 def test_spectra_stay_at_home(store: Store) -> None:
