@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from support.dashboard import Watched
+from support.patience import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -14,8 +15,9 @@ def browser() -> Iterator[Any]:
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
         pytest.skip("needs Debian's chromium")
+    playwright.expect.set_options(timeout=1000 * PATIENCE_S)
     with playwright.sync_playwright() as running:
-        opened = running.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        opened = running.chromium.launch(executable_path=chromium, args=["--no-sandbox"], timeout=1000 * PATIENCE_S)
         yield opened
         opened.close()
 

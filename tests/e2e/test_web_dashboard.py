@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched, furnished
+from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Watched, furnished
 from support.estimates import make_record
-from support.patience import PATIENCE_S
 from support.web import Gateway, serving
 
 from gateway.records import Why
@@ -16,7 +15,6 @@ from gateway.web import Scope, State, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect
-expect.set_options(timeout=1000 * PATIENCE_S)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +77,8 @@ AXLE_PLACES = "[...document.querySelectorAll('#van line.axle')].map((line) => li
 def test_it_says_in_words_why_a_batch_was_not_weighed(site: str, watched: Watched) -> None:
     page = watched.page
     page.goto(site)
-    (item,) = page.locator("#rejected li").all()
+    item = page.locator("#rejected li")
+    expect(item).to_have_count(1)
     expect(item).to_contain_text("Too slow: too much of the window below speed_min_mps: town, queue, yard.")
     expect(item).to_contain_text("What to do: nothing; the next open road will do.")
     expect(item).to_contain_text("Gap: frames of both sensors are missing")
@@ -240,7 +239,7 @@ def test_it_asks_for_a_token_where_one_is_needed(tmp_path: Path, watched: Watche
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_every_text_can_be_read_in_light_and_dark(drawn: Watched, scheme: str) -> None:
     drawn.page.emulate_media(color_scheme=scheme)
-    drawn.page.wait_for_timeout(500)  # charts follow two frames later
+    drawn.wait_until(CHARTS_FOLLOW)
     seen = drawn.page.evaluate(CONTRASTS)
     assert len(seen) > 200
     assert [text for contrast, text in seen if contrast < LEAST_CONTRAST] == []
@@ -251,7 +250,7 @@ def test_it_fits_a_phone(drawn: Watched) -> None:
     usual = page.viewport_size
     page.set_viewport_size({"width": 360, "height": 740})
     drawn.wait_until("document.querySelector('#payload-chart .main-svg').clientWidth < 360")
-    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    drawn.wait_until("document.documentElement.scrollWidth <= 360")
     page.set_viewport_size(usual)
 
 
@@ -304,7 +303,7 @@ def test_the_first_key_leads_past_the_head(site: str, watched: Watched) -> None:
     watched.page.goto(site)
     watched.page.keyboard.press("Tab")
     watched.page.keyboard.press("Enter")
-    assert watched.page.evaluate("document.activeElement.id") == "main"
+    watched.wait_until("document.activeElement.id === 'main'")
 
 
 def test_it_is_built_for_screen_readers(drawn: Watched) -> None:

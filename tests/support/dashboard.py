@@ -1,5 +1,6 @@
 """A gateway with something to look at, and a browser page that keeps count of what it did."""
 
+import time
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -82,19 +83,28 @@ class Watched:
 
     def wait_for_charts(self) -> None:
         """Until the last of them is drawn."""
-        for chart in ("#payload-chart", "#share-chart", "#spectra-phase_rad"):
+        for chart in ("#payload-chart", "#share-chart", "#spectra-pitch_rate_radps_rthz", "#spectra-phase_rad"):
             self.page.wait_for_selector(f"{chart}[data-drawn]")
 
     def wait_until(self, condition: str) -> None:
         """Until a JavaScript expression holds; playwright's own way would need eval, which the page forbids."""
-        for _ in range(200):
-            if self.page.evaluate(condition):
-                return
+        end_s = time.monotonic() + PATIENCE_S
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < end_s, f"it did not come true that {condition}"
             self.page.wait_for_timeout(50)
-        raise AssertionError(f"in 10 s it did not come true that {condition}")
 
 
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA
+
+# Charts follow the page's colours a few frames later.
+CHARTS_FOLLOW = """(() => {
+  const probe = document.body.appendChild(document.createElement("span"));
+  probe.style.color = "var(--soft)";
+  const soft = getComputedStyle(probe).color;
+  probe.remove();
+  const ticks = [...document.querySelectorAll("[data-drawn] .xtick text")];
+  return ticks.length > 0 && ticks.every((tick) => getComputedStyle(tick).fill === soft);
+})()"""
 
 # Every text that can be seen: [contrast (WCAG 2.2, 1.4.3), text], its colour over the grounds below it.
 CONTRASTS = """() => {
