@@ -12,27 +12,35 @@ import click
 from gateway.errors import SpringscaleError
 
 _COMMANDS = {
-    "bounds": ("gateway.cli.bounds", "bounds", "How well anyone could weigh, by what is seen and known."),
-    "calibrate": ("gateway.cli.calibrate", "calibrate", "Known-load drives to a calibration file."),
+    "bounds": ("gateway.cli.bounds", "bounds", "Theoretical limits of accuracy: what no estimator can beat."),
+    "calibrate": ("gateway.cli.calibrate", "calibrate", "Make a calibration file from drives with known loads."),
     "calibration": (
         "gateway.cli.calibration",
         "calibration_commands",
-        "Look at calibration files, compare and check them; re-zero a running service.",
+        "Show, compare and check calibration files; re-zero a running service.",
     ),
     "check-config": (
         "gateway.cli.check_config",
         "check_config",
-        "Check everything that can be checked without the bus.",
+        "Check a configuration, without opening the bus.",
     ),
-    "demo": ("gateway.cli.demo", "demo", "The whole service on a simulated drive: no hardware, no configuration."),
-    "estimate": ("gateway.cli.estimate", "estimate", "Logs to estimates, one line per batch."),
-    "evaluate": ("gateway.cli.evaluate", "evaluate", "The error table over known-load drives."),
+    "demo": ("gateway.cli.demo", "demo", "Run the whole service on a simulated drive: no hardware, no configuration."),
+    "estimate": ("gateway.cli.estimate", "estimate", "Weigh from log files, one line per batch."),
+    "evaluate": ("gateway.cli.evaluate", "evaluate", "Compare estimates with known loads: the error table."),
     "replay": ("gateway.cli.replay", "replay", "Send a log to a bus, paced by its time stamps."),
-    "reproduce": ("gateway.cli.reproduce", "reproduce", "The paper's section 4 with our simulator, as a report."),
-    "run": ("gateway.cli.run", "run", "The service."),
-    "simulate": ("gateway.cli.simulate", "simulate", "Simulated drives, as logs or onto a bus."),
-    "study": ("gateway.cli.study", "study", "What a calibration is worth, found out by experiment."),
-    "token": ("gateway.cli.token", "token_commands", "Who may ask the gateway from elsewhere."),
+    "reproduce": (
+        "gateway.cli.reproduce",
+        "reproduce",
+        "Repeat the paper's section 4 in the simulator, as a report.",
+    ),
+    "run": ("gateway.cli.run", "run", "Run the service."),
+    "simulate": ("gateway.cli.simulate", "simulate", "Simulate drives, as log files or onto a bus."),
+    "study": (
+        "gateway.cli.study",
+        "study",
+        "Experiments on calibration: fewer runs, advised runs, coverage.",
+    ),
+    "token": ("gateway.cli.token", "token_commands", "Make, list and revoke access tokens for other machines."),
 }
 
 

@@ -30,7 +30,7 @@ _seed = click.option("--seed", type=click.IntRange(min=0), default=SEED, show_de
 
 @click.group("study")
 def study() -> None:
-    """How good is a calibration? Found out by experiment; each study takes minutes."""
+    """Experiments on calibration: fewer runs, advised runs, coverage of intervals. Each takes minutes."""
 
 
 @study.command("learning-curve")

@@ -22,7 +22,7 @@ def token_file(config_path: Path) -> TokenFile:
 
 @click.group("token")
 def token_commands() -> None:
-    """Make, list and revoke the tokens with which others may ask."""
+    """Make, list and revoke access tokens for other machines."""
 
 
 @token_commands.command("create")
