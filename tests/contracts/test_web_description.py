@@ -102,7 +102,7 @@ WITH_PARAMETERS = [label for label in LABELS if not label.endswith(WITHOUT_PARAM
 def test_every_answer_is_as_described(
     schema: BaseSchema, headers: dict[str, str], label: str, mode: GenerationMode
 ) -> None:
-    @settings(max_examples=20, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=20, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(case=operations(schema)[label].as_strategy(generation_mode=mode))
     def ask(case: schemathesis.Case) -> None:
         case.call_and_validate(headers=headers, excluded_checks=EXCLUDED.get(label))

@@ -65,7 +65,7 @@ def frames_of(payloads: list[bytes], width: int) -> Frames:
     )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(dbc_signals(), st.data())
 def test_every_number_is_the_one_cantools_gives(signal, draws):
     dbc, n_bytes = signal
@@ -78,7 +78,7 @@ def test_every_number_is_the_one_cantools_gives(signal, draws):
     np.testing.assert_array_equal(motion.columns[:, 0], finite)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(dbc_signals(), st.data())
 def test_what_the_encoder_writes_cantools_would_write(signal, draws):
     dbc, n_bytes = signal

@@ -46,7 +46,6 @@ def assert_equal(a: Frames, b: Frames) -> None:
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 
-@settings(deadline=None)
 @given(st.lists(frame_rows, max_size=40), st.booleans(), st.integers(256, 2000))
 def test_what_is_written_is_read_back_to_the_nanosecond(rows, is_gzip, block_bytes):
     frames = table(rows)
@@ -58,7 +57,6 @@ def test_what_is_written_is_read_back_to_the_nanosecond(rows, is_gzip, block_byt
     assert (report.lines, report.frames, report.n_rejected) == (len(rows), len(rows), 0)
 
 
-@settings(deadline=None)
 @given(st.lists(frame_rows, min_size=1, max_size=20))
 def test_what_is_written_python_can_reads_as_well(rows):
     frames = table(rows)
@@ -97,7 +95,7 @@ LINES = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.lists(LINES, max_size=40), st.integers(300, 3000), st.booleans())
 def test_the_fast_path_reads_what_the_exact_path_reads(lines, block_bytes, has_final_newline):
     """Any mixture of sound and dirty lines: whatever shapes were learned, each line is read as if alone."""

@@ -42,7 +42,7 @@ def test_the_gradient_is_the_slope_of_the_cost(spectra: CrossSpectra) -> None:
     assert gradient[-1] == pytest.approx(by_share, rel=1e-3)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(gain=st.floats(1e-3, 1e3))
 def test_the_roads_level_does_not_matter(gain: float, spectra: CrossSpectra) -> None:
     louder = replace(

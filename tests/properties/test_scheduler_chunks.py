@@ -56,7 +56,7 @@ WHOLE = {(name, every_s): batches_of(motion, [], every_s) for name, motion in DR
 
 @pytest.mark.parametrize("provisional_every_s", [0.0, 7.0])
 @pytest.mark.parametrize("name", DRIVES)
-@settings(max_examples=5, deadline=None, derandomize=True)
+@settings(max_examples=5, derandomize=True)
 @given(share_cuts=st.lists(st.floats(0.0, 1.0), max_size=40))
 def test_chunks_do_not_matter(name: str, provisional_every_s: float, share_cuts: list[float]) -> None:
     motion = DRIVES[name]

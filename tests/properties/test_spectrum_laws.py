@@ -14,7 +14,7 @@ RATE_HZ = 50.0
 masks = hnp.arrays(bool, st.integers(0, 300), elements=st.integers(0, 9).map(bool))
 
 
-@settings(deadline=None, derandomize=True)
+@settings(derandomize=True)
 @given(usable=masks, n_segment=st.integers(2, 40), step=st.integers(1, 40))
 def test_segments_lie_wholly_in_the_mask_and_fill_every_run(usable: Bool, n_segment: int, step: int) -> None:
     starts = segment_starts(usable, n_segment, step)
@@ -26,7 +26,7 @@ def test_segments_lie_wholly_in_the_mask_and_fill_every_run(usable: Bool, n_segm
     assert set(run_starts[np.array(fitting, int) > 0]) <= set(starts)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), n_segment=st.integers(8, 257), scale=st.floats(1e-3, 1e3))
 def test_parseval(seed: int, n_segment: int, scale: float) -> None:
     x = scale * np.random.default_rng(seed).standard_normal(n_segment)
@@ -37,7 +37,7 @@ def test_parseval(seed: int, n_segment: int, scale: float) -> None:
     assert np.sum(power) * RATE_HZ / n_segment == pytest.approx(np.sum(tapered**2) / weight, rel=1e-9)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), offset=st.floats(-1e3, 1e3), slope=st.floats(-10.0, 10.0))
 def test_a_straight_line_changes_nothing(seed: int, offset: float, slope: float) -> None:
     x = np.random.default_rng(seed).standard_normal(600)

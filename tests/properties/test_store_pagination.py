@@ -22,7 +22,7 @@ def number(text: str) -> int:
     return int(json.loads(text)["t_end_ns"]) // (300 * 10**9) - 1
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(bursts=st.lists(st.integers(0, 7), min_size=1, max_size=8), limit=st.integers(1, 5))
 def test_the_cursor_misses_and_repeats_nothing_while_rows_arrive(bursts: list[int], limit: int) -> None:
     with tempfile.TemporaryDirectory() as directory:
