@@ -1,7 +1,7 @@
 """springscale.toml and SPRINGSCALE_* variables -> frozen settings. An unknown key is an error that names it."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
@@ -13,8 +13,8 @@ from gateway.toml_file import describe_faults, read_toml
 Seconds = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
-ESTIMATOR_NAMES = ("cross_spectrum", "ratio_index")
-EstimatorName = Literal["cross_spectrum", "ratio_index"]
+EstimatorName = Literal["cross_spectrum", "ratio_index"]  # those of core.estimator, which loads too much for this
+ESTIMATOR_NAMES: tuple[EstimatorName, ...] = get_args(EstimatorName)
 
 
 class Section(BaseModel):

@@ -12,8 +12,8 @@ from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.evaluation import Judged, error_table
 from gateway.calibration.ratio_index_fit import N_SEGMENT
 from gateway.calibration.regression_fit import fit_regression
+from gateway.config import ESTIMATOR_NAMES
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.estimator import ESTIMATORS
 from gateway.core.known_run import KnownRun
 from gateway.core.ratio_index import PAPER_BANDS, RatioIndexCalibration, indexes_of
 from gateway.core.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
@@ -130,7 +130,7 @@ def gather(output: Path, scope: Scope, on_step: OnStep = lambda what, done, of: 
 
 def _methods(driven: Driven, scope: Scope, path: Path) -> tuple[Method, ...]:
     """Every estimator calibrated on the identification part, and the ratio index with the bands of Table 2."""
-    outcome = calibrate(driven.campaign, scope.settings, estimators=tuple(ESTIMATORS), command="springscale reproduce")
+    outcome = calibrate(driven.campaign, scope.settings, estimators=ESTIMATOR_NAMES, command="springscale reproduce")
     held = outcome.file
     path.write_text(held.to_json(), encoding="utf-8")
     calibrated = held.for_core()

@@ -1,5 +1,6 @@
 """Calibrate a known half-car, weigh it, and refuse what cannot be believed."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -178,8 +179,10 @@ def _gyro_on_another_axis(batch: Batch) -> Batch:
         (_gyro_on_another_axis, Why.MODEL_MISFIT),
     ],
 )
-def test_it_refuses_with_the_reason(spoil: object, why: Why, calibration: CrossSpectrumCalibration) -> None:
-    found = weigh(spoil(batch_over_road(200.0, 50.0, seed=4)), calibration)  # type: ignore[operator]
+def test_it_refuses_with_the_reason(
+    spoil: Callable[[Batch], Batch], why: Why, calibration: CrossSpectrumCalibration
+) -> None:
+    found = weigh(spoil(batch_over_road(200.0, 50.0, seed=4)), calibration)
     assert found.rejected == (why,)
     assert np.isnan(found.payload_kg)
     assert np.isnan(found.front_share_pct)

@@ -1,6 +1,8 @@
 """Load epochs: fuse while the load is the same, begin anew when it is not."""
 
 import math
+from dataclasses import replace
+from random import Random
 
 import numpy as np
 import pytest
@@ -46,10 +48,27 @@ def test_the_interval_shrinks_but_never_below_what_batches_share() -> None:
     assert stds[-1] > 10.0 * math.sqrt(0.5)
 
 
+def drifted(payload_kg: float) -> Estimate:
+    """Nearly all of its 10 kg is what the vehicle has changed since its calibration: every batch has that alike."""
+    return replace(batch(payload_kg), diagnostics={"payload_drift_std_kg": 9.8})
+
+
+def test_what_a_vehicle_has_changed_does_not_average_out() -> None:
+    assert fields_of(epoch_of(*[drifted(270.0)] * 100))["payload_std_kg"] > 9.8
+    assert fields_of(epoch_of(drifted(270.0)))["payload_std_kg"] == pytest.approx(10.0)
+
+
+def test_what_a_vehicle_has_changed_hides_no_change_of_load() -> None:
+    vague, drifting = (epoch_of(*map(kind, (270.0, 281.0))) for kind in (batch, drifted))
+    assert vague is not None
+    assert drifting is not None
+    assert (vague.is_change, drifting.is_change) == (False, True)
+
+
 @given(st.lists(st.floats(262.0, 278.0), min_size=1, max_size=8), st.randoms(use_true_random=False))
-def test_order_does_not_matter_within_an_epoch(payloads_kg: list[float], random: object) -> None:
+def test_order_does_not_matter_within_an_epoch(payloads_kg: list[float], random: Random) -> None:
     shuffled = payloads_kg.copy()
-    random.shuffle(shuffled)  # type: ignore[attr-defined]
+    random.shuffle(shuffled)
     one, other = (fields_of(epoch_of(*map(batch, order))) for order in (payloads_kg, shuffled))
     assert one["payload_kg"] == pytest.approx(other["payload_kg"])
     assert one["payload_kg"] == pytest.approx(np.mean(payloads_kg))

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from gateway.config import Settings, load_settings
+from gateway.config import ESTIMATOR_NAMES, Settings, load_settings
+from gateway.core.estimator import ESTIMATORS
 from gateway.errors import ConfigurationError, SignalMapError
 from gateway.units import si_factor
 
@@ -34,6 +35,10 @@ def test_a_signal_map_is_all_that_must_be_said(tmp_path: Path) -> None:
     assert (settings.batch.window_s, settings.batch.standstill_s, settings.batch.silence_s) == (300.0, 60.0, 10.0)
     assert settings.batch.last_batch_share_min == 0.95
     assert (settings.web.host, settings.web.port) == ("127.0.0.1", 8000)
+
+
+def test_every_estimator_there_is_can_be_chosen_the_better_one_first() -> None:
+    assert tuple(ESTIMATORS) == ESTIMATOR_NAMES
 
 
 def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
