@@ -1,6 +1,6 @@
 """How fast the simulator drives: seconds of driving per second of one core.
 
-Run: python benchmarks/simulator.py
+Run: python benchmarks/bench_simulator.py
 """
 
 import time
