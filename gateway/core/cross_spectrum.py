@@ -18,6 +18,7 @@ import numpy as np
 
 from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
 from gateway.core.drift import DRIFT_STD, DRIFTING, STEADY, drift_covariance
+from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
 from gateway.core.grey_model import INDEX, PARAMETERS, Ground
 from gateway.core.likelihood import Curvature, Point, Whittle
 from gateway.core.map_fit import Found, most_probable
@@ -238,6 +239,8 @@ def _judged(
         "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
         "damper_rear_ratio": _ratio(located, calibration, "damper_rear_nspm"),
         "delay_scale": float(located.point.theta[INDEX["delay_scale"]]),
+        PAYLOAD_DRIFT_STD_KG: math.sqrt(payload_drift_var),
+        FRONT_SHARE_DRIFT_STD_PCT: 100.0 * math.sqrt(share_drift_var),
         "payload_mode_hz": math.exp(located.point.theta[INDEX["payload_mode_hz"]]),
         "delay_s": spectra.delay_mean_s,
         "delay_std_s": spectra.delay_std_s,

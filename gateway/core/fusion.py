@@ -4,7 +4,8 @@
     replace(estimate, epoch=fields_of(epoch))
 
 Part of a batch's error is its own, part is shared by all batches of one vehicle and load (the model's
-error), and only the first averages out. A batch that does not fit opens a new epoch by itself.
+error, and what the vehicle has changed since its calibration), and only the first averages out. What is
+shared hides no change of load. A batch that does not fit opens a new epoch by itself.
 """
 
 import math
@@ -14,9 +15,21 @@ from typing import Final
 
 from gateway.records import Estimate
 
-SHARED_VARIANCE: Final = 0.5  # of a batch's variance: what the batches of an epoch have in common
+SHARED_VARIANCE: Final = 0.5  # of a batch's variance without drift: what the batches of an epoch have in common
+PAYLOAD_DRIFT_STD_KG: Final = "payload_drift_std_kg"
+FRONT_SHARE_DRIFT_STD_PCT: Final = "front_share_drift_std_pct"
+"""Names in ``Estimate.diagnostics`` of what the vehicle's drift adds, which batches share wholly; none if absent."""
 CHANGE_THRESHOLD: Final = 13.8  # chi-squared of two degrees of freedom, one false alarm in a thousand
 STOP_THAT_ENDS_EPOCH_S: Final = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One batch's number with its variance, drift apart."""
+
+    number: float
+    var: float
+    drift_var: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,23 +37,27 @@ class Fused:
     """A running precision-weighted mean of n estimates, in the unit of the quantity."""
 
     mean: float
-    precision: float  # sum of inverse variances
+    precision: float  # sum of inverse variances, drift apart
+    drift_var: float  # mean, weighted alike
     n: int
 
     @property
     def var(self) -> float:
-        """Shared part whole, own part divided by n."""
-        return self.n / self.precision * (SHARED_VARIANCE + (1.0 - SHARED_VARIANCE) / self.n)
+        """Shared parts whole, own part divided by n."""
+        return self.drift_var + self.n / self.precision * (SHARED_VARIANCE + (1.0 - SHARED_VARIANCE) / self.n)
 
-    def distance2(self, found: float, var: float) -> float:
+    def distance2(self, found: Found) -> float:
         """Squared distance of another estimate in standard deviations of the difference; shared errors cancel."""
         own = 1.0 - SHARED_VARIANCE
-        return (found - self.mean) ** 2 / (own * (var + 1.0 / self.precision))
+        return (found.number - self.mean) ** 2 / (own * (found.var + 1.0 / self.precision))
 
-    def joined(self, found: float, var: float) -> "Fused":
+    def joined(self, found: Found) -> "Fused":
         """With one more estimate."""
-        precision = self.precision + 1.0 / var
-        return Fused(self.mean + (found - self.mean) / (var * precision), precision, self.n + 1)
+        precision = self.precision + 1.0 / found.var
+        weight = 1.0 / (found.var * precision)
+        mean = self.mean + weight * (found.number - self.mean)
+        drift_var = self.drift_var + weight * (found.drift_var - self.drift_var)
+        return Fused(mean, precision, drift_var, self.n + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,24 +79,25 @@ def fused(epoch: LoadEpoch | None, estimate: Estimate, could_have_changed: bool 
     kept = None if could_have_changed else epoch
     if not _teaches(estimate):
         return kept
-    payload_var, share_var = estimate.payload_std_kg**2, estimate.front_share_std_pct**2
-    begun = LoadEpoch(
-        estimate.t_start_ns,
-        Fused(estimate.payload_kg, 1.0 / payload_var, 1),
-        Fused(estimate.front_share_pct, 1.0 / share_var, 1),
-    )
+    payload = _found(estimate, estimate.payload_kg, estimate.payload_std_kg, PAYLOAD_DRIFT_STD_KG)
+    share = _found(estimate, estimate.front_share_pct, estimate.front_share_std_pct, FRONT_SHARE_DRIFT_STD_PCT)
+    begun = LoadEpoch(estimate.t_start_ns, _begun(payload), _begun(share))
     if kept is None:
         return begun
-    jump = kept.payload_kg.distance2(estimate.payload_kg, payload_var)
-    jump += kept.front_share_pct.distance2(estimate.front_share_pct, share_var)
-    if jump > CHANGE_THRESHOLD:
+    if kept.payload_kg.distance2(payload) + kept.front_share_pct.distance2(share) > CHANGE_THRESHOLD:
         return LoadEpoch(begun.t_start_ns, begun.payload_kg, begun.front_share_pct, is_change=True)
     return LoadEpoch(
-        kept.t_start_ns,
-        kept.payload_kg.joined(estimate.payload_kg, payload_var),
-        kept.front_share_pct.joined(estimate.front_share_pct, share_var),
-        kept.is_change,
+        kept.t_start_ns, kept.payload_kg.joined(payload), kept.front_share_pct.joined(share), kept.is_change
     )
+
+
+def _found(estimate: Estimate, number: float, std: float, drift_name: str) -> Found:
+    drift_var = estimate.diagnostics.get(drift_name, 0.0) ** 2
+    return Found(number, std**2 - drift_var, drift_var)
+
+
+def _begun(found: Found) -> Fused:
+    return Fused(found.number, 1.0 / found.var, found.drift_var, 1)
 
 
 def fields_of(epoch: LoadEpoch | None) -> Mapping[str, float]:
