@@ -51,9 +51,15 @@ test-vm: .venv/.development deb
 vcan: .venv/.package
 	PATH="$(CURDIR)/$(BIN):$$PATH" deploy/try-on-vcan.sh
 
-# A simulated week in the service at high speed; about ten minutes of one processor.
-soak: .venv/.development
+# A simulated week in the service at high speed, some minutes of one processor; then, where `make test-vm` can run, 200
+# kills of the service and 30 power cuts of its machine at random moments, half an hour.
+SOAK_TESTS := tests/vm/test_4_process_faults.py::test_killed_again_and_again_it_loses_and_doubles_nothing \
+	tests/vm/test_6_power.py
+soak: .venv/.development deb
 	$(BIN)/python benchmarks/soak.py --output build/soak.json
+	rm -f build/vm-soak.json
+	SPRINGSCALE_VM_RESULTS=vm-soak.json SPRINGSCALE_KILLS=200 SPRINGSCALE_POWER_CUTS=30 \
+		$(BIN)/python -m pytest -n 2 --dist loadfile $(SOAK_TESTS)
 
 # Debian packages in build/, for this machine's architecture or another, such as `make deb ARCHITECTURE=arm64`; dpkg-deb
 # must be there, root need not.

@@ -13,7 +13,7 @@ from vm.harness.machine import Machine
 from vm.harness.vehicle import Vehicle
 
 BUILD = Path(__file__).parents[2] / "build"
-RESULTS = BUILD / "vm-results.json"
+RESULTS = BUILD / os.environ.get("SPRINGSCALE_VM_RESULTS", "vm-results.json")
 _BEGUN_S = time.monotonic()
 _RECOVERY = pytest.StashKey[float]()
 _FINDINGS = pytest.StashKey[dict[str, dict[str, object]]]()
@@ -82,7 +82,7 @@ def recovered(request: pytest.FixtureRequest) -> Callable[[float], None]:
 
 @pytest.fixture
 def measured(request: pytest.FixtureRequest) -> Callable[..., None]:
-    """Called with figures, name=number: they go into docs/deployment.md."""
+    """Called with figures, name=number: they go into docs/faults.md."""
 
     def note(**figures: float) -> None:
         request.config.stash.setdefault(_FINDINGS, {}).setdefault("figures", {}).update(figures)

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 
 import httpx
+import pytest
 from vm.harness.vehicle import CONFIG, HEARD, SETTINGS, Vehicle
 
 
@@ -30,6 +31,20 @@ def test_it_runs_as_its_own_user_and_writes_to_its_state_only(vehicle: Vehicle) 
     mounts = vehicle.run(f"grep ' / ' /proc/{vehicle.pid()}/mountinfo")
     assert " ro," in mounts
     assert vehicle.run(f"grep CapEff /proc/{vehicle.pid()}/status").split()[1].strip("0") == ""
+
+
+def test_its_firewall_lets_in_whom_it_was_told_to_and_this_machine(vehicle: Vehicle) -> None:
+    live = f"http://{vehicle.machine.address}:8000/health/live"
+    assert httpx.get(live, timeout=10.0).status_code == 200  # allowed by the drop-in that the tests installed
+    change = "systemctl set-property --runtime springscale"
+    try:
+        vehicle.run(f"{change} IPAddressAllow= IPAddressAllow=localhost")  # as shipped
+        with pytest.raises(httpx.TransportError):
+            httpx.get(live, timeout=2.0)
+        vehicle.run("python3 -c 'import urllib.request as r; r.urlopen(\"http://127.0.0.1:8000/health/live\")'")
+    finally:
+        vehicle.run(f"{change} IPAddressAllow=198.18.0.0/16")
+    vehicle.wait_until(lambda status: True)
 
 
 def test_the_receive_buffer_is_as_large_as_asked(vehicle: Vehicle) -> None:

@@ -37,7 +37,9 @@ def ids(records: list[Answer]) -> list[str]:
     return found
 
 
-def test_killed_again_and_again_it_loses_and_doubles_nothing(many_records: Vehicle, recovered: Recovered) -> None:
+def test_killed_again_and_again_it_loses_and_doubles_nothing(
+    many_records: Vehicle, recovered: Recovered, measured: Callable[..., None]
+) -> None:
     vehicle, moments = many_records, random.Random(4)
     n_restarts = vehicle.n_restarts()
     vehicle.wait_for(lambda: len(vehicle.stored()) > 2)
@@ -55,6 +57,7 @@ def test_killed_again_and_again_it_loses_and_doubles_nothing(many_records: Vehic
     vehicle.wait_for(lambda: len(vehicle.stored()) > n_first)
     told = ids(vehicle.records())
     assert told == ids(vehicle.stored())[: len(told)]
+    measured(kills=N_KILLS, records_after_kills=len(told) - n_first)
 
 
 def test_a_hung_pipeline_is_ended_and_begun_anew(vehicle: Vehicle, recovered: Recovered) -> None:
@@ -151,6 +154,5 @@ def test_a_fault_for_a_person_ends_the_start_once_and_says_which(
         assert "Traceback" not in vehicle.journal(20)
     finally:
         set_schema(vehicle, schema)
-        vehicle.configure(SETTINGS)
-    vehicle.restart()
+    vehicle.restore()  # mended, it starts
     assert ids(vehicle.stored())[: len(before)] == before

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from vm.harness.drives import loaded_drive, log_of
@@ -11,9 +10,10 @@ from vm.harness.vehicle import SETTINGS, STATE, Vehicle
 Recovered = Callable[[float], None]
 
 
-@pytest.fixture
-def small_disk(vehicle: Vehicle, tmp_path: Path) -> Iterator[Vehicle]:
-    """The service on a disk of 4 MB, committing a record every two seconds or so."""
+@pytest.fixture(scope="module")
+def small_disk(installed: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Vehicle]:
+    """The service on a disk of 4 MB, committing a record every two seconds or so. Every test leaves it well."""
+    vehicle = installed
     vehicle.configure(SETTINGS.replace("silence_s = 3.0", "silence_s = 0.5"))
     vehicle.run(
         f"systemctl stop springscale; cp -p {STATE}/tokens.json /root/;"
@@ -21,12 +21,13 @@ def small_disk(vehicle: Vehicle, tmp_path: Path) -> Iterator[Vehicle]:
         f"cp -p /root/tokens.json {STATE}/; systemctl start springscale",
         timeout_s=120.0,
     )
-    pulse = vehicle.put_log(log_of(loaded_drive(1.0, 4), tmp_path / "pulse.log"))
+    pulse = vehicle.put_log(log_of(loaded_drive(1.0, 4), tmp_path_factory.mktemp("pulse") / "pulse.log"))
     vehicle.play_pulses(pulse, pause_s=0.8)
     vehicle.wait_until(lambda status: status["store"]["n_written"] > 2)
     yield vehicle
     vehicle.stop_playing()
     vehicle.run(f"systemctl stop springscale; umount {STATE}")
+    vehicle.restore()
 
 
 def degraded(vehicle: Vehicle) -> None:

@@ -43,6 +43,7 @@ def test_no_power_cut_loses_or_doubles_a_committed_record(
     moments, slowest_s, started_s, n_lost = random.Random(6), 0.0, 0.0, 0
     pulse = vehicle.put_log(log_of(loaded_drive(1.0, 4), tmp_path / "pulse.log"))
     vehicle.run("sync")
+    kept: list[str] = []
     for i in range(N_CUTS):
         vehicle.play_pulses(pulse, pause_s=0.8)
         n_before = len(committed(vehicle))
@@ -59,8 +60,10 @@ def test_no_power_cut_loses_or_doubles_a_committed_record(
         vehicle.machine.boot()
         vehicle.wait_until(lambda status: True)
         slowest_s, started_s = max(slowest_s, time.monotonic() - begun_s), vehicle.machine.boot_s
-        assert committed(vehicle)[: len(before)] == before
+        kept = committed(vehicle)
+        assert kept[: len(before)] == before
         assert vehicle.status()["store"]["set_aside"] is None
     recovered(slowest_s)
-    measured(boot_after_power_cut_s=round(started_s, 1), power_cuts=N_CUTS, sectors_lost_at_power_cuts=n_lost)
+    measured(boot_after_power_cut_s=round(started_s, 1))
+    measured(power_cuts=N_CUTS, sectors_lost_at_power_cuts=n_lost, records_after_power_cuts=len(kept))
     assert n_lost > 0
