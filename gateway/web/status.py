@@ -22,13 +22,16 @@ class State(StrEnum):
 SENTENCES: Final[dict[State, str]] = {
     State.STARTING: "Starting.",
     State.WAITING_FOR_BUS: "The bus is silent: the vehicle is asleep or the channel is not connected.",
-    State.SENSOR_FAULT: "The bus is alive, but a sensor is silent: see the signals.",
+    State.SENSOR_FAULT: "The bus is alive, but a sensor is silent.",
     State.WAITING_FOR_SPEED: "Sensors are heard; waiting for the vehicle to drive fast enough.",
     State.COLLECTING: "Driving; collecting the first batch.",
     State.ESTIMATING: "Driving; the estimate is kept up to date.",
     State.STALE: "No new estimate for a while: the shown one is old.",
     State.READER_FAULT: "The bus cannot be read: see the last fault.",
 }
+
+
+SILENT_AFTER_S: Final = 5.0
 
 
 class _Told(BaseModel):
@@ -65,6 +68,11 @@ class SignalHealth(_Told):
     rate_hz: float | None = None
     last_age_s: float | None = None
     rejected_share: float | None = Field(None, description="share of its frames that gave no sample")
+
+    @property
+    def is_silent(self) -> bool:
+        """Not heard, or not for longer than any signal pauses."""
+        return self.last_age_s is None or self.last_age_s > SILENT_AFTER_S
 
 
 class BatchCounts(_Told):
@@ -133,6 +141,10 @@ class Status(_Told):
     def sentence(self) -> str:
         """The state in words, with what is wrong beside it."""
         said = [SENTENCES[self.state]]
+        if self.state is State.SENSOR_FAULT and (
+            silent := [s.signal.replace("_", " ") for s in self.signals if s.is_silent]
+        ):
+            said.append(f"Silent: {', '.join(silent)}.")
         if self.state is State.READER_FAULT and self.bus.last_fault:
             said.append(f"Last fault: {self.bus.last_fault}.")
         if self.calibration_id is None:

@@ -188,6 +188,13 @@ def test_status_is_told_in_words_and_numbers(gateway: Gateway, client: Client) -
     assert told["store"]["n_held"] == 3
 
 
+def test_a_silent_sensor_is_named() -> None:
+    heard = {"speed": 0.2, "vertical_acceleration": 75.0, "pitch_rate": None}
+    signals = tuple(SignalHealth(signal=name, last_age_s=age_s) for name, age_s in heard.items())
+    told = Status(version="1", state=State.SENSOR_FAULT, uptime_s=90.0, calibration_id="sha256:ab", signals=signals)
+    assert told.state_in_words == "The bus is alive, but a sensor is silent. Silent: vertical acceleration, pitch rate."
+
+
 @pytest.mark.parametrize("state", State)
 def test_every_state_has_its_words(state: State) -> None:
     assert Status(version="1", state=state, uptime_s=0.0).sentence().endswith(".")

@@ -92,6 +92,7 @@ def test_it_shows_how_bus_sensors_and_calibration_are(site: str, watched: Watche
     expect(rows.nth(1).locator(".silent")).to_have_text("silent for 75 s")
     expect(rows.nth(2).locator(".silent")).to_have_text("never heard")
     expect(page.locator("#bus")).to_contain_text("socketcan can0: receiving")
+    expect(page.locator("#bus")).to_contain_text("connected; 31 wait, the oldest for 2.6 h")
     expect(page.locator("#calibrated")).to_contain_text("0 to 420 kg")
 
 

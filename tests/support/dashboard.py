@@ -10,7 +10,7 @@ from gateway.calibration.file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.spectrum import spectra_of
 from gateway.records import Estimate, Why, estimate_to_json
-from gateway.web import BusStatus, KnownLoad, SignalHealth, State, Status, StoreStatus
+from gateway.web import BusStatus, KnownLoad, SignalHealth, State, Status, StoreStatus, UplinkStatus
 from support.estimates import WINDOW_NS, make_estimate
 from support.half_car_road import batch_over_road
 from support.patience import PATIENCE_S
@@ -30,6 +30,7 @@ STATUS = Status(
         SignalHealth(signal="speed"),
     ),
     store=StoreStatus(),
+    uplink=UplinkStatus(broker="fleet.example:8883", is_connected=True, n_waiting=31, waiting_age_s=9300.0),
 )
 TRUTH = (KnownLoad(0, 0.0, 50.0), KnownLoad(2 * WINDOW_NS, 270.0, 48.0))
 

@@ -19,8 +19,20 @@ function signalRow(signal) {
   return built;
 }
 
+/** How estimates get to the fleet; nothing where no broker is configured. */
+function uplinkPairs(uplink) {
+  if (uplink === null) return [];
+  const age = uplink.waiting_age_s === null ? "" : `, the oldest for ${duration(uplink.waiting_age_s)}`;
+  const queue = uplink.n_waiting ? `${number(uplink.n_waiting, 0)} wait${age}` : "nothing waits";
+  const link = uplink.is_connected ? "connected" : "not connected";
+  return [
+    pair("Fleet's broker", `${link}; ${queue}`, uplink.is_connected ? "" : "over"),
+    pair("Delivered to it", number(uplink.n_delivered, 0)),
+  ];
+}
+
 show(({ status }) => {
-  const { bus, batches, store } = status;
+  const { bus, batches, store, uplink } = status;
   element("signals").replaceChildren(...status.signals.map(signalRow));
   element("bus").replaceChildren(
     pair("Bus", `${bus.interface} ${bus.channel}: ${words(bus.state)}`),
@@ -28,6 +40,7 @@ show(({ status }) => {
     pair("Dropped", number(bus.n_inbox_dropped + (bus.n_kernel_dropped ?? 0), 0)),
     pair("Batches since the start", `${batches.n_estimates} weighed, ${batches.n_rejected} not`),
     pair("Store", store.state === "ok" ? "on disk" : `in memory only: ${store.reason}`, store.state === "ok" ? "" : "over"),
+    ...uplinkPairs(uplink),
     pair("Running for", duration(status.uptime_s)),
   );
 }, "status");
@@ -58,6 +71,7 @@ function withCode(text) {
 }
 
 const N_SHOWN = 3;
+const USUAL = "The drive"; // a cause that asks nobody for anything
 
 function rejection(batch, reasons) {
   const when = made("time", new Date(batch.t_end).toLocaleString(undefined, { dateStyle: "short", timeStyle: "short" }));
@@ -65,7 +79,7 @@ function rejection(batch, reasons) {
   const parts = batch.rejected.map((reason) => {
     const told = reasons.get(reason);
     const said = told ? [": ", ...withCode(told.happened), ". ", made("em", "What to do: "), ...withCode(told.advice), "."] : [];
-    return made("p", [made("strong", capital(words(reason))), ...said]);
+    return made("p", [made("strong", capital(words(reason))), ...said], told?.cause === USUAL ? "usual" : "");
   });
   return made("li", [when, ...parts]);
 }

@@ -8,10 +8,11 @@ import { clock, figure, number, words } from "/assets/dashboard/words.js";
 const PANELS = [
   { name: "vertical_acceleration_mps2_rthz", title: "Vertical acceleration [m/s²/√Hz], log scale", bands: "acceleration_bands" },
   { name: "pitch_rate_radps_rthz", title: "Pitch rate [rad/s/√Hz], log scale", bands: "pitch_rate_bands" },
-  { name: "coherence", title: "Coherence of the two", range: [0, 1] },
+  { name: "coherence", title: "Coherence of the two", range: [0, 1.05] },
   { name: "phase_rad", title: "Phase of pitch rate against acceleration [rad]", range: [-Math.PI, Math.PI] },
 ];
 
+const TICKS = [0.00001, 0.00003, 0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10]; // evenly apart on a log scale
 const RESONANCE_BELOW_HZ = 4; // spectra are high there: names of bands stand at the foot, elsewhere at the head
 
 function panel({ name, title }) {
@@ -64,7 +65,7 @@ function drawPanels(told) {
     if (told.model) lines.push(line(told.model, each.name, "model", 2.2));
     plot(element(`spectra-${each.name}`), each.name === "phase_rad" ? lines.map(wrapped) : lines, {
       xaxis: { title: { text: "Hz", standoff: 2 }, range: [0.5, 15] },
-      yaxis: each.range ? { range: each.range } : { type: "log", dtick: "D2", exponentformat: "none" },
+      yaxis: each.range ? { range: each.range } : { type: "log", tickvals: TICKS, ticktext: TICKS.map(String) },
       shapes: bandShapes(told[each.bands]),
     });
   }
