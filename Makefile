@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check bench deb soak test-vm vcan lock docs screenshots clean
+.PHONY: demo test check bench deb soak test-vm vm-image vcan lock docs screenshots clean
 .DEFAULT_GOAL := demo
 
 .venv/bin/python:
@@ -47,6 +47,10 @@ test-vm: .venv/.development deb
 	rm -f build/vm-results.json
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/vm
 
+# What of test-vm needs no test: its machine's disk, built once and kept.
+vm-image: .venv/.development
+	PYTHONPATH=tests $(BIN)/python -c "from vm.harness.image import kept_image; kept_image('uml')"
+
 # A simulated drive on this machine's own vcan0, into the service: docs/deployment.md.
 vcan: .venv/.package
 	PATH="$(CURDIR)/$(BIN):$$PATH" deploy/try-on-vcan.sh
@@ -63,8 +67,13 @@ soak: .venv/.development deb
 
 # Debian packages in build/, for this machine's architecture or another, such as `make deb ARCHITECTURE=arm64`; dpkg-deb
 # must be there, root need not.
-deb: .venv/.package
-	$(BIN)/python deploy/deb/build.py $(if $(ARCHITECTURE),--architecture $(ARCHITECTURE))
+PACKAGED := $(shell find gateway dbc deploy docs -type f -not -name '*.pyc') \
+	CHANGELOG.md LICENSE README.md pyproject.toml requirements.txt
+PACKAGES := build/.packages$(addprefix -,$(ARCHITECTURE))
+deb: $(PACKAGES)
+$(PACKAGES): $(PACKAGED) | .venv/.package
+	$(BIN)/python deploy/deb/build.py $(addprefix --architecture ,$(ARCHITECTURE))
+	touch $@
 
 # The pictures in README.md; needs chromium.
 screenshots: .venv/.development
