@@ -21,7 +21,7 @@ from gateway.calibration.design_loads import PlacedLoad
 from gateway.calibration.grey_box import BAND_HZ, EVIDENCE_WEIGHT, N_SEGMENT
 from gateway.core.bounds import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectra import Reading
-from gateway.core.drift import DRIFT_STD, DRIFTING, STEADY
+from gateway.core.drift import DRIFT_PRECISION, DRIFTING, STEADY
 from gateway.core.grey_model import PARAMETERS, Ground
 from gateway.core.likelihood import Point, Whittle
 from gateway.core.vehicle import Vehicle
@@ -94,8 +94,7 @@ class Design:
         n = len(PARAMETERS)
         information = whittle.curvature(point, list(range(n)), is_load_free=True).information
         fitted = [*DRIFTING, n, n + 1]
-        prior = np.r_[np.array(list(DRIFT_STD.values())) ** -2.0, 0.0, 0.0]
-        own = np.linalg.inv(information[np.ix_(fitted, fitted)] + np.diag(prior))
+        own = np.linalg.inv(information[np.ix_(fitted, fitted)] + np.pad(DRIFT_PRECISION, (0, 2)))
         moves = np.zeros((2, n))
         moves[:, STEADY] = -(own @ information[np.ix_(fitted, STEADY)])[-2:]
         return np.diag(own)[-2:], moves

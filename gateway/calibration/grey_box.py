@@ -160,7 +160,7 @@ def fit_half_car(known: Sequence[KnownSpectra], prior: Prior, start: F64) -> Fou
             information=np.sum([part.information for part in parts], axis=0),
         )
 
-    return most_probable(start, prior.mean, prior.std, cost, curvature, tolerance=0.05)
+    return most_probable(start, prior.mean, np.diag(prior.std**-2.0), cost, curvature, tolerance=0.05)
 
 
 def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:

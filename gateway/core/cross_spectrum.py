@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
-from gateway.core.drift import DRIFT_STD, DRIFTING, STEADY, drift_covariance
+from gateway.core.drift import DRIFT_PRECISION, DRIFTING, STEADY, drift_covariance
 from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
 from gateway.core.grey_model import INDEX, PARAMETERS, Ground
 from gateway.core.likelihood import Curvature, Point, Whittle
@@ -154,7 +154,7 @@ def _fit_load(whittle: Whittle, calibration: CrossSpectrumCalibration) -> Found:
     """Drift parameters, then payload (kg) and front share (0..1), from the best of a few starting loads."""
     usual = calibration.parameters[DRIFTING]
     prior_mean = np.r_[usual, 0.0, 0.0]
-    prior_std = np.r_[list(DRIFT_STD.values()), np.inf, np.inf]
+    prior_precision = np.pad(DRIFT_PRECISION, (0, 2))  # flat in payload and share
 
     def cost(x: F64) -> float:
         return whittle.cost(_point(x, calibration))
@@ -163,7 +163,7 @@ def _fit_load(whittle: Whittle, calibration: CrossSpectrumCalibration) -> Found:
         return whittle.curvature(_point(x, calibration), DRIFTING, is_load_free=True)
 
     starts = sorted((np.r_[usual, load] for load in _starting_loads(calibration)), key=cost)[:STARTS_TRIED]
-    peaks = [most_probable(start, prior_mean, prior_std, cost, curvature) for start in starts]
+    peaks = [most_probable(start, prior_mean, prior_precision, cost, curvature) for start in starts]
     return min(peaks, key=lambda found: found.cost)
 
 

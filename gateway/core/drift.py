@@ -14,9 +14,9 @@ from gateway.core.grey_model import INDEX, PARAMETERS
 from gateway.records import F64
 
 DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
-    {"damper_front_nspm": 0.02, "damper_rear_nspm": 0.02, "delay_scale": 0.003, "payload_mode_hz": 0.3}
+    {"damper_front_nspm": 0.01, "damper_rear_nspm": 0.01, "delay_scale": 0.003, "payload_mode_hz": 0.3}
 )
-"""What the search leaves free, and how far off: standard deviations, of logarithms where quantities are positive.
+"""What the search leaves free, and how far off, each by itself: standard deviations, of logarithms of what is positive.
 
 Narrower than nature, for the minutes of a batch repeat one error of the model: less evidence than they seem.
 """
@@ -27,27 +27,39 @@ NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
         "spring_rear_npm": 0.01,
         "tyre_front_npm": 0.03,  # goes with its pressure, and that with the absolute temperature: 10 K are 3.4 %
         "tyre_rear_npm": 0.03,
-        "damper_front_nspm": 0.05,  # the oil's viscosity, as far as valves let it through
+        "damper_front_nspm": 0.05,  # wear, and the oil's viscosity as far as valves let it through
         "damper_rear_nspm": 0.05,
         "payload_mode_hz": 0.6,  # on the floor, on pallets, in a rack
     }
 )
 """How far vehicle and packing really lie from their calibration; each axle its own."""
 
+DAMPERS_TOGETHER_STD: Final = 0.05
+"""What both axles' dampers have in common beside it: their oil is as warm or cold in front as at the rear."""
+
 DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
 STEADY: Final = [i for i in range(len(PARAMETERS)) if i not in DRIFTING]
+
+
+def _believed_covariance() -> F64:
+    is_damper = np.array([name.startswith("damper_") for name in DRIFT_STD], dtype=float)
+    together: F64 = DAMPERS_TOGETHER_STD**2 * np.outer(is_damper, is_damper)
+    return together + np.diag(np.array(list(DRIFT_STD.values())) ** 2)
+
+
+DRIFT_PRECISION: Final = np.linalg.inv(_believed_covariance())
+"""(k, k) of the DRIFTING parameters: the inverse of what the search believes of them."""
 
 
 def drift_covariance(found: F64, moves: F64) -> F64:
     """What nature adds to the covariance ``found`` (k, k) of the drifting parameters and the load: (k, k) again.
 
     ``moves`` (k, s) is by how much these move with each of the STEADY parameters. A parameter that drifts
-    further than the search believed pulls the answer by the share that the prior holds of it: found / std^2
+    further than the search believed pulls the answer by the share that the prior holds of it: found times precision
     (S. F. Schmidt's consider covariance, Adv. Control Syst. 3, 1966).
     """
-    believed_var = np.array(list(DRIFT_STD.values())) ** 2
-    pulls = found[:, : len(DRIFTING)] / believed_var
-    more_var = np.maximum(0.0, _nature_var(DRIFTING) - believed_var)
+    pulls = found[:, : len(DRIFTING)] @ DRIFT_PRECISION
+    more_var = np.maximum(0.0, _nature_var(DRIFTING) - np.array(list(DRIFT_STD.values())) ** 2)
     added: F64 = (moves * _nature_var(STEADY)) @ moves.T + (pulls * more_var) @ pulls.T
     return added
 

@@ -24,28 +24,27 @@ class Found:
 def most_probable(
     start: F64,
     prior_mean: F64,
-    prior_std: F64,
+    prior_precision: F64,
     cost: Callable[[F64], float],
     curvature: Callable[[F64], Curvature],
     tolerance: float = 1e-3,
 ) -> Found:
-    """Minimise cost(x) + sum ((x - mean) / std)^2 / 2 from ``start``.
+    """Minimise cost(x) + (x - mean)' precision (x - mean) / 2 from ``start`` (k,).
 
-    An infinite ``prior_std`` is a flat prior. Steps are damped (Levenberg 1944) until they help; the
+    Where ``prior_precision`` (k, k) is zero the prior is flat. Steps are damped (Levenberg 1944) until they help; the
     search ends when a step gains less than ``tolerance``, which is nothing against one unit of evidence.
     """
-    precision = prior_std**-2.0
 
     def total(x: F64) -> float:
-        return cost(x) + 0.5 * float(np.sum(precision * (x - prior_mean) ** 2))
+        return cost(x) + 0.5 * float((x - prior_mean) @ prior_precision @ (x - prior_mean))
 
     x, damping = start, 1e-3
     best = total(x)
-    information: F64 = np.diag(precision)
+    information = prior_precision
     for _ in range(MOST_STEPS):
         here = curvature(x)
-        gradient = here.gradient + precision * (x - prior_mean)
-        information = here.information + np.diag(precision)
+        gradient = here.gradient + prior_precision @ (x - prior_mean)
+        information = here.information + prior_precision
         moved = _damped_step(x, gradient, information, damping, total, best)
         if moved is None:
             break

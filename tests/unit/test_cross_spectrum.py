@@ -7,11 +7,18 @@ import numpy as np
 import pytest
 
 from gateway.calibration.grey_box import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum
-from gateway.core.cross_spectrum import CrossSpectrum, CrossSpectrumCalibration
+from gateway.core.cross_spectra import cross_spectra_of
+from gateway.core.cross_spectrum import (
+    UNSEEN_ROUGHNESS_SCALE,
+    UNSEEN_SPEED_SCALE,
+    CrossSpectrum,
+    CrossSpectrumCalibration,
+)
+from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
 from gateway.core.grey_model import INDEX, PARAMETERS
 from gateway.core.known_run import KnownRun
 from gateway.errors import CalibrationImpossibleError
-from gateway.records import Batch, Estimate, Why
+from gateway.records import F64, Batch, Estimate, Why
 from tests.support.half_car_road import CAR, VAN, batch_of, batch_over_road
 
 KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
@@ -96,12 +103,21 @@ def test_more_driving_makes_it_surer(calibration: CrossSpectrumCalibration) -> N
     assert long.front_share_std_pct < short.front_share_std_pct
 
 
+def own_variances(found: Estimate) -> F64:
+    """Of payload (kg) and front share (%), without what a change of the vehicle adds: that is the same anywhere."""
+    drift = np.array([found.diagnostics[PAYLOAD_DRIFT_STD_KG], found.diagnostics[FRONT_SHARE_DRIFT_STD_PCT]])
+    return np.array([found.payload_std_kg, found.front_share_std_pct]) ** 2 - drift**2
+
+
 def test_an_unseen_speed_widens_the_interval(calibration: CrossSpectrumCalibration) -> None:
+    """Twice the variance for a speed a factor of e^0.5 below the slowest of calibration."""
     seen = weigh(batch_over_road(200.0, 50.0, seed=3), calibration)
-    at_other_speeds = replace(calibration, speed_seen_mps=(28.0, 29.0))
-    unseen = weigh(batch_over_road(200.0, 50.0, seed=3), at_other_speeds)
+    slowest_mps = seen.mean_speed_mps * np.exp(UNSEEN_SPEED_SCALE)
+    unseen = weigh(batch_over_road(200.0, 50.0, seed=3), replace(calibration, speed_seen_mps=(slowest_mps, 99.0)))
     assert unseen.payload_kg == seen.payload_kg
-    assert unseen.payload_std_kg > 1.5 * seen.payload_std_kg
+    roughness = roughness_ratio(calibration)
+    factor = (2.0 + roughness) / (1.0 + roughness)
+    assert own_variances(unseen) == pytest.approx(factor * own_variances(seen), rel=1e-6)
 
 
 @pytest.mark.parametrize("rougher", [0.5, 2.0])
@@ -111,8 +127,17 @@ def test_another_roughness_widens_the_interval(calibration: CrossSpectrumCalibra
     on_other_roads = replace(calibration, acceleration_rms_mps2=calibration.acceleration_rms_mps2 / rougher)
     unseen = weigh(batch_over_road(200.0, 50.0, seed=3), on_other_roads)
     assert unseen.payload_kg == seen.payload_kg
-    assert unseen.payload_std_kg > 1.5 * seen.payload_std_kg
-    assert unseen.front_share_std_pct > 1.2 * seen.front_share_std_pct  # what drift adds is the same on any road
+    factor = (1.0 + roughness_ratio(on_other_roads)) / (1.0 + roughness_ratio(calibration))
+    assert factor > 1.5
+    assert own_variances(unseen) == pytest.approx(factor * own_variances(seen), rel=1e-6)
+
+
+def roughness_ratio(calibration: CrossSpectrumCalibration) -> float:
+    """The square of the road's distance from those of calibration, in its scale."""
+    spectra = cross_spectra_of([batch_over_road(200.0, 50.0, seed=3)], calibration.reading)
+    assert spectra is not None
+    distance = np.log(spectra.acceleration_rms_mps2 / calibration.acceleration_rms_mps2)
+    return float((distance / UNSEEN_ROUGHNESS_SCALE) ** 2)
 
 
 def test_one_empty_run_is_enough_and_says_so() -> None:

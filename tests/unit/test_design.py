@@ -63,8 +63,14 @@ def test_the_order_of_runs_does_not_matter_and_every_run_helps(design: Design, l
     assert np.all(np.diag(forward) <= np.diag(UNKNOWN) * (1.0 + 1e-9))
 
 
-def test_with_a_vehicle_fully_known_the_spread_is_the_cramer_rao_bound(calibration: CrossSpectrumCalibration) -> None:
+def test_with_a_vehicle_fully_known_the_spread_is_the_cramer_rao_bound(
+    calibration: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of parameters that drift each by itself, as the bound takes them."""
     target = placed(220.0, 1.9)
+    monkeypatch.setattr(
+        "gateway.calibration.design.DRIFT_PRECISION", np.diag(np.array(list(DRIFT_STD.values())) ** -2.0)
+    )
     found = Design(VAN, calibration.parameters, DRIVE, [target]).spread(np.zeros_like(UNKNOWN))
     bound = cramer_rao(calibration, 220.0, target.front_share_pct, Drive(300.0, 14.0), DRIFT_STD)
     assert found.payload_std_kg == pytest.approx(bound.payload_std_kg, rel=1e-6)
