@@ -1,8 +1,9 @@
 """A connection that gives nobody more than a fair share of time, memory and places."""
 
 import asyncio
+import logging
 from http import HTTPStatus
-from typing import Final
+from typing import Any, Final
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
@@ -16,6 +17,9 @@ LINGER_S: Final = 1.0  # for a refused client to read why; closed at once, its u
 CONNECTIONS: Final = 512  # below the usual 1024 file descriptors of a process
 CONNECTIONS_PER_ADDRESS: Final = 128
 
+_log = logging.getLogger("uvicorn.error.connection")
+_log.setLevel(logging.ERROR)  # uvicorn warns of each request it cannot read: strangers could fill the log with them
+
 
 class GuardedConnection(HttpToolsProtocol):
     """uvicorn's HTTP/1.1 protocol with the limits it leaves out.
@@ -24,6 +28,10 @@ class GuardedConnection(HttpToolsProtocol):
     what is no HTTP are answered with a problem and end it too; a connection too many is closed before it costs
     anything. Answers under way, streams among them, may take as long as they like.
     """
+
+    def __init__(self, *parts: Any, **named_parts: Any) -> None:
+        super().__init__(*parts, **named_parts)
+        self.logger = _log
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as in uvicorn
         super().connection_made(transport)

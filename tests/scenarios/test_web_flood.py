@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import logging
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
@@ -175,7 +176,9 @@ def test_many_requests_in_one_breath_are_no_long_head(tmp_path: Path) -> None:
         b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5\r\n\r\n",
     ],
 )
-def test_what_is_no_request_ends_with_400(tmp_path: Path, request_text: bytes) -> None:
+def test_what_is_no_request_ends_with_400_and_leaves_no_word_in_the_log(
+    tmp_path: Path, request_text: bytes, caplog: pytest.LogCaptureFixture
+) -> None:
     async def scenario(server: Server) -> None:
         stranger = await connect(server)
         stranger[1].write(request_text)
@@ -183,3 +186,4 @@ def test_what_is_no_request_ends_with_400(tmp_path: Path, request_text: bytes) -
         await assert_others_are_answered(server)
 
     run(tmp_path, scenario)
+    assert [record for record in caplog.records if record.levelno > logging.INFO] == []
