@@ -109,7 +109,7 @@ class Campaign:
 
 
 def load_campaign(path: Path) -> Campaign:
-    """Raises CampaignError naming every fault of the file, every log that is not there and every load that cannot be."""
+    """Raises CampaignError naming every fault of the file, logs that are not there and loads that cannot be."""
     campaign = Campaign(path, load_toml(path, CampaignTable, CampaignError))
     faults = [
         f"{path}: runs[{i}].{fault}" for i, run in enumerate(campaign.runs, 1) for fault in _faults(campaign, run)

@@ -11,7 +11,7 @@ auto-spectra: 1 for the same phases, -1 for opposite ones. The rear axle follows
 sensor turned over at the rear is not the same as one at the front.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -88,10 +88,13 @@ def mean_coherence(spectra: CrossSpectra) -> float:
     return float(np.mean(spectra.coherence[seen]))
 
 
-def agreement(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Agreement:
-    """The best over sensor positions from 1.5 m ahead of the front axle to 1.5 m behind the rear one."""
+def agreement(spectra: CrossSpectra, load: tuple[float, float], vehicle: Vehicle) -> Agreement:
+    """The best over sensor positions from 1.5 m ahead of the front axle to 1.5 m behind the rear one.
+
+    ``load`` is the payload (kg) and front share (%) of the half-car.
+    """
     positions_m = np.arange(-BEYOND_AXLES_M, vehicle.wheelbase_m + BEYOND_AXLES_M + STEP_M / 2.0, STEP_M)
-    m_aa, m_gg, m_ga = _half_cars(spectra, run, vehicle, positions_m)
+    m_aa, m_gg, m_ga = _half_cars(spectra, load, vehicle, positions_m)
     n = spectra.n_segments
     seen: C128 = spectra.cross / np.sqrt(spectra.acceleration * spectra.pitch_rate)
     expected: C128 = m_ga / np.sqrt(m_aa * m_gg)
@@ -103,12 +106,14 @@ def agreement(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Agreeme
     return Agreement(float((inner / np.sqrt(norms))[at]), float(positions_m[at]), scale)
 
 
-def _half_cars(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle, positions_m: F64) -> tuple[F64, F64, C128]:
+def _half_cars(
+    spectra: CrossSpectra, load: tuple[float, float], vehicle: Vehicle, positions_m: F64
+) -> tuple[F64, F64, C128]:
     """The usual half-car's spectra (p, b, m) with its sensor at each of positions_m (p,)."""
     theta = np.repeat(prior_of(vehicle).mean[None], len(positions_m), axis=0)
     theta[:, INDEX["sensor_position_m"]] = positions_m
     ground = Ground(vehicle.empty_mass_kg, vehicle.empty_front_share_pct / 100.0, vehicle.wheelbase_m)
-    payload_kg, share = np.full(len(theta), run.payload_kg), np.full(len(theta), run.front_share_pct / 100.0)
+    payload_kg, share = np.full(len(theta), load[0]), np.full(len(theta), load[1] / 100.0)
     return expected_spectra(spectral_model(theta, payload_kg, share, ground, spectra.freq_hz), spectra)
 
 
@@ -136,8 +141,26 @@ class Phases:
 
 
 def phases(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Phases:
-    """Both signs of the pitch rate beside the usual half-car."""
-    return Phases(agreement(spectra, run, vehicle), agreement(spectra.with_pitch_reversed(), run, vehicle))
+    """Both signs of the pitch rate beside the usual half-car.
+
+    It carries the load stated or none, whichever explains more: a load noted wrong shall not look like a wrong axis.
+    """
+    loads = dict.fromkeys([_stated(run), (0.0, vehicle.empty_front_share_pct)])
+    upright, turned = (
+        _likeliest([agreement(seen, load, vehicle) for load in loads])
+        for seen in (spectra, spectra.with_pitch_reversed())
+    )
+    return Phases(upright, turned)
+
+
+def _stated(run: KnownRun) -> tuple[float, float]:
+    return run.payload_kg, run.front_share_pct
+
+
+def _likeliest(found: Sequence[Agreement]) -> Agreement:
+    """The best agreement, with the most usual of the scales."""
+    best = max(found, key=lambda one: one.best)
+    return replace(best, scale=min((one.scale for one in found), key=lambda scale: abs(np.log(scale))))
 
 
 def likeliest_speed(as_read: Phases, misread: Mapping[str, Phases]) -> tuple[str | None, Phases]:
@@ -199,7 +222,7 @@ def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) ->
 
 def fitted_position_m(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> tuple[float, float]:
     """The most probable sensor position of one run and its standard deviation, the rest of the vehicle unknown too."""
-    start_m = agreement(spectra, run, vehicle).position_m
+    start_m = agreement(spectra, _stated(run), vehicle).position_m
     loose = prior_of(replace(vehicle, sensor_position_m=start_m, sensor_position_std_m=LOOSE_STD_M))
     at_rest = fit_half_car([KnownSpectra(run, vehicle, spectra)], loose, loose.start(0.0, 0.0))
     at = INDEX["sensor_position_m"]

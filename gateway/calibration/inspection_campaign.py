@@ -9,12 +9,14 @@ import numpy as np
 from gateway.calibration.inspection import Finding, RunVerdict, Severity
 from gateway.calibration.inspection_kinds import Kind, found
 from gateway.calibration.inspection_loads import compare_loads
+from gateway.calibration.inspection_log import same_drive_findings
 from gateway.calibration.inspection_run import Inspected, inspect_run
 from gateway.core.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 
 SPEED_DIFFERS_BY: Final = 0.2
+BEYOND_RANGE_BY: Final = 0.25  # of the range
 SMOOTHER_BY: Final = 4.0
 ALIKE_SHARE: Final = 0.05  # of the empty mass: what five minutes of the ratio index scatter by
 SHARES_ALIKE_PCT: Final = 1.0
@@ -26,7 +28,11 @@ def inspect_campaign(
 ) -> tuple[tuple[RunVerdict, ...], tuple[Finding, ...]]:
     """A verdict for every run in the order given, and what is to say of the campaign as a whole."""
     verdicts = {one.identification.number: inspect_run(one, vehicle, settings) for one in inspected}
-    for number, finding in _beside_the_others(inspected):
+    for number, finding in (
+        *_same_drives(inspected),
+        *_beyond_range(inspected, vehicle),
+        *_beside_the_others(inspected),
+    ):
         verdicts[number] = _with(verdicts[number], finding)
     sound = [
         one.identification
@@ -41,6 +47,21 @@ def inspect_campaign(
 
 def _with(verdict: RunVerdict, finding: Finding) -> RunVerdict:
     return replace(verdict, findings=(*verdict.findings, finding))
+
+
+def _same_drives(inspected: Sequence[Inspected]) -> Iterator[tuple[int, Finding]]:
+    runs = {one.identification.number: one for one in inspected}
+    loads = {number: (one.run.payload_kg, one.run.front_share_pct) for number, one in runs.items()}
+    return same_drive_findings({number: one.log for number, one in runs.items()}, loads)
+
+
+def _beyond_range(inspected: Sequence[Inspected], vehicle: Vehicle) -> Iterator[tuple[int, Finding]]:
+    low_kg, high_kg = vehicle.payload_range_kg
+    for one in inspected:
+        payload_kg = one.identification.payload_kg
+        if payload_kg > high_kg + BEYOND_RANGE_BY * (high_kg - low_kg):
+            text = f"{payload_kg:g} kg, payload_range_kg ends at {high_kg:g} kg"
+            yield one.identification.number, found(Kind.LOAD_BEYOND_RANGE, Severity.WARNING, text)
 
 
 def _beside_the_others(inspected: Sequence[Inspected]) -> Iterator[tuple[int, Finding]]:

@@ -12,10 +12,15 @@ from gateway.calibration.inspection import Finding, Severity
 class Kind(StrEnum):
     """What a finding is about. docs/calibration.md has the table."""
 
+    LOG_UNREADABLE = "log_unreadable"
+    LOG_DAMAGED = "log_damaged"
+    CUT_AWAY = "cut_away"
+    SAME_DRIVE = "same_drive"
     TOO_SHORT = "too_short"
     NO_USABLE_BATCH = "no_usable_batch"
     BATCHES_LOST = "batches_lost"
     UNSTEADY = "unsteady"
+    SIGNAL_UNMAPPED = "signal_unmapped"
     SENSOR_SILENT = "sensor_silent"
     RATE_LOW = "rate_low"
     JITTER = "jitter"
@@ -38,6 +43,7 @@ class Kind(StrEnum):
     SPEED_DIFFERS = "speed_differs"
     SMOOTH_ROAD = "smooth_road"
     COARSE_RESOLUTION = "coarse_resolution"
+    LOAD_BEYOND_RANGE = "load_beyond_range"
     ONE_LOAD_ONLY = "one_load_only"
     LOADS_ALIKE = "loads_alike"
     SHARES_ALIKE = "shares_alike"
@@ -70,6 +76,30 @@ class Explained:
 
 EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
     {
+        Kind.LOG_UNREADABLE: Explained(
+            Topic.DRIVE,
+            (Severity.FAULT,),
+            "nothing in the log can be read, or nothing that the signal map names",
+            "check that it is the log of this drive, recorded on this bus, and copied whole",
+        ),
+        Kind.LOG_DAMAGED: Explained(
+            Topic.DRIVE,
+            (Severity.WARNING,),
+            "a part of the log cannot be read; the rest is used",
+            "copy the log again from the recorder; let the recorder close its file before power goes",
+        ),
+        Kind.CUT_AWAY: Explained(
+            Topic.DRIVE,
+            (Severity.FAULT,),
+            "start_s and end_s leave nothing of the log",
+            "correct start_s and end_s: seconds from the first frame of the log",
+        ),
+        Kind.SAME_DRIVE: Explained(
+            Topic.DRIVE,
+            (Severity.FAULT,),
+            "two runs are the same piece of the same log, so one of them tells nothing new or something wrong",
+            "name the right log for each run, or pieces of it that do not overlap",
+        ),
         Kind.TOO_SHORT: Explained(
             Topic.DRIVE,
             (Severity.FAULT,),
@@ -99,6 +129,12 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             (Severity.WARNING,),
             "the vehicle hardly shakes, or far less than in the other runs",
             "drive on an ordinary road, the same for all loads",
+        ),
+        Kind.SIGNAL_UNMAPPED: Explained(
+            Topic.SENSORS,
+            (Severity.FAULT, Severity.WARNING),
+            "the signal map does not name this signal",
+            "add it to the signal map: every estimator wants the speed, cross_spectrum wants both sensors",
         ),
         Kind.SENSOR_SILENT: Explained(
             Topic.SENSORS,
@@ -231,6 +267,12 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             (Severity.NOTE,),
             "the speed is another than in most runs, which the ratio index takes for a load",
             "drive all loads at the same speed, or every load at every speed",
+        ),
+        Kind.LOAD_BEYOND_RANGE: Explained(
+            Topic.LOADS,
+            (Severity.WARNING,),
+            "a load lies far beyond payload_range_kg, which errors are stated in percent of and plans keep within",
+            "check payload_kg; if it is right, set payload_range_kg to what the vehicle may carry",
         ),
         Kind.ONE_LOAD_ONLY: Explained(
             Topic.LOADS,

@@ -20,12 +20,14 @@ from gateway.core.cross_spectrum import locate
 from gateway.core.known_run import KnownRun
 from gateway.core.likelihood import Point
 from gateway.core.map_fit import Found
+from gateway.core.reach import beyond
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
 
 LEAST_EVIDENCE: Final = 20.0
-PAIRS_TRIED: Final = 2
+PAIRS_TRIED: Final = 4
+PAIRS_OF_FEW: Final = 2
 FEW_RUNS: Final = 4  # so few can bend the fit to their labels: pairs are tried whatever the fit says
 STRAINED_MISFIT: Final = 4.0  # 1 is perfect, true labels have stayed below 3
 LEAST_OTHERS: Final = 3  # to weigh a run by
@@ -35,19 +37,24 @@ DOUBT_FRONT_SHARE: Final = 0.03
 
 
 def compare_loads(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[tuple[int, Finding]]:
-    """Run numbers with what is to say of their loads: two that are swapped, or one that disagrees with the others."""
+    """Run numbers with what is to say of their loads: pairs that are swapped, then any that disagrees with the others.
+
+    The pair that explains most is set aside and the others are asked again, until no pair is left.
+    """
     try:
         known = known_spectra(runs, vehicle)
     except CalibrationImpossibleError:
         return
-    if len(known) < 2:
-        return
-    all_runs = _Labelled(known, vehicle)
-    swapped = all_runs.swapped_pair()
-    if swapped is not None:
-        yield from _swap_findings(all_runs, *swapped)
-        return
-    yield from _disagreements(all_runs)
+    least = 2
+    while len(known) >= least:
+        labelled = _Labelled(known, vehicle)
+        swapped = labelled.swapped_pair()
+        if swapped is None:
+            yield from _disagreements(labelled)
+            return
+        yield from _swap_findings(labelled, *swapped)
+        known = [one for n, one in enumerate(known) if n not in swapped[:2]]
+        least = LEAST_OTHERS
 
 
 class _Labelled:
@@ -65,7 +72,10 @@ class _Labelled:
         return np.array([[k.whittle.cost(Point(self.found.x, *load)) for load in loads] for k in self.known])
 
     def swapped_pair(self) -> tuple[int, int, float] | None:
-        """The pair whose exchange explains the drives best, with its evidence; None where none does by enough."""
+        """The pair whose exchange explains the drives best, with its evidence; None where none does by enough.
+
+        Where enough other runs are there to weigh both, these must agree: one wrong label improves by many exchanges.
+        """
         costs = self.costs()
         own = np.diag(costs)
         gains = own[:, None] + own[None, :] - costs - costs.T
@@ -74,10 +84,25 @@ class _Labelled:
         if len(self.known) > FEW_RUNS:
             likely = [pair for pair in pairs[:PAIRS_TRIED] if gains[pair] > 0.0]
         else:
-            likely = pairs if self._is_strained() else pairs[:PAIRS_TRIED]
+            likely = pairs if self._is_strained() else pairs[:PAIRS_OF_FEW]
         tried = [(i, j, self.found.cost - self._with_exchanged(i, j).cost) for i, j in likely]
-        best = max(tried, key=lambda one: one[2], default=None)
-        return best if best is not None and best[2] > LEAST_EVIDENCE else None
+        evident = sorted((one for one in tried if one[2] > LEAST_EVIDENCE), key=lambda one: -one[2])
+        return next((one for one in evident if self._is_confirmed(one[0], one[1])), None)
+
+    def _is_confirmed(self, i: int, j: int) -> bool:
+        """False where the runs besides these two weigh one of them nearer to its own label than to the other's."""
+        if len(self.known) - 2 < LEAST_OTHERS:
+            return True
+        return all(self._is_nearer(one, other, (i, j)) for one, other in ((i, j), (j, i)))
+
+    def _is_nearer(self, one: int, other: int, left_out: Sequence[int]) -> bool:
+        point, _ = self.weighed_by_others(one, left_out)
+        weighed = (point.payload_kg, 100.0 * point.front_share)
+        own, exchanged = (
+            beyond(weighed, [(run.payload_kg, run.front_share_pct)], self.vehicle.empty_mass_kg)
+            for run in (self.known[one].run, self.known[other].run)
+        )
+        return exchanged < own
 
     def _is_strained(self) -> bool:
         """True where no half-car explains some run with its label."""

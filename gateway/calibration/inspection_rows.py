@@ -26,6 +26,8 @@ MISREAD_AS_MPS2: Final = {  # what gravity then reads, over 9.81
     "it reads in m/s2 what the signal map takes for g": STANDARD_GRAVITY_MPS2,
     "it reads in mg what the signal map takes for m/s2": 1000.0 / STANDARD_GRAVITY_MPS2,
     "it reads in mg what the signal map takes for g": 1000.0,
+    "it reads in m/s2 what the signal map takes for mg": STANDARD_GRAVITY_MPS2 / 1000.0,
+    "it reads in g what the signal map takes for mg": 1.0 / 1000.0,
 }
 
 
@@ -81,6 +83,19 @@ def _stream(motion: Motion, signal: Signal, trait: SensorTraits) -> Stream:
         high=high,
         resolution=trait.resolution,
     )
+
+
+def unmapped_findings(facts: RowFacts) -> Iterator[Finding]:
+    """Signals that no log can hold because the map has no place for them; every mapped one has a stream."""
+    if not facts.streams:
+        return
+    if Signal.SPEED not in facts.streams and Signal.WHEEL_SPEED not in facts.streams:
+        yield found(Kind.SIGNAL_UNMAPPED, Severity.FAULT, "neither speed nor wheel_speed is in the signal map")
+    absent = [signal for signal in INERTIAL if signal not in facts.streams]
+    if absent:
+        severity = Severity.FAULT if len(absent) == len(INERTIAL) else Severity.WARNING
+        text = f"{' and '.join(absent)} {'are' if len(absent) > 1 else 'is'} not in the signal map"
+        yield found(Kind.SIGNAL_UNMAPPED, severity, f"{text}; axes and loads cannot be checked")
 
 
 def rate_findings(facts: RowFacts, settings: BatchSettings) -> Iterator[Finding]:

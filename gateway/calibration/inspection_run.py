@@ -1,7 +1,7 @@
 """One known-load drive inspected: what its rows, its batches and its cross-spectra say, as a verdict."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import sqrt
 from typing import Final
 
@@ -21,13 +21,16 @@ from gateway.calibration.inspection_axes import (
     reading_of,
 )
 from gateway.calibration.inspection_kinds import Kind, found
+from gateway.calibration.inspection_log import LogFacts, log_findings
 from gateway.calibration.inspection_rows import (
+    INERTIAL,
     Mended,
     RowFacts,
     bias_findings,
     gravity_findings,
     rate_findings,
     stands_still_but_shakes,
+    unmapped_findings,
 )
 from gateway.core.batch import REASON_SHARE_MIN
 from gateway.core.cross_spectra import LEAST_SEGMENTS, CrossSpectra, cross_spectra_of
@@ -43,13 +46,14 @@ STEPS_SHARE_MAX: Final = 0.1  # of a signal's power in that band
 
 @dataclass(frozen=True, slots=True)
 class Inspected:
-    """A run with all that inspection needs: both its parts, the facts of its rows; ``has_identification`` is
-    False where the campaign keeps the whole run for validation."""
+    """A run with all that inspection needs: both its parts, the facts of its rows and of its log;
+    ``has_identification`` is False where the campaign keeps the whole run for validation."""
 
     identification: KnownRun
     validation: KnownRun
     facts: RowFacts
     has_identification: bool = True
+    log: LogFacts = field(default_factory=LogFacts)
 
     @property
     def batches(self) -> tuple[Batch, ...]:
@@ -65,21 +69,23 @@ class Inspected:
 
 def inspect_run(inspected: Inspected, vehicle: Vehicle, settings: BatchSettings) -> RunVerdict:
     """Every finding of one run, faults first."""
-    facts = inspected.facts
+    one, facts = inspected.identification, inspected.facts
+    of_log = tuple(log_findings(inspected.log))
+    if _has_fault(of_log):
+        return RunVerdict(one.number, one.name, of_log)
     acceleration, findings = gravity_findings(facts)
-    findings.extend(rate_findings(facts, settings))
+    findings.extend((*of_log, *unmapped_findings(facts), *rate_findings(facts, settings)))
     findings.extend(_speed_findings(inspected, settings))
     findings.extend(_masked_findings(inspected))
     spectra = cross_spectra_of(inspected.batches, reading_of(vehicle))
-    if spectra is None:
+    if spectra is None and all(signal in facts.streams for signal in INERTIAL):
         findings.extend(_unsteady_findings(inspected))
-    elif acceleration.is_axis_sound:
+    elif spectra is not None and acceleration.is_axis_sound:
         findings.extend(_motion_findings(spectra, inspected, vehicle, acceleration))
         findings.extend(_excitation_findings(spectra, facts, acceleration))
     if not {Kind.CHANNELS_SWAPPED, Kind.PITCH_RATE_UNIT} & {finding.kind for finding in findings}:
         findings.extend(bias_findings(facts))
     findings.extend(_batch_findings(inspected, settings, has_fault=_has_fault(findings)))
-    one = inspected.identification
     order = list(Severity)
     return RunVerdict(one.number, one.name, tuple(sorted(findings, key=lambda f: order.index(f.severity))))
 
@@ -146,7 +152,7 @@ def _speed_findings(inspected: Inspected, settings: BatchSettings) -> Iterator[F
     ruinous = 1.0 - settings.usable_share_min
     for kind, why in ((Kind.SPEED_MISSING, Why.SPEED_MISSING), (Kind.SPEED_FROZEN, Why.SPEED_FROZEN)):
         share = _share(inspected.batches, why)
-        if share >= REASON_SHARE_MIN:
+        if share >= REASON_SHARE_MIN and _is_mapped(inspected.facts):
             severity = Severity.FAULT if is_lost and share > ruinous else Severity.WARNING
             yield found(kind, severity, f"{share:.0%} of the drive")
     outside = _share(inspected.batches, Why.TOO_SLOW) + _share(inspected.batches, Why.TOO_FAST)
@@ -154,6 +160,10 @@ def _speed_findings(inspected: Inspected, settings: BatchSettings) -> Iterator[F
         yield found(
             Kind.SPEED_OUTSIDE_GATE, Severity.FAULT, f"{outside:.0%} of the drive{_speeds(inspected, settings)}"
         )
+
+
+def _is_mapped(facts: RowFacts) -> bool:
+    return not facts.streams or Signal.SPEED in facts.streams or Signal.WHEEL_SPEED in facts.streams
 
 
 def _needed_s(settings: BatchSettings) -> float:
@@ -214,7 +224,8 @@ def _batch_findings(inspected: Inspected, settings: BatchSettings, *, has_fault:
         if _is_standing(inspected, settings):
             return
         longest_s = max((batch.duration_s for batch in batches), default=0.0)
-        text = f"its longest unbroken stretch lasts {longest_s:.0f} s, a batch needs {_needed_s(settings):.0f} s"
+        text = f"of the {inspected.facts.duration_s:.0f} s driven the longest unbroken stretch that identifies lasts "
+        text += f"{longest_s:.0f} s, a batch needs {_needed_s(settings):.0f} s"
         yield found(Kind.TOO_SHORT, Severity.FAULT, text)
     elif all(batch.rejected for batch in batches):
         if not has_fault:

@@ -8,13 +8,26 @@ from gateway.offline.known_runs import SplitRun
 
 
 def inspection_sentences(inspection: Inspection) -> str:
-    """A line a run, its findings below with what to do about each; then what is to say of all runs."""
+    """A line a run, its findings below with what to do about each; then of all runs together, and what is left."""
     lines: list[str] = []
     for one, verdict in zip(inspection.split, inspection.verdicts, strict=True):
         lines += [_run_line(one, verdict), *_finding_lines(verdict.findings)]
     if inspection.findings:
         lines += ["all runs together", *_finding_lines(inspection.findings)]
-    return "\n".join(lines)
+    return "\n".join([*lines, _in_all(inspection)])
+
+
+def _in_all(inspection: Inspection) -> str:
+    """How many runs are left, and what they cover."""
+    runs = [one.identification for one in inspection.usable if one.has_identification]
+    counted = f"{len(inspection.usable)} of {len(inspection.split)} runs can be used"
+    if not runs:
+        return counted
+    payloads_kg, shares_pct = [run.payload_kg for run in runs], [run.front_share_pct for run in runs]
+    return (
+        f"{counted}: {min(payloads_kg):g} to {max(payloads_kg):g} kg, "
+        f"{min(shares_pct):.1f} to {max(shares_pct):.1f} % in front"
+    )
 
 
 def _run_line(one: SplitRun, verdict: RunVerdict) -> str:

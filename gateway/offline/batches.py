@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gateway.bus.log_report import LogReport
 from gateway.bus.logs import motion_of_log
 from gateway.bus.signal_map import SignalMap
 from gateway.core.scheduler import Scheduler
@@ -15,14 +16,20 @@ from gateway.units import NS_PER_S
 
 def motion_of_whole_log(log: Path, signal_map: SignalMap) -> Motion:
     """All rows of one log at once. Raises LogUnreadableError where nothing in it can be read."""
+    return read_whole_log(log, signal_map)[0]
+
+
+def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]:
+    """The same with what the reader met on its way."""
     motions, report, _ = motion_of_log(log, signal_map)
     parts = list(motions)
     report.require_frames()
-    return Motion(
+    motion = Motion(
         parts[0].signals,
         np.concatenate([part.t_ns for part in parts]),
         np.concatenate([part.columns for part in parts]),
     )
+    return motion, report
 
 
 @dataclass(frozen=True, slots=True)

@@ -62,8 +62,10 @@ def inspect(
     on_run: OnRun = lambda done, of: None,
 ) -> Inspection:
     """Reads the logs of the chosen runs and tells of each what is wrong with it, if anything."""
-    split = split_runs(campaign, settings, numbers=numbers, on_run=on_run)
-    inspected = [Inspected(one.identification, one.validation, one.facts, one.has_identification) for one in split]
+    split = split_runs(campaign, settings, numbers=numbers, on_run=on_run, keeps_unreadable=True)
+    inspected = [
+        Inspected(one.identification, one.validation, one.facts, one.has_identification, one.read) for one in split
+    ]
     verdicts, findings = inspect_campaign(inspected, campaign.vehicle, settings)
     return Inspection(tuple(split), verdicts, findings)
 

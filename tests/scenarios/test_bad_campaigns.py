@@ -83,7 +83,8 @@ def test_a_sound_campaign_passes_without_a_word(folder: Path) -> None:
     exit_code, found = check(altered(folder, "sound"))
     assert (exit_code, kinds(found)) == (0, {0: [], 1: [], 2: [], 3: [], 4: []})
     lines = calibrate(altered(folder, "one", [1, 10]), "--check").stdout.splitlines()
-    assert [line.split("; ")[0].split(": ")[1] for line in lines] == ["sound"] * 2
+    assert [line.split("; ")[0].split(": ")[1] for line in lines[:2]] == ["sound"] * 2
+    assert lines[2].startswith("2 of 2 runs can be used: 0 to 420 kg")
 
 
 def test_one_load_only_is_a_zero_point_and_nothing_for_the_ratio_index(folder: Path, tmp_path: Path) -> None:
@@ -153,6 +154,25 @@ def test_twenty_seconds_are_too_short_and_the_rest_goes_on(folder: Path, tmp_pat
     held = load_calibration(tmp_path / "v.json")
     assert [run.number for run in held.provenance.runs] == [1, 3, 4]
     assert [one for one in held.warnings if one.startswith("run 2 left out: too_short: ")]
+
+
+def test_every_log_at_fault_is_named_and_the_rest_goes_on(folder: Path) -> None:
+    (folder / "empty.log").touch()
+    whole = next(folder.glob("10_*/can.log.gz")).read_bytes()
+    (folder / "cut.log.gz").write_bytes(whole[: 9 * len(whole) // 10])
+    log = next(line for line in table_of(folder, 1).splitlines() if line.startswith("log"))
+    runs = {
+        "run4": '\nlog = "empty.log"\npayload_kg = 0.0\n\n',
+        "run8": table_of(folder, 8).rstrip() + "\nstart_s = 900.0\n\n",
+        "run10": '\nlog = "cut.log.gz"\npayload_kg = 420.0\npayload_position_m = 2.8\n\n',
+        "run9": f"\n{log}\npayload_kg = 420.0\npayload_position_m = 1.3\n\n",
+    }
+    exit_code, found = check(altered(folder, "logs", (1, 4, 8, 10), **runs))
+    told = kinds(found)
+    assert (exit_code, told[2], told[3]) == (0, ["fault:log_unreadable"], ["fault:cut_away"])
+    assert told[4] == ["warning:log_damaged"]
+    exit_code, found = check(altered(folder, "twice", (1, 9, 10), run9=runs["run9"]))
+    assert (kinds(found)[1], kinds(found)[2]) == (["fault:same_drive"], ["fault:same_drive"])
 
 
 def test_faults_that_leave_one_load_of_several_are_refused(folder: Path) -> None:

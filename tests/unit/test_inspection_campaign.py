@@ -9,7 +9,7 @@ from support.known_runs import LOADS, campaign, known_run
 from gateway.calibration.inspection import Finding, RunVerdict, Severity
 from gateway.calibration.inspection_campaign import inspect_campaign, load_findings
 from gateway.calibration.inspection_kinds import Kind, found
-from gateway.calibration.inspection_loads import compare_loads
+from gateway.calibration.inspection_loads import _Labelled, compare_loads
 from gateway.calibration.inspection_rows import RowFacts
 from gateway.calibration.inspection_run import Inspected
 from gateway.core.known_run import KnownRun
@@ -64,6 +64,20 @@ def test_two_exchanged_labels_are_found_whichever_they_are(i: int, j: int, runs:
         (i + 1, j + 1), Kind.LOADS_SWAPPED
     )
     assert f"runs {i + 1} and {j + 1}" in findings[i + 1].text
+
+
+def test_after_one_exchanged_pair_the_others_are_asked_again(
+    runs: list[KnownRun], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def next_pair(labelled: _Labelled) -> tuple[int, int, float] | None:
+        numbers = [known.run.number for known in labelled.known]
+        told = [pair for pair in ((1, 3), (2, 4)) if set(pair) <= set(numbers)]
+        return (numbers.index(told[0][0]), numbers.index(told[0][1]), 99.0) if told else None
+
+    monkeypatch.setattr(_Labelled, "swapped_pair", next_pair)
+    findings = list(compare_loads([*runs, known_run(5, 100.0, 1.4, seed=7)], VAN))
+    assert [number for number, _ in findings] == [1, 3, 2, 4]
+    assert "runs 2 and 4" in findings[-1][1].text
 
 
 def test_the_order_of_runs_changes_no_verdict(runs: list[KnownRun]) -> None:

@@ -7,7 +7,7 @@ import pytest
 from support.drives import T0_NS, changed, drive, without_rows
 from support.inspected import kinds, stated, traits_of_reference, verdict_on
 
-from gateway.calibration.inspection_rows import gravity_findings, rate_findings, row_facts
+from gateway.calibration.inspection_rows import gravity_findings, rate_findings, row_facts, unmapped_findings
 from gateway.core.settings import BatchSettings
 from gateway.records import Motion, Signal
 from gateway.sim.vans import PAPER_VAN
@@ -58,6 +58,22 @@ def test_a_silent_sensor_is_named_and_one_that_is_not_mapped_is_not() -> None:
     silent = changed(motion, Signal.PITCH_RATE, 0.0, 99.0, lambda x: np.full(len(x), np.nan))
     assert rate_kinds(silent) == ["sensor_silent"]
     assert rate_kinds(Motion((motion.signals[0], motion.signals[2]), motion.t_ns, motion.columns[:, [0, 2]])) == []
+
+
+@pytest.mark.parametrize(
+    ("kept", "said"),
+    [
+        ((0, 1, 2), []),
+        ((0, 1), ["fault: neither speed nor wheel_speed is in the signal map"]),
+        ((0, 2), ["warning: pitch_rate is not in the signal map; axes and loads cannot be checked"]),
+    ],
+)
+def test_a_signal_that_is_not_mapped_is_named(kept: tuple[int, ...], said: list[str]) -> None:
+    motion = drive(30.0)
+    assert motion.signals == (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
+    mapped = Motion(tuple(motion.signals[i] for i in kept), motion.t_ns, motion.columns[:, list(kept)])
+    found = unmapped_findings(row_facts(mapped, TRAITS))
+    assert [f"{finding.severity}: {finding.text}" for finding in found] == said
 
 
 def test_lost_frames_are_a_warning() -> None:
