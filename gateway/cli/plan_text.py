@@ -6,10 +6,13 @@ from gateway.offline.plan import Advice, Expected, Plan
 
 def plan_sentences(plan: Plan) -> str:
     """What is expected now, the runs to drive in order, and what each would bring."""
-    kmh = 3.6 * plan.drive.speed_mps
+    is_enough = plan.is_enough_driven
+    what = "most would bring" if is_enough else "drive next"
+    minutes, kmh = plan.drive.duration_s / 60.0, 3.6 * plan.drive.speed_mps
     lines = [
         _now(plan),
-        f"drive next, each for {plan.drive.duration_s / 60.0:.0f} minutes near {kmh:.0f} km/h:",
+        *(["enough is driven: no further run would narrow answers by a tenth"] if is_enough else []),
+        f"{what}, each for {minutes:.0f} minutes near {kmh:.0f} km/h:",
         *(f"{i}. {_load(step.load)}: then {_expected(step.expected)}" for i, step in enumerate(plan.advice, 1)),
     ]
     if plan.least is not None:

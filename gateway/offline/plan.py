@@ -28,6 +28,7 @@ from gateway.units import NS_PER_S
 FIRST_DRIVE: Final = Drive(600.0, 50.0 / 3.6)
 N_FIRST: Final = 4
 N_NEXT: Final = 3
+WORTH_DRIVING: Final = 0.1  # by how much a run should narrow the spread to be worth a quarter of an hour
 
 Loads = tuple[PlacedLoad, ...]
 
@@ -69,9 +70,22 @@ class Plan:
     advice: tuple[Advice, ...]
     least: Advice | None
 
+    @property
+    def is_enough_driven(self) -> bool:
+        """True where not even the first of ``advice`` would narrow answers, or widen the reach, by a tenth."""
+        if self.now is None or not self.advice or self.now.reach_share is None:
+            return False
+        now, then = self.now, self.advice[0].expected
+        widths = (
+            (then.payload_std_kg, now.payload_std_kg),
+            (then.front_share_std_pct, now.front_share_std_pct),
+            (now.reach_share or 0.0, then.reach_share or 0.0),
+        )
+        return all(after > (1.0 - WORTH_DRIVING) * before for after, before in widths)
+
     def to_json(self) -> dict[str, Any]:
         """Plain numbers for a file or a report."""
-        return asdict(self)
+        return asdict(self) | {"is_enough_driven": self.is_enough_driven}
 
 
 def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST) -> Plan:

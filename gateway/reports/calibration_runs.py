@@ -78,8 +78,11 @@ def best_next(plan: Plan) -> str | None:
     payload, share, reach = _expected(first.expected)
     now = _expected(plan.now) if plan.now else None
     before = f" (now {now[0]} and {now[1]})" if now else ""
-    load = _load(first).capitalize()
-    return f"{load}: expected {payload} and {share} afterwards{before}, {reach} of loads within reach."
+    load = _load(first)
+    after = f"expected {payload} and {share} afterwards{before}, {reach} of the loads it may carry within reach."
+    if plan.is_enough_driven:
+        return f"Enough is driven: no further run would narrow answers by a tenth. Most would bring {load}: {after}"
+    return f"{load.capitalize()}: {after}"
 
 
 def _load(advice: Advice) -> str:

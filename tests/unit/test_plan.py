@@ -17,6 +17,7 @@ from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.offline.calibrate import Outcome
 from gateway.offline.plan import FIRST_DRIVE, N_FIRST, Expected, Plan, plan_first, plan_next, usual_drive
+from gateway.reports.calibration_runs import best_next
 
 DRAFT = """
 [vehicle]
@@ -86,6 +87,21 @@ def test_a_plan_is_told_in_sentences_and_in_numbers(outcome: Outcome) -> None:
     read = json.loads(json.dumps(plan.to_json(), allow_nan=False))
     assert read["advice"][0]["load"]["payload_kg"] == load.payload_kg
     assert read["now"]["ratio_index"] is None
+
+
+def test_a_plan_says_when_enough_is_driven(outcome: Outcome) -> None:
+    plan = plan_next(outcome, VAN)
+    assert not plan.is_enough_driven
+    assert "drive next, each" in plan_sentences(plan)
+    assert "Enough" not in str(best_next(plan))
+    nearly = replace(plan.advice[0], expected=replace(plan.advice[0].expected, reach_share=0.95))
+    known = Expected(1.05 * nearly.expected.payload_std_kg, 1.05 * nearly.expected.front_share_std_pct, 0.95)
+    enough = replace(plan, now=known, advice=(nearly,))
+    assert enough.is_enough_driven
+    assert "enough is driven" in plan_sentences(enough)
+    assert str(best_next(enough)).startswith("Enough is driven")
+    assert not replace(enough, now=replace(known, reach_share=0.5)).is_enough_driven
+    assert not replace(enough, now=replace(known, payload_std_kg=2.0 * known.payload_std_kg)).is_enough_driven
 
 
 def test_without_the_half_car_there_is_no_plan(outcome: Outcome) -> None:
