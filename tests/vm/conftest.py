@@ -102,7 +102,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
     """Keep each test's outcome and recovery time."""
     outcome = yield
     report = outcome.get_result()  # type: ignore[attr-defined]
-    if report.when == "call":
+    if report.when == "call" and not report.skipped:
         findings = item.config.stash.setdefault(_FINDINGS, {}).setdefault("tests", {})
         findings[item.name] = {"outcome": report.outcome, "recovery_s": item.stash.get(_RECOVERY, None)}
 

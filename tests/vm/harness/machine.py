@@ -61,7 +61,7 @@ class Machine:
             )  # fmt: skip
         os.close(write_end)
         while True:
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError, GuestError):  # not up yet, or up and too busy to answer
                 self.run("true", timeout_s=2.0)
                 break
             self._require_alive(begun_s)
