@@ -1,4 +1,7 @@
-"""Inspection of recorded drives: no false alarm on any, and the right one where the signal map is spoiled."""
+"""Inspection of a real car's drives: no false alarm; and of spoiled signal maps: the right one.
+
+That the ten known loads raise none is asked in test_recorded_drives.py, which calibrates with them.
+"""
 
 from pathlib import Path
 
@@ -21,10 +24,6 @@ def findings(campaign: str) -> dict[int, list[str]]:
     found: Inspection = inspect(load_campaign(recordings() / campaign), SETTINGS)
     assert found.refusal is None
     return {one.number: [f"{finding.severity}:{finding.kind}" for finding in one.findings] for one in found.verdicts}
-
-
-def test_ten_sound_runs_are_sound() -> None:
-    assert findings("known_loads/campaign.toml") == {number: [] for number in range(1, 11)}
 
 
 @pytest.mark.parametrize("trip", ["a", "b"])

@@ -13,6 +13,8 @@ from support.recordings import recordings
 
 from gateway.cli import springscale
 
+CROSS = ("--estimator", "cross_spectrum")
+
 
 def run(*arguments: str | Path) -> str:
     found = CliRunner().invoke(springscale, [str(argument) for argument in arguments], catch_exceptions=False)
@@ -21,11 +23,21 @@ def run(*arguments: str | Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Calibrated on the identification parts of all ten known loads."""
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """The file calibrated on the identification parts of all ten known loads, and what was told meanwhile."""
     output = tmp_path_factory.mktemp("vehicle") / "vehicle.json"
-    run("calibrate", recordings() / "known_loads/campaign.toml", "--output", output)
-    return output
+    told = run("calibrate", recordings() / "known_loads/campaign.toml", "--output", output, "--json")
+    return output, json.loads(told)
+
+
+@pytest.fixture(scope="module")
+def calibration(calibrated: tuple[Path, dict[str, Any]]) -> Path:
+    return calibrated[0]
+
+
+def test_ten_sound_runs_are_sound(calibrated: tuple[Path, dict[str, Any]]) -> None:
+    inspection = calibrated[1]["inspection"]
+    assert [one["findings"] for one in inspection["runs"]] == [[]] * 10
 
 
 def table(campaign: str, calibration: Path, *arguments: str) -> dict[str, Any]:
@@ -37,9 +49,9 @@ def table(campaign: str, calibration: Path, *arguments: str) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("campaign", "arguments", "n_batches", "payload_pct", "front_share_pct"),
     [
-        ("known_loads/campaign.toml", ["--estimator", "cross_spectrum"], 10, 3.0, 1.5),
-        ("speeds/campaign.toml", ["--estimator", "cross_spectrum"], 15, 5.0, 2.0),
-        ("known_loads/campaign.toml", ["--estimator", "cross_spectrum", "--window-s", "60"], 50, 6.0, 2.0),
+        ("known_loads/campaign.toml", [*CROSS], 10, 3.0, 1.5),
+        ("speeds/campaign.toml", [*CROSS], 15, 5.0, 2.0),
+        ("known_loads/campaign.toml", [*CROSS, "--window-s", "60"], 50, 6.0, 2.0),
         ("known_loads/campaign.toml", ["--estimator", "ratio_index"], 10, 15.0, 7.5),
     ],
 )
@@ -60,8 +72,8 @@ def test_errors_stay_within_what_is_promised(
 
 def test_three_known_loads_are_enough(tmp_path: Path) -> None:
     output = tmp_path / "three.json"
-    run("calibrate", recordings() / "known_loads/campaign.toml", "--output", output, "--runs", "1,6,10")
-    found = table("known_loads/campaign.toml", output, "--estimator", "cross_spectrum")
+    run("calibrate", recordings() / "known_loads/campaign.toml", "--output", output, "--runs", "1,6,10", *CROSS)
+    found = table("known_loads/campaign.toml", output, *CROSS)
     assert found["payload"]["mean_abs_pct"] <= 6.0
     assert found["front_share"]["mean_abs_pct"] <= 3.0
 
