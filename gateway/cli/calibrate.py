@@ -19,7 +19,7 @@ from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, windo
 from gateway.cli.plan_text import plan_sentences
 from gateway.cli.progress import bar, counted
 from gateway.config import ESTIMATOR_NAMES
-from gateway.errors import CalibrationImpossibleError
+from gateway.errors import CalibrationImpossibleError, ConfigurationError
 from gateway.offline.calibrate import Outcome, calibrate_inspected
 from gateway.offline.inspect import Inspection, inspect
 from gateway.offline.learning_curve import curve_of
@@ -73,6 +73,7 @@ def calibrate(
         raise click.UsageError("name the calibration file to write with --output, or ask with --check or --plan")
     if wants_curve and report is None:
         raise click.UsageError("--learning-curve is part of a report: name its directory with --report")
+    _require_places(output, report)
     if wants_plan and not (draft := load_draft(campaign)).runs:
         plan = plan_first(draft.vehicle)
         click.echo(json_line({"plan": plan.to_json()}) if as_json else plan_sentences(plan))
@@ -96,7 +97,7 @@ def calibrate(
     )
     found = outcome.file
     if output is not None:
-        output.write_text(found.to_json(), encoding="utf-8")
+        _write(output, found)
     if report is not None:
         _report(report, loaded, outcome, _curve(loaded, outcome) if wants_curve else None)
     next_runs = plan_next(outcome, loaded.vehicle) if wants_plan else None
@@ -105,6 +106,23 @@ def calibrate(
         click.echo(json_line(summary))
     else:
         click.echo(_sentences(found, output, next_runs, said=inspection.warnings))
+
+
+def _require_places(output: Path | None, report: Path | None) -> None:
+    """Before minutes of work: the file and the directory can lie where they shall."""
+    if output is not None and output.is_dir():
+        raise click.UsageError(f"--output {output}: is a folder, a file is wanted")
+    if output is not None and not output.parent.is_dir():
+        raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")
+    if report is not None and report.exists() and not report.is_dir():
+        raise click.UsageError(f"--report {report}: is a file, a directory is wanted")
+
+
+def _write(output: Path, found: CalibrationFile) -> None:
+    try:
+        output.write_text(found.to_json(), encoding="utf-8")
+    except OSError as fault:
+        raise ConfigurationError(f"{output}: cannot be written: {fault.strerror}") from None
 
 
 def _inspect(campaign: Campaign, numbers: Sequence[int] | None, window_s: float | None) -> Inspection:

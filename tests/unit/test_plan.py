@@ -123,6 +123,24 @@ def test_the_command_plans_from_a_vehicle_alone(tmp_path: Path) -> None:
     assert json.loads(numbers.stdout)["plan"]["n_driven"] == 0
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--output", "absent/v.json"), "there is no folder"),
+        (("--output", "."), "is a folder"),
+        (("--plan", "--report", "campaign.toml"), "is a file"),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_told_before_anything_is_read(
+    options: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("campaign.toml").write_text(DRAFT, encoding="utf-8")
+    done = CliRunner().invoke(springscale, ["calibrate", "campaign.toml", *options])
+    assert done.exit_code == 2
+    assert said in done.output
+
+
 def test_neither_a_file_nor_a_plan_asked_for_is_a_usage_error(tmp_path: Path) -> None:
     draft = tmp_path / "campaign.toml"
     draft.write_text(DRAFT, encoding="utf-8")
