@@ -117,11 +117,12 @@ def _error(table: Mapping[str, Any], part: Part, quantity: str) -> Reason:
         grade = Grade.UNFIT if quantity == "payload" else Grade.RESERVED
         return Reason(f"{quantity}_error", grade, f"No {name} was answered over the {PART_NAMES[part]}.")
     percent = float(errors["mean_abs_pct_with_misses"])
+    missed = ", batches without an answer counted as guesses at mid-range" if table["n_rejected"] else ""
     return Reason(
         f"{quantity}_error",
         _graded(percent, FIT_ERROR_PCT, MOST_ERROR_PCT),
-        f"Mean error of {name} over the {PART_NAMES[part]}: {errors[f'mean_abs_{unit}']:.3g} {unit}; with misses "
-        f"{percent:.1f} % of the range (fit to {FIT_ERROR_PCT:g} %, no use beyond {MOST_ERROR_PCT:g} %).",
+        f"Mean error of {name} over the {PART_NAMES[part]}: {errors[f'mean_abs_{unit}']:.3g} {unit}, {percent:.1f} % "
+        f"of the range{missed} (fit to {FIT_ERROR_PCT:g} %, no use beyond {MOST_ERROR_PCT:g} %).",
     )
 
 
