@@ -224,7 +224,7 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
                 Severity.WARNING,
             ),
             "the spectra put the sensor elsewhere than sensor_position_m says",
-            "measure again from the front axle, check wheelbase_m and the unit of speed, or widen sensor_position_std_m",
+            "measure again from the front axle, check wheelbase_m and the speed's unit, or widen sensor_position_std_m",
         ),
         Kind.COARSE_RESOLUTION: Explained(
             Topic.SENSORS,
