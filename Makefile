@@ -22,9 +22,9 @@ BIN := .venv/bin
 demo: .venv/.package
 	$(BIN)/springscale demo
 
-# A whole file stays on one worker: compiled code and servers are shared inside it.
+# A whole file stays on one worker: compiled code and servers are shared inside it. Small matrices: more threads only cost.
 test: .venv/.development
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile
 
 check: .venv/.development
 	$(BIN)/ruff check .
