@@ -73,14 +73,16 @@ FIGURES = {
     "sustained_frames_per_s": "frames/s of a timed canplayer log without one lost, by candump and by the service",
     "boot_after_power_cut_s": "s from power on to a running system after a power cut",
     "sectors_lost_at_power_cuts": "sectors of 512 bytes that power cuts lost, none of a committed record",
-    "reference_std_kg": "kg: standard deviation of the 20 s batches compared below",
-    "reference_same_stamps_kg": "kg between HTTP and `springscale estimate` on candump's recording of the replay; "
+    "reference_std_kg": "kg: standard deviation of a 20 s batch, reference map",
+    "j1939_std_kg": "kg: standard deviation of a 20 s batch, J1939",
+    "reference_same_stamps_kg": "kg between HTTP and `springscale estimate` on candump's recording of the replay, "
+    "reference map; 0.05 standard deviations are allowed",
+    "j1939_same_stamps_kg": "kg between HTTP and `springscale estimate` on candump's recording of the replay, J1939; "
     "0.05 standard deviations are allowed",
-    "j1939_same_stamps_kg": "the same for a J1939 log",
-    "late_ms": "ms that canplayer's frames were late at most, 99 of 100, in the replays compared below",
-    "reference_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log that canplayer read; "
+    "late_ms": "ms that canplayer's frames were late at most, 99 of 100, in the replay compared below",
+    "reference_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log that canplayer read, reference map; "
     "0.5 standard deviations are allowed, for the kernel stamps frames when they come",
-    "j1939_new_stamps_kg": "the same for a J1939 log",
+    "j1939_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log that canplayer read, J1939; likewise",
 }
 
 

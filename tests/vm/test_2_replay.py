@@ -124,8 +124,9 @@ def drive_once(vehicle: Vehicle, log: str, frames: Frames) -> tuple[list[Answer]
     vehicle.wait_for_frames(frames_before + len(frames))
     vehicle.stop_listening()
     assert dropped(vehicle) == dropped_before
-    told = whole_batches(vehicle.records()[n_before:])
     expected = whole_batches(of_guests_estimate(vehicle, HEARD))
+    vehicle.wait_for(lambda: len(whole_batches(vehicle.records()[n_before:])) >= len(expected))
+    told = whole_batches(vehicle.records()[n_before:])
     assert [record["rejected"] for record in told] == [record["rejected"] for record in expected]
     if all(record["rejected"] for record in told):
         return told, {}
