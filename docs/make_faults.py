@@ -82,7 +82,7 @@ FIGURES = {
     "late_ms": "ms that canplayer's frames were late at most, 99 of 100, in the replay compared below",
     "reference_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log that canplayer read, reference "
     "map; 0.5 standard deviations are allowed, for the kernel stamps frames when they come",
-    "j1939_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log that canplayer read, J1939; likewise",
+    "j1939_new_stamps_kg": "kg between HTTP and `springscale estimate` on canplayer's log, J1939; likewise",
 }
 
 
