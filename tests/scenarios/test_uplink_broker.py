@@ -3,9 +3,9 @@
 import itertools
 import json
 import random
-import signal
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -57,9 +57,11 @@ def test_ten_thousand_estimates_arrive_in_order_through_twenty_cuts_restarts_and
     blows = dice.sample(["cut"] * N_CUTS + ["restart"] * N_RESTARTS + ["kill"] * N_KILLS, N_CUTS + N_RESTARTS + N_KILLS)
     moments = sorted(dice.sample(range(N_ESTIMATES // 50, N_ESTIMATES - N_ESTIMATES // 50), len(blows)))
     on_disk = []  # how many the store knew to be delivered after each kill
-    with running_broker(tmp_path) as broker, CuttableLink(broker.port) as link:
+    with running_broker(tmp_path) as broker, CuttableLink(broker.port) as link, ExitStack() as at_the_end:
         listener = Listener(broker.port, "springscale/+/estimates")
+        at_the_end.callback(listener.close)
         deliverer = _deliverer(state, link.port)
+        at_the_end.callback(lambda: _kill(deliverer))  # whichever it is by then
         for moment, blow in zip(moments, blows, strict=True):
             assert listener.wait_for(moment), f"stuck before the next {blow}"
             if blow == "cut":
@@ -68,15 +70,11 @@ def test_ten_thousand_estimates_arrive_in_order_through_twenty_cuts_restarts_and
                 broker.stop()
                 broker.start()
             else:
-                deliverer.send_signal(signal.SIGKILL)
-                deliverer.wait()
+                _kill(deliverer)
                 link.cut()
                 on_disk.append(_n_delivered(state))
                 deliverer = _deliverer(state, link.port)
         wait_until(lambda: json.loads(listener.heard[-1].payload)["id"] == ids[-1])
-        deliverer.kill()
-        deliverer.wait()
-        listener.close()
     came = _places(listener, ids)
     assert list(dict.fromkeys(came)) == list(range(len(ids)))  # all of them, each first seen in its turn
     steps = list(itertools.pairwise(came))
@@ -95,6 +93,11 @@ def _places(listener: Listener, ids: list[str]) -> list[int]:
             came.append(n)
             seen.add(n)
     return came
+
+
+def _kill(process: "subprocess.Popen[str]") -> None:
+    process.kill()
+    process.wait()
 
 
 def _n_delivered(state: Path) -> int:
