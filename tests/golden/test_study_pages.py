@@ -1,4 +1,4 @@
-"""docs/learning_curve.md and coverage.md say what the numbers beside them say, and nothing else.
+"""docs/learning_curve.md, advice.md and coverage.md say what the numbers beside them say, and nothing else.
 
 They come from `springscale study NAME --output DIR`: NAME.md, and its numbers NAME.json.
 """
@@ -13,11 +13,12 @@ import pytest
 from gateway.calibration.coverage_table import ALL_KINDS
 from gateway.offline.coverage_drives import TRIPS
 from gateway.reports.coverage_page import coverage_page
-from gateway.reports.study_pages import learning_curve_page
+from gateway.reports.study_pages import advice_page, learning_curve_page
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "learning_curve": learning_curve_page,
+    "advice": advice_page,
     "coverage": coverage_page,
 }
 
