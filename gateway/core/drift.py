@@ -41,10 +41,13 @@ DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
 STEADY: Final = [i for i in range(len(PARAMETERS)) if i not in DRIFTING]
 
 
+_OWN_VAR: Final = np.array(list(DRIFT_STD.values())) ** 2
+
+
 def _believed_covariance() -> F64:
     is_damper = np.array([name.startswith("damper_") for name in DRIFT_STD], dtype=float)
     together: F64 = DAMPERS_TOGETHER_STD**2 * np.outer(is_damper, is_damper)
-    return together + np.diag(np.array(list(DRIFT_STD.values())) ** 2)
+    return together + np.diag(_OWN_VAR)
 
 
 DRIFT_PRECISION: Final = np.linalg.inv(_believed_covariance())
@@ -59,7 +62,7 @@ def drift_covariance(found: F64, moves: F64) -> F64:
     (S. F. Schmidt's consider covariance, Adv. Control Syst. 3, 1966).
     """
     pulls = found[:, : len(DRIFTING)] @ DRIFT_PRECISION
-    more_var = np.maximum(0.0, _nature_var(DRIFTING) - np.array(list(DRIFT_STD.values())) ** 2)
+    more_var = np.maximum(0.0, _nature_var(DRIFTING) - _OWN_VAR)
     added: F64 = (moves * _nature_var(STEADY)) @ moves.T + (pulls * more_var) @ pulls.T
     return added
 

@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.calibrated import calibration_file
-from support.tare import FakePipeline
+from support.tare import FakePipeline, tare_desk
 from support.web import Client, Gateway
 
-from gateway.service.tare_desk import Subject, TareDesk
+from gateway.service.tare_desk import TareDesk
 from gateway.web import Scope, TokenFile
 
 URL = "/api/v1/calibration/tare"
@@ -23,8 +22,7 @@ def pipeline() -> FakePipeline:
 
 @pytest.fixture
 def desk(tmp_path: Path, pipeline: FakePipeline) -> TareDesk:
-    subject = Subject(calibration_file().for_core(), "ratio_index", "van-17")
-    return TareDesk(tmp_path, subject, pipeline, stale_after_s=900.0, on_event=lambda kind, detail: None)
+    return tare_desk(tmp_path, pipeline)
 
 
 @pytest.fixture

@@ -5,13 +5,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.calibrated import calibration_file
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.estimates import make_record
-from support.tare import FakePipeline
+from support.tare import FakePipeline, tare_desk
 from support.web import Gateway, serving
 
-from gateway.service.tare_desk import Subject, TareDesk
+from gateway.service.tare_desk import TareDesk
 from gateway.web import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
@@ -27,8 +26,7 @@ def pipeline() -> FakePipeline:
 
 @pytest.fixture
 def desk(tmp_path: Path, pipeline: FakePipeline) -> TareDesk:
-    subject = Subject(calibration_file().for_core(), "ratio_index", "van-17")
-    return TareDesk(tmp_path, subject, pipeline, stale_after_s=900.0, on_event=lambda kind, detail: None)
+    return tare_desk(tmp_path, pipeline)
 
 
 @pytest.fixture

@@ -1,11 +1,14 @@
 """A vehicle as a tare desk sees it, without a pipeline behind it."""
 
+from pathlib import Path
 from typing import Any
 
 from gateway.core.fusion import fused
 from gateway.core.tare import Weighed
 from gateway.records import Estimate
+from gateway.service.tare_desk import Subject, TareDesk
 from gateway.units import NS_PER_S
+from support.calibrated import calibration_file
 
 
 class FakeFlow:
@@ -42,3 +45,9 @@ class FakePipeline:
 
     def weighed_age_s(self) -> float | None:
         return self.age_s
+
+
+def tare_desk(directory: Path, pipeline: FakePipeline) -> TareDesk:
+    """A desk that keeps its tares in ``directory`` and tells nobody."""
+    subject = Subject(calibration_file().for_core(), "ratio_index", "van-17")
+    return TareDesk(directory, subject, pipeline, stale_after_s=900.0, on_event=lambda kind, detail: None)

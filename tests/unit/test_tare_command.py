@@ -7,13 +7,11 @@ from pathlib import Path
 import pytest
 import trustme
 from click.testing import CliRunner, Result
-from support.calibrated import calibration_file
-from support.tare import FakePipeline
+from support.tare import FakePipeline, tare_desk
 from support.web import Gateway, serving
 
 from gateway.cli.calibration import calibration_commands
 from gateway.errors import ConfigurationError, SpringscaleError
-from gateway.service.tare_desk import Subject, TareDesk
 from gateway.web import Scope, Tls, TokenFile, server_config
 
 
@@ -35,8 +33,7 @@ def tokens(tmp_path: Path) -> TokenFile:
 def url(tmp_path: Path, tokens: TokenFile, pipeline: FakePipeline) -> Iterator[str]:
     """A service behind tokens."""
     tokens.create("somebody", Scope.READ)
-    subject = Subject(calibration_file().for_core(), "ratio_index", "van-17")
-    desk = TareDesk(tmp_path, subject, pipeline, stale_after_s=900.0, on_event=lambda kind, detail: None)
+    desk = tare_desk(tmp_path, pipeline)
     with Gateway(tmp_path / "store", tokens=tokens, tare=desk) as gateway, serving(gateway.app) as server:
         yield server.url
 

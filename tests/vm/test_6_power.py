@@ -4,6 +4,7 @@ import os
 import random
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,10 @@ def committed(vehicle: Vehicle) -> list[str]:
     return found
 
 
+def has_committed_more(vehicle: Vehicle, n: int) -> bool:
+    return len(committed(vehicle)) > n
+
+
 def test_no_power_cut_loses_or_doubles_a_committed_record(
     vehicle: Vehicle,
     state_disk: StateDisk,
@@ -47,7 +52,7 @@ def test_no_power_cut_loses_or_doubles_a_committed_record(
     for i in range(N_CUTS):
         vehicle.play_pulses(pulse, pause_s=0.8)
         n_before = len(committed(vehicle))
-        vehicle.wait_for(lambda n=n_before: len(committed(vehicle)) > n + 1)  # type: ignore[misc]
+        vehicle.wait_for(partial(has_committed_more, vehicle, n_before + 1))
         before = committed(vehicle)
         state_disk.mark("committed")
         time.sleep(moments.uniform(2.0, 4.0))
