@@ -83,3 +83,9 @@ def test_a_cut_with_nothing_to_lose_is_refused(tmp_path: Path) -> None:
     (tmp_path / "disk").write_bytes(bytes(N_SECTORS * SECTOR_BYTES))
     with pytest.raises(AssertionError, match="nothing was written after here"):
         cut(tmp_path / "disk", log, "here", random.Random(1))
+
+
+def test_the_superblock_of_ext4_comes_whole_or_not_at_all(tmp_path: Path) -> None:
+    seen = disks(tmp_path, mark("here"), write(1, "abcd"))
+    assert {disk[1] + disk[4] for disk in seen} == {"..", "a.", ".d", "ad"}
+    assert {disk[2:4] for disk in seen} == {"..", "bc"}

@@ -17,6 +17,9 @@ SECTOR_BYTES: Final = 512
 MAGIC: Final = 0x6A73_6677_7368_72
 SUPERBLOCK: Final = struct.Struct("<QQQI")  # magic, version, number of entries, bytes in a sector
 HEADER: Final = struct.Struct("<QQQQ")  # first sector, number of sectors, flags, bytes of a mark's name
+# ext4 refuses to mount where one of these two sectors is new and the other old, before it looks into its journal: it
+# counts on a disk that writes its superblock whole, as one with physical sectors of 4096 bytes does.
+EXT4_SUPERBLOCK: Final = range(2, 4)
 
 
 class Flag(IntFlag):
@@ -79,7 +82,7 @@ def cut(disk: Path, log: Path, since: str, moments: random.Random) -> Damage:
     with disk.open("r+b") as target, log.open("rb") as source:
         for i, entry in enumerate(entries[:moment]):
             waits = i >= n_flushed and not entry.flags & Flag.FUA
-            arrived = _surviving(entry.n_sectors, moments) if waits else range(entry.n_sectors)
+            arrived = _surviving(entry, moments) if waits else range(entry.n_sectors)
             _write(entry, arrived, source, target)
             n_lost += (entry.n_sectors - len(arrived)) * waits
             n_kept += len(arrived) * waits
@@ -103,12 +106,17 @@ def _is_waiting(entries: Sequence[Entry]) -> bool:
     return any(entry.n_sectors and not entry.flags & (Flag.FUA | Flag.DISCARD) for entry in entries)
 
 
-def _surviving(n_sectors: int, moments: random.Random) -> Sequence[int]:
-    """Which sectors of a write arrive: all, none, or any of them."""
+def _surviving(entry: Entry, moments: random.Random) -> Sequence[int]:
+    """Which sectors of a write arrive: all, none, or any of them, but the superblock as one."""
     fate = moments.choice(("kept", "lost", "torn"))
-    if fate == "torn":
-        return [i for i in range(n_sectors) if moments.random() < 0.5]
-    return range(n_sectors if fate == "kept" else 0)
+    if fate != "torn":
+        return range(entry.n_sectors if fate == "kept" else 0)
+    superblock_arrives = moments.random() < 0.5
+    return [
+        i
+        for i, sector in enumerate(range(entry.sector, entry.sector + entry.n_sectors))
+        if (superblock_arrives if sector in EXT4_SUPERBLOCK else moments.random() < 0.5)
+    ]
 
 
 def _write(entry: Entry, arrived: Sequence[int], source: BinaryIO, target: BinaryIO) -> None:
