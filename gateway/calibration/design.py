@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.calibration.design_loads import PlacedLoad
-from gateway.calibration.grey_box import BAND_HZ, EVIDENCE_WEIGHT, N_SEGMENT
+from gateway.calibration.known_spectra import BAND_HZ, EVIDENCE_WEIGHT, N_SEGMENT
 from gateway.core.bounds import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectra import Reading
 from gateway.core.drift import DRIFT_PRECISION, DRIFTING, STEADY

@@ -138,6 +138,7 @@ class CrossSpectrumPart(Part):
     known_loads: tuple[tuple[float, float], ...] = ()
     payload_inflation_per_reach: float = Field(0.0, ge=0.0)
     front_share_inflation_per_reach: float = Field(0.0, ge=0.0)
+    usual_log_amplitude: float | None = None
 
     @classmethod
     def of(cls, calibration: CrossSpectrumCalibration) -> "CrossSpectrumPart":

@@ -17,40 +17,23 @@ import numpy as np
 from gateway.calibration.grey_box_prior import Prior, prior_of
 from gateway.calibration.inflation import UNTESTED as UNTESTED_INFLATION
 from gateway.calibration.inflation import inflation_of
-from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
+from gateway.calibration.known_spectra import KnownSpectra, known_spectra
+from gateway.core.cross_spectra import cross_spectra_of
 from gateway.core.cross_spectrum import CrossSpectrumCalibration, locate
-from gateway.core.grey_model import PARAMETERS, Ground
+from gateway.core.grey_model import PARAMETERS
 from gateway.core.known_run import KnownRun
-from gateway.core.likelihood import Curvature, Point, Whittle
+from gateway.core.likelihood import Curvature
 from gateway.core.map_fit import Found, most_probable
 from gateway.core.reach import beyond
 from gateway.core.vehicle import Vehicle
-from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
 
-BAND_HZ: Final = (1.1, 14.0)
-N_SEGMENT: Final = 256
-EVIDENCE_WEIGHT: Final = 0.2  # minutes of driving repeat the same model error: less than they seem to say
 LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
 MISFIT_MARGIN: Final = 3.0
 SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
 UNTESTED: Final = "intervals_untested"
 
 _STARTS: Final = ((0.0, 0.0), (0.4, 0.3), (-0.4, -0.3))  # log springs, log dampers, off the prior's centre
-
-
-class KnownSpectra:
-    """A run's spectra and likelihood with its true load."""
-
-    def __init__(self, run: KnownRun, vehicle: Vehicle, spectra: CrossSpectra) -> None:
-        ground = Ground(vehicle.empty_mass_kg, vehicle.empty_front_share_pct / 100.0, vehicle.wheelbase_m)
-        self.run = run
-        self.spectra = spectra
-        self.whittle = Whittle(spectra, ground, EVIDENCE_WEIGHT)
-
-    def at(self, theta: F64) -> Point:
-        """The parameters theta (p,) with the run's load."""
-        return Point(theta, self.run.payload_kg, self.run.front_share_pct / 100.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,26 +103,6 @@ def _tell(progress: Callable[[int, int], None] | None, done: int, n_steps: int) 
         progress(done, n_steps)
 
 
-def _reading(vehicle: Vehicle) -> Reading:
-    return Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT)
-
-
-def known_spectra(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[KnownSpectra]:
-    """Those of ``runs`` that hold enough steady driving. Raises CalibrationImpossibleError where none does."""
-    known = []
-    for run in runs:
-        batches = [batch for batch in run.batches if not batch.rejected]
-        spectra = cross_spectra_of(batches, _reading(vehicle))
-        if spectra is not None:
-            known.append(KnownSpectra(run, vehicle, spectra))
-    if not known:
-        raise CalibrationImpossibleError(
-            "no run holds enough steady driving with both sensors for the cross-spectral estimator: drive at least a "
-            "minute at speed, and map both"
-        )
-    return known
-
-
 def _best_fit(known: list[KnownSpectra], prior: Prior) -> Found:
     """The best of several starts: the posterior need not have one peak."""
     return min((fit_half_car(known, prior, prior.start(*shift)) for shift in _STARTS), key=lambda found: found.cost)
@@ -165,6 +128,7 @@ def fit_half_car(known: Sequence[KnownSpectra], prior: Prior, start: F64) -> Fou
 
 def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
     """What the known runs taught, its intervals not yet tested on any run left out."""
+    reading = known[0].spectra.reading
     runs = [k.run for k in known]
     payloads, shares = [r.payload_kg for r in runs], [r.front_share_pct for r in runs]
     speeds = [batch.mean_speed_mps for run in runs for batch in run.batches if not batch.rejected]
@@ -173,8 +137,8 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         empty_mass_kg=vehicle.empty_mass_kg,
         empty_front_share_pct=vehicle.empty_front_share_pct,
         wheelbase_m=vehicle.wheelbase_m,
-        band_hz=BAND_HZ,
-        n_segment=N_SEGMENT,
+        band_hz=reading.band_hz,
+        n_segment=reading.n_segment,
         names=PARAMETERS,
         parameters=found.x,
         covariance=found.covariance,
@@ -188,6 +152,7 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         speed_seen_mps=(min(speeds), max(speeds)),
         warnings=(SPRINGS_FROM_PRIORS,) if len({*payloads}) == 1 else (),
         known_loads=tuple(zip(payloads, shares, strict=True)),
+        usual_log_amplitude=reading.usual_log_amplitude,
     )
 
 

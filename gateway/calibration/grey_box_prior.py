@@ -24,6 +24,8 @@ GYRATION_PER_WHEELBASE: Final = 0.46
 SLACK: Final = 0.03
 SLOPE_STD_PER_KN: Final = 0.05
 BEND_STD_PER_KN: Final = 0.1
+DAMPER_FRICTION, DAMPER_FRICTION_STD = 0.1, 0.3  # shares of the rate at the usual amplitude
+SPRING_FRICTION, SPRING_FRICTION_STD = 0.03, 0.05
 TRACK_OFFSET_M: Final = 0.03
 NOISE_ACCELERATION_M2PS3: Final = 1e-5  # 300 ug per root hertz
 NOISE_PITCH_RATE_RAD2PS: Final = 1e-8  # 0.006 deg/s per root hertz; steps of 0.25 deg/s at 100 Hz make 3e-8
@@ -100,6 +102,8 @@ def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
         f"damper_mount_{end}_npm": (log(MOUNT_NPM * scale), _LOG_STD["damper_mount"]),
         f"tyre_{end}_npm": (log(TYRE_NPM * scale), _LOG_STD["tyre"]),
         f"unsprung_{end}_kg": (log(unsprung_kg), WEIGHED_STD if given_kg else _LOG_STD["unsprung"]),
+        f"damper_friction_{end}": (DAMPER_FRICTION, DAMPER_FRICTION_STD),
+        f"spring_friction_{end}": (SPRING_FRICTION, SPRING_FRICTION_STD),
         f"spring_slope_{end}_per_kn": (0.03 / scale, SLOPE_STD_PER_KN / scale),
         **{f"spring_bend_{end}_{i}_per_kn": (0.0, BEND_STD_PER_KN / scale) for i in range(len(BEND_SHARES))},
     }

@@ -17,10 +17,11 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.grey_box import BAND_HZ, N_SEGMENT, KnownSpectra, fit_half_car
+from gateway.calibration.grey_box import fit_half_car
 from gateway.calibration.grey_box_prior import prior_of
 from gateway.calibration.inspection import Finding, Severity
 from gateway.calibration.inspection_kinds import Kind, found
+from gateway.calibration.known_spectra import BAND_HZ, N_SEGMENT, KnownSpectra
 from gateway.core.cross_spectra import CrossSpectra, Reading
 from gateway.core.cross_spectrum import COHERENCE_BAND_HZ
 from gateway.core.grey_model import INDEX, Ground

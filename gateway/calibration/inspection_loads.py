@@ -12,10 +12,11 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.grey_box import KnownSpectra, fit_half_car, half_car_calibration, known_spectra
+from gateway.calibration.grey_box import fit_half_car, half_car_calibration
 from gateway.calibration.grey_box_prior import prior_of
 from gateway.calibration.inspection import Finding, Severity
 from gateway.calibration.inspection_kinds import Kind, found
+from gateway.calibration.known_spectra import KnownSpectra, known_spectra
 from gateway.core.cross_spectrum import locate
 from gateway.core.known_run import KnownRun
 from gateway.core.likelihood import Point

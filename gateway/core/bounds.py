@@ -90,6 +90,8 @@ def steady_spectra(reading: Reading, drive: Drive) -> CrossSpectra:
         delay_s=np.array([[delay_s]]),
         n_segments=np.array([[n]]),
         inverse_power=np.zeros((1, 1)),
+        log_amplitude=np.zeros((1, 1)),
         acceleration_rms_mps2=1.0,
         pitch_rate_rms_radps=1.0,
+        reading=reading,
     )

@@ -1,4 +1,4 @@
-"""What the likelihood needs of a drive: cross-spectra of the two sensors, grouped by speed and roughness.
+"""What the likelihood needs of a drive: cross-spectra of the two sensors, grouped by speed and amplitude.
 
 Segments are short, tapered, detrended, and never cross a masked sample. Each is divided by its own
 power, so that a rough stretch does not drown the others. The road reaches the rear axle later than
@@ -15,7 +15,7 @@ from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transf
 from gateway.records import C128, F64, I64, Batch
 
 SPEED_BIN = 0.03  # width of a group of segments in the logarithm of speed
-AMPLITUDE_BIN = 0.5  # and in the logarithm of how hard the road shakes: noise counts for more where it is smooth
+AMPLITUDE_BIN = 0.5  # and in the logarithm of how much it moves: friction and noise count for more where that is little
 SPEED_CHANGE_MAX_MPS2 = 0.3  # braking and pulling away pitch the body without any road
 SPEED_SAMPLE_STEP = 8
 LEAST_SEGMENTS = 6
@@ -23,11 +23,16 @@ LEAST_SEGMENTS = 6
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How spectra are taken of a vehicle: band_hz is inclusive, n_segment in samples."""
+    """How spectra are taken of a vehicle: band_hz is inclusive, n_segment in samples.
+
+    usual_log_amplitude is how much the vehicle moved in calibration (:func:`log_amplitude_of`); None for as much as in
+    the drive that is read.
+    """
 
     wheelbase_m: float
     band_hz: tuple[float, float]
     n_segment: int
+    usual_log_amplitude: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +43,9 @@ class CrossSpectra:
     auto-spectra, cross (b, m) is pitch rate times the conjugate of acceleration; delay_phase
     (b, m + 2) is the mean of exp(-j 2 pi f l / v), delay_s (b, 1) the mean of l / v and n_segments
     (b, 1) the number of segments in each group. inverse_power (b, 1) is the mean of what segments were
-    multiplied by. The two root mean squares are of the segments before division, in m/s2 and rad/s within the band.
+    multiplied by, log_amplitude (b, 1) how much they moved over the usual. The two root mean squares are of
+    the segments before division, in m/s2 and rad/s within the band; reading is how they were taken, the usual
+    amplitude filled in.
     """
 
     freq_hz: F64
@@ -49,8 +56,15 @@ class CrossSpectra:
     delay_s: F64
     n_segments: F64
     inverse_power: F64
+    log_amplitude: F64
     acceleration_rms_mps2: float
     pitch_rate_rms_radps: float
+    reading: Reading
+
+    @property
+    def log_amplitude_mean(self) -> float:
+        """How much the vehicle moved over the usual, over all segments."""
+        return float(np.sum(self.log_amplitude * self.n_segments) / self.n_segments.sum())
 
     @property
     def n_total(self) -> int:
@@ -109,6 +123,17 @@ def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra
     return _grouped(joined, freq_hz, reading)
 
 
+def log_amplitude_of(acceleration: F64, pitch_rate: F64) -> F64:
+    """How much a vehicle moves (...), from the power of both sensors at each frequency (..., m).
+
+    The natural logarithm of an amplitude, averaged over frequencies and sensors. Averaged powers would not do: by
+    chance a segment's peak is higher, and would look like a peak that is higher wherever more moves.
+    """
+    tiny = np.finfo(float).tiny
+    found: F64 = 0.25 * np.mean(np.log(np.maximum(acceleration, tiny)) + np.log(np.maximum(pitch_rate, tiny)), axis=-1)
+    return found
+
+
 def _segments(batch: Batch, reading: Reading, kept: I64) -> _Segments:
     n_segment = reading.n_segment
     has_both = np.isfinite(batch.vertical_acceleration_mps2) & np.isfinite(batch.pitch_rate_radps)
@@ -136,7 +161,9 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
     divisor = np.maximum(np.sqrt(power_a * power_g), np.finfo(float).tiny)[:, None]
     width_hz = float(freq_hz[-2] - freq_hz[1])
     rms_a, rms_g = float(np.sqrt(power_a.mean() * width_hz)), float(np.sqrt(power_g.mean() * width_hz))
-    log_amplitude = 0.5 * np.log(divisor[:, 0] / np.median(divisor))
+    amplitude = log_amplitude_of(np.abs(a) ** 2, np.abs(g) ** 2)
+    usual = float(amplitude.mean()) if reading.usual_log_amplitude is None else reading.usual_log_amplitude
+    log_amplitude = amplitude - usual
     alike = np.round(np.stack([np.log(mean_delay_s) / SPEED_BIN, log_amplitude / AMPLITUDE_BIN], axis=1))
     _, member = np.unique(alike, axis=0, return_inverse=True)
     n_segments = np.bincount(member).astype(float)[:, None]
@@ -157,6 +184,8 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
         delay_s=np.real(mean(mean_delay_s[:, None])),
         n_segments=n_segments,
         inverse_power=np.real(mean(1.0 / divisor)),
+        log_amplitude=np.real(mean(log_amplitude[:, None])),
         acceleration_rms_mps2=rms_a,
         pitch_rate_rms_radps=rms_g,
+        reading=replace(reading, usual_log_amplitude=usual),
     )

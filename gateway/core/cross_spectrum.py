@@ -48,7 +48,7 @@ class CrossSpectrumCalibration:
     these are positive quantities). The inflations widen standard deviations, by so much more per_reach
     as a load lies beyond ``known_loads`` (payload kg, front share %; core.reach); misfit_limit is the
     largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
-    root mean squares within the band.
+    root mean squares within the band. usual_log_amplitude: see core.cross_spectra.Reading.
     """
 
     empty_mass_kg: float
@@ -72,6 +72,7 @@ class CrossSpectrumCalibration:
     known_loads: tuple[tuple[float, float], ...] = ()
     payload_inflation_per_reach: float = 0.0
     front_share_inflation_per_reach: float = 0.0
+    usual_log_amplitude: float | None = None
 
     @property
     def ground(self) -> Ground:
@@ -81,7 +82,7 @@ class CrossSpectrumCalibration:
     @property
     def reading(self) -> Reading:
         """How spectra of this vehicle are taken."""
-        return Reading(self.wheelbase_m, self.band_hz, self.n_segment)
+        return Reading(self.wheelbase_m, self.band_hz, self.n_segment, self.usual_log_amplitude)
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,6 +237,7 @@ def _judged(
         "reach": reach,
         "misfit": located.misfit,
         "n_segments": float(spectra.n_total),
+        "amplitude_ratio": math.exp(spectra.log_amplitude_mean),
         "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
         "damper_rear_ratio": _ratio(located, calibration, "damper_rear_nspm"),
         "delay_scale": float(located.point.theta[INDEX["delay_scale"]]),

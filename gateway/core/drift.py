@@ -34,7 +34,7 @@ NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
 )
 """How far vehicle and packing really lie from their calibration; each axle its own."""
 
-DAMPERS_TOGETHER_STD: Final = 0.05
+DAMPERS_TOGETHER_STD: Final = 0.03
 """What both axles' dampers have in common beside it: their oil is as warm or cold in front as at the rear."""
 
 DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]

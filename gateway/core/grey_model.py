@@ -2,8 +2,9 @@
 
 Springs, dampers, masses and the like enter as logarithms, so that they stay positive and a prior's
 standard deviation is a share; the rest enters as it is. The vector also holds the slack: the share
-of each sensor's power, as a function of frequency, that does not come through the modelled path; and the
-sensors' own noise as spectral densities.
+of each sensor's power, as a function of frequency, that does not come through the modelled path; the
+sensors' own noise as spectral densities; and which share of each spring's and damper's rate is friction
+(core.friction).
 """
 
 from dataclasses import dataclass
@@ -45,6 +46,10 @@ _SIGNED: Final = (
     "spring_slope_rear_per_kn",
     *(f"spring_bend_front_{i}_per_kn" for i in range(len(BEND_SHARES))),
     *(f"spring_bend_rear_{i}_per_kn" for i in range(len(BEND_SHARES))),
+    "damper_friction_front",
+    "damper_friction_rear",
+    "spring_friction_front",
+    "spring_friction_rear",
     "gyro_lag_s",
     "delay_scale",
     "rear_lag_s",

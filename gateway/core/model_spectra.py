@@ -1,10 +1,11 @@
 """The spectral matrix that the two sensors should show of a vehicle, for every group of segments, and its slopes.
 
 Both axles meet one road, so the matrix is that of two coherent paths; what is not coherent is added to
-it. Two things make groups differ that carry the same load:
+it. Three things make groups differ that carry the same load:
 
 - speed, by the delay of the rear axle, and by the tracks: axles whose wheels do not run in one track
   meet roads that resemble each other the less the shorter the waves are;
+- how much the vehicle moves, by the friction of its axles;
 - sensor noise, which is the same on every road, so that it counts for more on a smooth one.
 """
 
@@ -15,6 +16,7 @@ import numpy as np
 from scipy.special import k0, k1
 
 from gateway.core.cross_spectra import CrossSpectra
+from gateway.core.friction import at_levels, level_weights
 from gateway.core.grey_model import HALF_CAR_PARAMETERS, INDEX, SLACK_KNOTS_HZ, Ground, half_car, slack_weights
 from gateway.core.halfcar import frequency_response
 from gateway.records import C128, F64
@@ -29,8 +31,8 @@ PAYLOAD_STEP_KG: Final = 0.1
 class SpectralModel:
     """Vehicles theta (..., p) with their loads, solved but not yet driven at any speed.
 
-    The four responses (..., 1, m) are to a unit of road under one axle; slack (..., m) is a share of each sensor's
-    power, noise (..., 1) a density in the square of the sensor's unit per hertz.
+    The four responses (..., 3, m) are to a unit of road under one axle, at three amplitudes of movement; slack
+    (..., m) is a share of each sensor's power, noise (..., 1) a density in the square of the sensor's unit per hertz.
     """
 
     responses: tuple[C128, C128, C128, C128]
@@ -46,7 +48,7 @@ class SpectralModel:
 
 @dataclass(frozen=True, slots=True)
 class _Paths:
-    """What groups see: responses (..., 1, m), and the rear axle's phase times its coherence with the front's."""
+    """What groups see: responses (..., b, m), and the rear axle's phase times its coherence with the front's."""
 
     acceleration_front: C128
     acceleration_rear: C128
@@ -121,14 +123,14 @@ def spectral_slopes(
 def _responses(
     theta: F64, payload_kg: F64, front_share: F64, ground: Ground, freq_hz: F64
 ) -> tuple[C128, C128, C128, C128]:
-    """Responses (..., 1, m) of acceleration to front and rear, then of pitch rate."""
+    """Responses (..., 3, m) of acceleration to front and rear, then of pitch rate, at each of friction.LEVELS."""
     r = frequency_response(
-        half_car(theta, ground), np.asarray(payload_kg)[..., None], np.asarray(front_share)[..., None], freq_hz
+        half_car(at_levels(theta), ground),
+        np.asarray(payload_kg)[..., None, None],
+        np.asarray(front_share)[..., None, None],
+        freq_hz,
     )
-    fa, ra, fg, rg = (
-        x[..., None, :] for x in (r.acceleration_front, r.acceleration_rear, r.pitch_rate_front, r.pitch_rate_rear)
-    )
-    return fa, ra, fg, rg
+    return r.acceleration_front, r.acceleration_rear, r.pitch_rate_front, r.pitch_rate_rear
 
 
 def _slack(theta: F64, sensor: str, freq_hz: F64) -> F64:
@@ -139,10 +141,12 @@ def _slack(theta: F64, sensor: str, freq_hz: F64) -> F64:
 
 
 def _paths(model: SpectralModel, spectra: CrossSpectra) -> _Paths:
+    weights = level_weights(spectra.log_amplitude)
     later_s = spectra.delay_s * model.delay_scale[..., None, :] + model.rear_lag_s[..., None, :]
     phase = spectra.delay_phase * np.exp(-2j * np.pi * spectra.freq_hz * later_s)
     x = _track_argument(model, spectra)
-    return _Paths(*model.responses, phase=phase * (x * k1(x)))
+    fa, ra, fg, rg = (weights @ response for response in model.responses)
+    return _Paths(fa, ra, fg, rg, phase=phase * (x * k1(x)))
 
 
 def _track_argument(model: SpectralModel, spectra: CrossSpectra) -> F64:
@@ -173,7 +177,7 @@ def _without_noise(p: _Paths, model: SpectralModel) -> Matrix:
 
 
 def _by_response(p: _Paths, moved: tuple[C128, C128, C128, C128], model: SpectralModel) -> Matrix:
-    """Change of the matrix with changes ``moved`` (k, 1, m) of the four responses."""
+    """Change of the matrix with changes ``moved`` (k, b, m) of the four responses."""
     dfa, dra, dfg, drg = moved
     fa, ra, fg, rg = p.acceleration_front, p.acceleration_rear, p.pitch_rate_front, p.pitch_rate_rear
     slack_a, slack_g = 1.0 + model.slack_acceleration, 1.0 + model.slack_pitch_rate
@@ -228,7 +232,7 @@ def _by_phase(d_phase: C128, p: _Paths) -> Matrix:
 def _moved_responses(
     theta: F64, load: tuple[float, float], ground: Ground, spectra: CrossSpectra, free: list[int], is_load_free: bool
 ) -> tuple[C128, C128, C128, C128]:
-    """Central differences (k, 1, m) of the responses for the vehicle's ``free`` entries, then the load's two."""
+    """Central differences (k, b, m) of the responses for the vehicle's ``free`` entries, then the load's two."""
     k = len(free) + 2 * is_load_free
     thetas = np.repeat(theta[None], 2 * k, axis=0)
     payload_kg, share = np.full(2 * k, load[0]), np.full(2 * k, load[1])
@@ -239,9 +243,10 @@ def _moved_responses(
         payload_kg[2 * k - 4 : 2 * k - 2] += (PAYLOAD_STEP_KG, -PAYLOAD_STEP_KG)
         share[2 * k - 2 :] += (STEP, -STEP)
         step[k - 2] = PAYLOAD_STEP_KG
-    per_step = 0.5 / step[:, None, None]
+    weights, per_step = level_weights(spectra.log_amplitude), 0.5 / step[:, None, None]
     fa, ra, fg, rg = (
-        (r[::2] - r[1::2]) * per_step for r in _responses(thetas, payload_kg, share, ground, spectra.freq_hz)
+        weights @ ((r[::2] - r[1::2]) * per_step)
+        for r in _responses(thetas, payload_kg, share, ground, spectra.freq_hz)
     )
     return fa, ra, fg, rg
 

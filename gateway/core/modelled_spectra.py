@@ -22,8 +22,8 @@ from gateway.records import F64, Bool, Spectra
 class Fitted:
     """What the estimator found for one batch.
 
-    Damper ratios are to the calibrated ones. delay_s is the mean time from axle to axle over the
-    batch, delay_std_s how much it varied.
+    Damper ratios are to the calibrated ones, amplitude_ratio to the calibrated drives'. delay_s is the mean
+    time from axle to axle over the batch, delay_std_s how much it varied.
     """
 
     payload_kg: float
@@ -34,12 +34,13 @@ class Fitted:
     damper_rear_ratio: float = 1.0
     delay_scale: float | None = None
     payload_mode_hz: float | None = None
+    amplitude_ratio: float = 1.0
 
 
 def modelled_spectra(seen: Spectra, calibration: CrossSpectrumCalibration, fitted: Fitted) -> Spectra:
     """Spectra (k,) of the fitted vehicle at those k of the m seen frequencies that calibration has used."""
     is_used = (seen.freq_hz >= calibration.band_hz[0]) & (seen.freq_hz <= calibration.band_hz[1])
-    measured = _as_one_group(seen, is_used, fitted)
+    measured = _as_one_group(seen, is_used, fitted, calibration)
     model = spectral_model(
         _parameters(calibration, fitted),
         np.array(fitted.payload_kg),
@@ -69,7 +70,7 @@ def _parameters(calibration: CrossSpectrumCalibration, fitted: Fitted) -> F64:
     return theta
 
 
-def _as_one_group(seen: Spectra, is_used: Bool, fitted: Fitted) -> CrossSpectra:
+def _as_one_group(seen: Spectra, is_used: Bool, fitted: Fitted, calibration: CrossSpectrumCalibration) -> CrossSpectra:
     """The spectra as if all segments had been one group, with delays normally distributed about their mean."""
     step_hz = float(seen.freq_hz[1] - seen.freq_hz[0])
     freq_hz = seen.freq_hz[is_used]
@@ -86,8 +87,10 @@ def _as_one_group(seen: Spectra, is_used: Bool, fitted: Fitted) -> CrossSpectra:
         delay_s=np.array([[fitted.delay_s]]),
         n_segments=np.array([[1.0]]),
         inverse_power=np.array([[1.0 / np.sqrt(np.mean(a**2) * np.mean(g**2))]]),
+        log_amplitude=np.array([[np.log(fitted.amplitude_ratio)]]),
         acceleration_rms_mps2=float("nan"),
         pitch_rate_rms_radps=float("nan"),
+        reading=calibration.reading,
     )
 
 

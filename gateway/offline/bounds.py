@@ -6,8 +6,8 @@ from math import radians
 from types import MappingProxyType
 from typing import Final
 
-from gateway.calibration.grey_box import BAND_HZ, N_SEGMENT
 from gateway.calibration.grey_box_prior import prior_of
+from gateway.calibration.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.core.bounds import Bound, Drive
 from gateway.core.cross_spectra import Reading
 from gateway.core.grey_model import Ground

@@ -1,5 +1,6 @@
 """The fitted half-car against what was measured, run by run."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -41,7 +42,13 @@ def fits_of(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration) -> 
         measured = _joined([spectra for batch in batches if (spectra := spectra_of(batch)) is not None])
         if cross is None or measured is None:
             continue
-        at_truth = Fitted(run.payload_kg, run.front_share_pct, cross.delay_mean_s, cross.delay_std_s)
+        at_truth = Fitted(
+            run.payload_kg,
+            run.front_share_pct,
+            cross.delay_mean_s,
+            cross.delay_std_s,
+            amplitude_ratio=math.exp(cross.log_amplitude_mean),
+        )
         point = Point(calibration.parameters, run.payload_kg, run.front_share_pct / 100.0)
         misfit = Whittle(cross, calibration.ground).misfit(point)
         fits.append(Fit(run, measured, modelled_spectra(measured, calibration, at_truth), misfit))

@@ -106,6 +106,7 @@ def _fitted(record: Record, wheelbase_m: float) -> Fitted | None:
         damper_rear_ratio=told.get("damper_rear_ratio") or 1.0,
         delay_scale=told.get("delay_scale"),
         payload_mode_hz=told.get("payload_mode_hz"),
+        amplitude_ratio=told.get("amplitude_ratio") or 1.0,
     )
 
 

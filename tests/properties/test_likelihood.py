@@ -17,15 +17,24 @@ GROUND = Ground(VAN.empty_mass_kg, VAN.empty_front_share_pct / 100.0, VAN.wheelb
 READING = Reading(VAN.wheelbase_m, (1.1, 14.0), 256)
 
 
-@pytest.fixture(scope="module")
-def spectra() -> CrossSpectra:
-    found = cross_spectra_of([batch_over_road(200.0, 50.0, seed=1, duration_s=60.0)], READING)
+def spectra_of(reading: Reading) -> CrossSpectra:
+    found = cross_spectra_of([batch_over_road(200.0, 50.0, seed=1, duration_s=60.0)], reading)
     assert found is not None
     return found
 
 
-def test_the_gradient_is_the_slope_of_the_cost(spectra: CrossSpectra) -> None:
-    whittle = Whittle(spectra, GROUND)
+@pytest.fixture(scope="module")
+def spectra() -> CrossSpectra:
+    return spectra_of(READING)
+
+
+@pytest.mark.parametrize("usually", [0.5, 1.0, 3.0])
+def test_the_gradient_is_the_slope_of_the_cost(usually: float, spectra: CrossSpectra) -> None:
+    """Wherever the vehicle moves more or less than it usually does, too."""
+    own = spectra.reading.usual_log_amplitude
+    assert own is not None
+    usual_log_amplitude = own + np.log(usually)
+    whittle = Whittle(spectra_of(replace(READING, usual_log_amplitude=usual_log_amplitude)), GROUND)
     prior = prior_of(VAN)
     free = list(range(len(PARAMETERS)))
     point = Point(prior.mean, 150.0, 0.49)

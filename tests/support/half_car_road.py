@@ -34,8 +34,9 @@ def batch_over_road(
     pitch_sign: float = 1.0,
     incoherent: float = 0.0,
     car: HalfCar = CAR,
+    shaken_mps2: float = 0.8,
 ) -> Batch:
-    """Constant speed; sensor noise is ``noise`` of each signal's standard deviation.
+    """Constant speed; ``shaken_mps2`` is the acceleration's standard deviation, ``noise`` a share of each signal's.
 
     ``incoherent`` replaces that share of the pitch rate's amplitude by something unrelated to the road.
     """
@@ -48,7 +49,7 @@ def batch_over_road(
     in_band = (freq_hz > 0.5) & (freq_hz < 22.0)
     acceleration = _in_time((r.acceleration_front + r.acceleration_rear * later) * road * in_band, n)
     pitch_rate = _in_time((r.pitch_rate_front + r.pitch_rate_rear * later) * road * in_band, n)
-    scale = 0.8 / acceleration.std()
+    scale = shaken_mps2 / acceleration.std()
     acceleration, pitch_rate = acceleration * scale, pitch_rate * scale
     unrelated = pitch_rate.std() * rng.standard_normal(n)
     pitch_rate = pitch_sign * ((1.0 - incoherent) * pitch_rate + incoherent * unrelated)

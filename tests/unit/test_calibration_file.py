@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ import pytest
 from support.calibrated import calibration_file
 
 from gateway.calibration.file import content_id, load_calibration
+from gateway.calibration.file_parts import CrossSpectrumPart
+from gateway.core.cross_spectrum import CrossSpectrumCalibration
 from gateway.errors import CalibrationFileError
 
 Change = Callable[[dict[str, Any]], Any]
@@ -53,6 +56,10 @@ def test_round_trip(tmp_path: Path) -> None:
         assert same is not None
         assert same.predict(0.9, 1.2) == model.predict(0.9, 1.2)
     assert core_again.ratio_index.acceleration_bands == core.ratio_index.acceleration_bands
+
+
+def test_the_file_keeps_all_that_the_estimator_goes_by() -> None:
+    assert set(CrossSpectrumPart.model_fields) == {field.name for field in fields(CrossSpectrumCalibration)}
 
 
 def test_the_id_does_not_depend_on_how_the_file_is_laid_out(tmp_path: Path) -> None:

@@ -122,7 +122,7 @@ def test_an_unseen_speed_widens_the_interval(calibration: CrossSpectrumCalibrati
 
 @pytest.mark.parametrize("rougher", [0.5, 2.0])
 def test_another_roughness_widens_the_interval(calibration: CrossSpectrumCalibration, rougher: float) -> None:
-    """Friction makes dampers depend on how much they move; the half-car has none."""
+    """Friction is known on roads like those of calibration; far from them it is an extrapolation."""
     seen = weigh(batch_over_road(200.0, 50.0, seed=3), calibration)
     on_other_roads = replace(calibration, acceleration_rms_mps2=calibration.acceleration_rms_mps2 / rougher)
     unseen = weigh(batch_over_road(200.0, 50.0, seed=3), on_other_roads)

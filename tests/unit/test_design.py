@@ -12,8 +12,9 @@ from support.known_runs import known_run
 
 from gateway.calibration.design import Design
 from gateway.calibration.design_loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
-from gateway.calibration.grey_box import calibrate_cross_spectrum, fit_half_car, half_car_calibration, known_spectra
+from gateway.calibration.grey_box import calibrate_cross_spectrum, fit_half_car, half_car_calibration
 from gateway.calibration.grey_box_prior import prior_of
+from gateway.calibration.known_spectra import known_spectra
 from gateway.core.bounds import Drive, cramer_rao, expected_of, steady_spectra
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectra import cross_spectra_of

@@ -1,0 +1,126 @@
+"""Friction: the law by which an axle stiffens where it moves less, and that it is learnt and allowed for."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.calibration.grey_box import calibrate_cross_spectrum
+from gateway.calibration.grey_box_prior import prior_of
+from gateway.core.cross_spectra import log_amplitude_of
+from gateway.core.cross_spectrum import CrossSpectrum, CrossSpectrumCalibration
+from gateway.core.friction import LEAST_LEFT, LEVELS, MOST, at_levels, level_weights
+from gateway.core.grey_model import INDEX, PARAMETERS, in_units
+from gateway.core.halfcar import Axle, HalfCar
+from gateway.core.known_run import KnownRun
+from gateway.records import Batch
+from tests.support.half_car_road import CAR, VAN, batch_over_road
+
+ROADS_MPS2 = (0.4, 0.8, 1.4)
+MOVED_MPS2 = 0.8  # where friction makes up these shares of a rate
+DAMPER_SHARE, SPRING_SHARE = 0.35, 0.04
+amplitudes = st.floats(-2.0, 2.0)
+
+
+def with_friction(shaken_mps2: float) -> HalfCar:
+    """CAR as it acts on a road that shakes it so much, with friction."""
+
+    def axle(smooth: Axle) -> Axle:
+        ratio = MOVED_MPS2 / shaken_mps2
+        return replace(
+            smooth,
+            damper_nspm=smooth.damper_nspm * (1.0 - DAMPER_SHARE + DAMPER_SHARE * ratio),
+            spring_npm=smooth.spring_npm * (1.0 - SPRING_SHARE + SPRING_SHARE * ratio),
+        )
+
+    return replace(CAR, front=axle(CAR.front), rear=axle(CAR.rear))
+
+
+def drive(payload_kg: float, front_share_pct: float, seed: int, shaken_mps2: float, car: HalfCar) -> Batch:
+    return batch_over_road(payload_kg, front_share_pct, seed, shaken_mps2=shaken_mps2, car=car, noise=0.01)
+
+
+def test_where_it_moves_as_usual_nothing_changes() -> None:
+    theta = prior_of(VAN).mean
+    np.testing.assert_array_equal(at_levels(theta)[1], theta)
+
+
+@given(share=st.floats(-0.2, 1.0))
+def test_a_rate_goes_with_one_less_p_and_p_over_s(share: float) -> None:
+    theta = prior_of(VAN).mean.copy()
+    theta[INDEX["damper_rear_nspm"]] = np.log(4000.0)
+    theta[INDEX["damper_friction_rear"]] = share
+    for level, moved in zip(LEVELS, at_levels(theta), strict=True):
+        left = max(LEAST_LEFT, 1.0 - share + share / np.exp(level))
+        assert in_units(moved, "damper_rear_nspm") == pytest.approx(4000.0 * left)
+        untouched = [i for i, name in enumerate(PARAMETERS) if not name.startswith(("damper_", "spring_"))]
+        np.testing.assert_array_equal(moved[untouched], theta[untouched])
+
+
+@given(amplitude=amplitudes, a=st.floats(-3.0, 3.0), b=st.floats(-3.0, 3.0), c=st.floats(-3.0, 3.0))
+def test_between_levels_a_parabola_is_met_exactly(amplitude: float, a: float, b: float, c: float) -> None:
+    at = np.array(LEVELS)
+    within = np.clip(amplitude, -MOST, MOST)
+    met = level_weights(np.array([[amplitude]])) @ (a + b * at + c * at**2)
+    assert met[0] == pytest.approx(a + b * within + c * within**2, abs=1e-9)
+
+
+@given(ratio=st.floats(0.1, 10.0))
+def test_twice_the_movement_is_one_logarithm_of_two_more(ratio: float) -> None:
+    a, g = np.array([0.3, 2.0, 0.1]), np.array([0.01, 0.4, 0.02])
+    moved = log_amplitude_of(ratio**2 * a, ratio**2 * g) - log_amplitude_of(a, g)
+    assert moved == pytest.approx(np.log(ratio))
+
+
+def calibrated(car_on: Callable[[float], HalfCar]) -> CrossSpectrumCalibration:
+    """From three loads on three roads each; ``car_on`` is the vehicle on a road that shakes it so much (m/s2)."""
+    runs = []
+    for number, (payload_kg, share_pct) in enumerate([(0.0, 52.0), (200.0, 50.0), (400.0, 44.0)]):
+        batches = [
+            drive(payload_kg, share_pct, 10 * number + i, shaken_mps2, car_on(shaken_mps2))
+            for i, shaken_mps2 in enumerate(ROADS_MPS2)
+        ]
+        runs.append(KnownRun(number, "", payload_kg, share_pct, tuple(batches)))
+    return calibrate_cross_spectrum(runs, VAN)
+
+
+@pytest.fixture(scope="module")
+def calibration() -> CrossSpectrumCalibration:
+    return calibrated(with_friction)
+
+
+def test_where_there_is_no_friction_none_is_found() -> None:
+    """By chance one part of a drive moves more than another; that alone must not look like friction."""
+    found = calibrated(lambda shaken_mps2: CAR)
+    for end in ("front", "rear"):
+        assert in_units(found.parameters, f"damper_friction_{end}") == pytest.approx(0.0, abs=0.05)
+        assert in_units(found.parameters, f"spring_friction_{end}") == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("end", ["front", "rear"])
+@pytest.mark.parametrize(("kind", "share"), [("damper", DAMPER_SHARE), ("spring", SPRING_SHARE)])
+def test_calibration_finds_the_friction_there_is(
+    kind: str, share: float, end: str, calibration: CrossSpectrumCalibration
+) -> None:
+    entry = INDEX[f"{kind}_friction_{end}"]
+    std = calibration.covariance[entry, entry] ** 0.5
+    assert std < 0.6 * prior_of(VAN).std[entry]
+    usually = share * MOVED_MPS2 / np.exp(np.mean(np.log(ROADS_MPS2)))
+    assert calibration.parameters[entry] == pytest.approx(usually / (1.0 - share + usually), abs=3.0 * std)
+
+
+@pytest.mark.parametrize("shaken_mps2", [0.35, 0.6, 1.6])
+def test_a_load_reads_the_same_on_smooth_and_on_rough_roads(
+    shaken_mps2: float, calibration: CrossSpectrumCalibration
+) -> None:
+    batch = drive(300.0, 48.0, 77, shaken_mps2, with_friction(shaken_mps2))
+    found = CrossSpectrum().estimate(batch, calibration)
+    assert found.payload_kg == pytest.approx(300.0, abs=9.0)
+    assert found.front_share_pct == pytest.approx(48.0, abs=0.2)
+    blind = calibration.parameters.copy()
+    blind[[i for i, name in enumerate(PARAMETERS) if "_friction_" in name]] = 0.0
+    without = CrossSpectrum().estimate(batch, replace(calibration, parameters=blind))
+    assert abs(without.payload_kg - 300.0) > 2.0 * abs(found.payload_kg - 300.0)
