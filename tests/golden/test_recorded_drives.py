@@ -4,7 +4,9 @@ The bounds are promises to users, not fits: they may only ever be tightened.
 """
 
 import json
+import tomllib
 from pathlib import Path
+from statistics import fmean, stdev
 from typing import Any
 
 import pytest
@@ -88,6 +90,39 @@ def test_a_real_drive_gives_one_line_per_batch_and_says_why_not(trip: str) -> No
     assert all("no_calibration" in record["rejected"] and record["payload_kg"] is None for record in records)
     driven = [record for record in whole if record["rejected"] == ["no_calibration"]]
     assert all(5.0 < record["mean_speed_mps"] < 40.0 and record["spectra"] for record in driven)
+
+
+def real_campaign(folder: Path, trip: str, payload_kg: float) -> Path:
+    """One trip of the real car, declared to carry so much amidships."""
+    drives = recordings() / "real_drive"
+    content = tomllib.loads((drives / f"campaign_trip_{trip}.toml").read_text(encoding="utf-8"))
+    vehicle = content["vehicle"]
+    lines = ["[vehicle]", *(f"{name} = {json.dumps(stated)}" for name, stated in vehicle.items())]
+    lines += ["[[runs]]", f'log = "{drives}/candump_trip{trip.upper()}.log.gz"', f"payload_kg = {payload_kg}"]
+    if payload_kg:
+        lines.append(f"payload_position_m = {vehicle['wheelbase_m'] / 2.0}")
+    campaign = folder / f"{trip}_{payload_kg:.0f}.toml"
+    head = [f'signals = "{drives}/signals.toml"', "identification_fraction = 1.0"]
+    campaign.write_text("\n".join(head + lines), encoding="utf-8")
+    return campaign
+
+
+@pytest.mark.parametrize(("known", "weighed"), [("a", "b"), ("b", "a")])
+def test_two_trips_of_a_real_car_weigh_alike_and_a_declared_load_moves_them(
+    tmp_path: Path, known: str, weighed: str
+) -> None:
+    found = {}
+    for declared_kg in (0.0, 100.0):
+        output = tmp_path / f"{declared_kg:.0f}.json"
+        run("calibrate", real_campaign(tmp_path, known, declared_kg), "--output", output, *CROSS)
+        assert json.loads(output.read_text(encoding="utf-8"))["cross_spectrum"]["warnings"][0] == "springs_from_priors"
+        campaign = real_campaign(tmp_path, weighed, 0.0)
+        told = json.loads(run("evaluate", campaign, "--calibration", output, "--split", "all", "--json"))
+        found[declared_kg] = [b["payload_kg"] for b in told["batches"] if b["payload_kg"] is not None]
+    assert len(found[0.0]) >= 6
+    assert abs(fmean(found[0.0])) <= 25.0
+    assert stdev(found[0.0]) <= 20.0
+    assert fmean(found[100.0]) - fmean(found[0.0]) == pytest.approx(100.0, abs=25.0)
 
 
 def test_the_file_says_what_to_expect_and_can_be_held_against_its_logs(calibration: Path) -> None:
