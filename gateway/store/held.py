@@ -27,6 +27,7 @@ class Held:
         self._changed = threading.Condition()
         self._waiting: deque[Row] = deque()
         self._in_flight: tuple[Row, ...] = ()
+        self._is_at_work = False
         self._epoch = epoch
         self._next_seq = _after(last_seq)
         self.n_dropped = 0
@@ -73,8 +74,9 @@ class Held:
             self._changed.wait_for(lambda: bool(self._waiting) or has_other_work(), timeout_s)
 
     def take(self) -> tuple[Row, ...]:
-        """All that waits, now in flight: end with ``settle`` or ``give_back``."""
+        """All that waits, now in flight: end with ``settle`` or ``give_back``, and then ``rest``."""
         with self._changed:
+            self._is_at_work = True
             self._in_flight = tuple(self._waiting)
             self._waiting.clear()
             return self._in_flight
@@ -83,6 +85,11 @@ class Held:
         """What was in flight is on disk."""
         with self._changed:
             self._in_flight = ()
+
+    def rest(self) -> None:
+        """Nothing is done to the disk until rows wait again or other work is found."""
+        with self._changed:
+            self._is_at_work = False
             self._changed.notify_all()
 
     def give_back(self) -> None:
@@ -97,8 +104,11 @@ class Held:
             self._changed.notify_all()
 
     def wait_until_empty(self, timeout_s: float) -> bool:
+        """True once all is on disk and the disk is left alone."""
         with self._changed:
-            return self._changed.wait_for(lambda: not self._waiting and not self._in_flight, timeout_s)
+            return self._changed.wait_for(
+                lambda: not self._waiting and not self._in_flight and not self._is_at_work, timeout_s
+            )
 
     def estimates(self) -> tuple[str, tuple[EstimateRow, ...]]:
         """The epoch and the estimates not yet on disk, oldest first."""

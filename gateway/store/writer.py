@@ -187,6 +187,8 @@ class Store:
             return self._attempt()
         except StoreError as error:  # since the start somebody put a foreign file there
             return self._degrade(str(error))
+        finally:
+            self._held.rest()  # whoever waits in flush finds the counters and the state as they are now
 
     def _attempt(self) -> bool:
         """Bring to disk what is held; False where the disk refuses, and then it is still held."""
@@ -221,7 +223,7 @@ class Store:
         if self._reason is not None:
             _log.warning("store is on disk again, %d rows had been held", len(rows))
             self._reason = None
-        self._held.settle()  # whoever waits in flush finds the counters and the state as they are now
+        self._held.settle()
         self._n_pruned += self._database.prune(self._clock_ns())
         self._size_bytes = self._database.size_bytes()
 
