@@ -32,6 +32,8 @@ SAME_STAMPS_STDS = 0.05
 # The log's own stamps are others: canplayer sends a frame about a millisecond late, and later where the host lets the
 # emulated machine wait. That jitter is noise of the replay, so its effect is held to the batch's own uncertainty.
 LATE_MS = 3.0
+# One stall that brings frames in a heap outweighs all of that: it moves a load by more than its uncertainty.
+STALL_MS = 10.0
 NEW_STAMPS_STDS = 0.5
 
 
@@ -76,10 +78,11 @@ def stamps_ns(log: Path) -> I64:
     return np.concatenate([chunk.t_ns for chunk in chunks])
 
 
-def lateness_ms(log: Path, heard: Path) -> float:
-    """How much later than the log says frames were sent: 99 of 100 were less late than this, after the first."""
+def lateness_ms(log: Path, heard: Path) -> tuple[float, float]:
+    """How much later than the log says frames were sent, after the promptest: 99 of 100 of them, and the latest."""
     delay_ns = stamps_ns(heard) - stamps_ns(log)
-    return float(np.quantile(delay_ns - delay_ns.min(), 0.99)) / 1e6
+    late, latest = np.quantile(delay_ns - delay_ns.min(), (0.99, 1.0)) / 1e6
+    return float(late), float(latest)
 
 
 @pytest.mark.parametrize(("signals", "n_batches"), [("reference", 2), ("j1939", 1)])
@@ -102,12 +105,13 @@ def test_http_tells_what_estimate_tells_of_the_same_frames(
         told, recorded = drive_once(vehicle, in_guest, frames)
         assert len(told) == n_batches
         heard.write_text(vehicle.run(f"cat {HEARD}"))
-        late_ms.append(lateness_ms(log, heard))
-        if late_ms[-1] < LATE_MS and not any(record["rejected"] for record in told):
+        late, latest = lateness_ms(log, heard)
+        late_ms.append(late)
+        if late < LATE_MS and latest < STALL_MS and not any(record["rejected"] for record in told):
             break
         time.sleep(4.0)  # silence ends the drive
     else:
-        pytest.skip(f"this host is too busy: at best canplayer was {min(late_ms):.0f} ms late, not {LATE_MS:.0f}")
+        pytest.skip(f"this host is too busy: canplayer was {late:.0f} ms late and stood still for {latest:.0f} ms")
     assert [record["rejected"] for record in told] == [record["rejected"] for record in recorded]
     same_kg, same_pp = furthest_apart(told, recorded)
     new_kg, new_pp = furthest_apart(told, expected)
