@@ -8,8 +8,8 @@ import click
 from gateway.calibration.tare_file import FILE_NAME
 from gateway.cli.options import FILE, as_json
 from gateway.config import load_settings
-from gateway.offline.estimates import setup_of
 from gateway.records import json_line
+from gateway.setup import setup_of
 from gateway.uplink import uplink_settings
 
 

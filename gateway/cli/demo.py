@@ -15,10 +15,10 @@ from gateway.bus.sink import BusSink, replay_frames
 from gateway.cli.sentence import sentence
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
 from gateway.offline.demo_drive import demo_drive, frames_of
-from gateway.offline.estimates import setup_of
 from gateway.records import json_line
 from gateway.service.gateway import Gateway
 from gateway.service.log import set_up_log
+from gateway.setup import setup_of
 from gateway.sim.scenario import START_NS, Truth
 from gateway.store import Store
 from gateway.units import NS_PER_S

@@ -2,7 +2,7 @@
 
 from importlib.metadata import version
 
-from gateway.offline.estimates import Setup
+from gateway.setup import Setup
 from gateway.store import Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings
 

@@ -13,7 +13,6 @@ from gateway.bus.decode import Decoder
 from gateway.bus.source import LiveSource, OpenReceiver
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.errors import SpringscaleError, StoreError
-from gateway.offline.estimates import Setup
 from gateway.service.forwarding import uplink_of
 from gateway.service.log import log_event
 from gateway.service.notify import Notifier
@@ -21,6 +20,7 @@ from gateway.service.pipeline import Pipeline
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
 from gateway.service.tare_desk import Subject, TareDesk
+from gateway.setup import Setup
 from gateway.store import Retention, Store
 from gateway.uplink import uplink_settings
 from gateway.web import Board, KnownLoads, TokenFile, create_app, refuse_open_address, server_config

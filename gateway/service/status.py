@@ -7,9 +7,9 @@ from importlib.metadata import version
 
 from gateway.bus.source import LiveSource, SourceState
 from gateway.config import Settings
-from gateway.offline.estimates import Setup
 from gateway.records import Signal
 from gateway.service.pipeline import Pipeline
+from gateway.setup import Setup
 from gateway.store import Store
 from gateway.uplink import Uplink
 from gateway.web import (

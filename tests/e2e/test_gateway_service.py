@@ -22,9 +22,10 @@ from gateway.bus.candump_write import write_candump
 from gateway.bus.sink import replay
 from gateway.config import load_settings
 from gateway.errors import StoreError
-from gateway.offline.estimates import estimates_of_logs, setup_of
+from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Motion, estimate_to_json, json_line
 from gateway.service.gateway import Gateway, GatewayFailedError
+from gateway.setup import setup_of
 from gateway.store import Latest, Store
 
 WINDOW_S = 20.0

@@ -21,9 +21,9 @@ from gateway.bus.sink import replay
 from gateway.cli import springscale
 from gateway.config import load_settings
 from gateway.errors import SpringscaleError
-from gateway.offline.estimates import setup_of
 from gateway.records import Frames, Signal
 from gateway.service.gateway import Gateway
+from gateway.setup import setup_of
 from gateway.store import Store
 
 START_NS = 1_790_000_000_000_000_000

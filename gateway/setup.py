@@ -1,0 +1,74 @@
+"""What turns frames into estimates: signal map, calibration, estimator and tare, loaded and checked."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from gateway.bus.signal_map import SignalMap, load_signal_map
+from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.tare_file import load_tares
+from gateway.config import Settings
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.flow import Flow, Identity
+from gateway.core.settings import BatchSettings
+from gateway.core.tare import Tare
+from gateway.errors import ConfigurationError
+
+NOBODY = Identity()  # a log without a configuration belongs to no named vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """Everything that turns frames into estimates, loaded and checked."""
+
+    signal_map: SignalMap
+    calibration: CalibrationFile | None
+    estimator: str
+    identity: Identity
+    tare: Tare | None = None
+    calibrated: CalibratedVehicle | None = field(init=False)  # the calibration, as the core knows it
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "calibrated", self.calibration.for_core() if self.calibration else None)
+
+    def flow(self, settings: BatchSettings) -> Flow:
+        """A fresh pipeline."""
+        return Flow(settings, self.signal_map.traits, self.calibrated, self.estimator, self.identity, self.tare)
+
+    def with_tare_of(self, path: Path) -> "Setup":
+        """With the tare that ``path`` has in use for this calibration and estimator; without any where it has none.
+
+        Raises ConfigurationError for a file that cannot be believed.
+        """
+        calibration_id = self.calibration.id if self.calibration else None
+        active = load_tares(path).active(calibration_id, self.estimator)
+        return replace(self, tare=active.for_core() if active else None)
+
+
+def load_setup(
+    signals: Path | str, calibration: Path | None, estimator: str | None, identity: Identity = NOBODY
+) -> Setup:
+    """Loads the signal map and the calibration file; the best estimator of the file where none is named.
+
+    Raises SignalMapError, CalibrationFileError, or ConfigurationError where the file lacks the estimator.
+    """
+    held = load_calibration(calibration) if calibration else None
+    chosen = estimator or (held.estimators[0] if held else "cross_spectrum")
+    if held and chosen not in held.estimators:
+        raise ConfigurationError(
+            f"{calibration}: holds no calibration for the estimator {chosen!r}, only for "
+            f"{', '.join(held.estimators)}: choose one of these or calibrate again"
+        )
+    return Setup(load_signal_map(signals), held, chosen, identity)
+
+
+def setup_of(settings: Settings, estimator: str | None = None) -> Setup:
+    """The setup that a springscale.toml describes. Raises as :func:`load_setup`, and for another vehicle's file."""
+    identity = Identity(settings.vehicle.id, settings.vehicle.vin)
+    setup = load_setup(settings.signals, settings.calibration, estimator or settings.estimator, identity)
+    wanted = settings.vehicle.calibrated_as
+    if wanted and setup.calibration and setup.calibration.vehicle.name != wanted:
+        raise ConfigurationError(
+            f"{settings.calibration}: was made for the vehicle {setup.calibration.vehicle.name!r}, "
+            f"vehicle.calibrated_as says {wanted!r}"
+        )
+    return setup
