@@ -23,10 +23,10 @@ import numpy as np
 from gateway.bus.candump_write import append_candump
 from gateway.bus.frames import merge_frames
 from gateway.config import ESTIMATOR_NAMES
-from gateway.offline.demo_drive import demo_drive, frames_of
-from gateway.offline.wiring import unrelated_traffic
 from gateway.records import Frames
 from gateway.units import NS_PER_S
+from gateway.workbench.demo_drive import demo_drive, frames_of
+from gateway.workbench.wiring import unrelated_traffic
 
 FRAMES_PER_S = 2500
 CALIBRATION = Path(__file__).parents[1] / "gateway" / "demo" / "paper_van.json"

@@ -7,7 +7,6 @@ import time
 
 import numpy as np
 
-from gateway.offline.wiring import Wiring
 from gateway.sim.drive import constant
 from gateway.sim.ride import ride
 from gateway.sim.road import PaperRoad, iso_road
@@ -15,6 +14,7 @@ from gateway.sim.scenario import simulate_drive
 from gateway.sim.sensors import REFERENCE
 from gateway.sim.vans import PAPER_VAN
 from gateway.sim.vehicle import Load
+from gateway.workbench.wiring import Wiring
 
 DRIVE_S = 900.0
 

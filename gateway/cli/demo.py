@@ -14,7 +14,6 @@ import click
 from gateway.bus.sink import BusSink, replay_frames
 from gateway.cli.sentence import sentence
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
-from gateway.offline.demo_drive import demo_drive, frames_of
 from gateway.records import json_line
 from gateway.service.gateway import Gateway
 from gateway.service.log import set_up_log
@@ -23,6 +22,7 @@ from gateway.sim.scenario import START_NS, Truth
 from gateway.store import Store
 from gateway.units import NS_PER_S
 from gateway.web import KnownLoad
+from gateway.workbench.demo_drive import demo_drive, frames_of
 
 CHANNEL: Final = "springscale-demo"
 ROUND_NS: Final = 1800 * NS_PER_S  # from the start of one drive to the start of the next

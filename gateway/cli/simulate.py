@@ -11,11 +11,11 @@ from gateway.bus.sink import ReplayProgress, Speed
 from gateway.cli import bus_options
 from gateway.cli.options import FILE, as_json
 from gateway.cli.progress import StatusLine, bar
-from gateway.offline.plans import PLANS
-from gateway.offline.simulate import SENSORS_OF_MAP, Bench, bench_of, write_campaign
-from gateway.offline.simulate import stream as send_drives
 from gateway.records import json_line
 from gateway.sim.vans import VANS
+from gateway.workbench.campaigns import PLANS
+from gateway.workbench.simulate import SENSORS_OF_MAP, Bench, bench_of, write_campaign
+from gateway.workbench.simulate import stream as send_drives
 
 _BENCH = (
     click.argument("kind", type=click.Choice(list(PLANS))),

@@ -14,8 +14,8 @@ from gateway.core.grey_model import Ground
 from gateway.core.likelihood import Point
 from gateway.core.sensor_bounds import SPEED, Scene, Seen, bound_of
 from gateway.core.vehicle import Vehicle
-from gateway.offline.plans import PAPER_PAYLOAD_KG, PAPER_ROUGHNESS_M3, PAPER_SPEED_MPS, PAPER_WHEELBASE_M
 from gateway.units import STANDARD_GRAVITY_MPS2
+from gateway.workbench.campaigns import PAPER_PAYLOAD_KG, PAPER_ROUGHNESS_M3, PAPER_SPEED_MPS, PAPER_WHEELBASE_M
 
 PAPER_VAN: Final = Vehicle("paper_van", 1240.0, PAPER_WHEELBASE_M, 50.0, 3.1)
 MODEL_SLACK: Final = 0.02

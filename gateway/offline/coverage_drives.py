@@ -13,8 +13,6 @@ from gateway.core.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle as StatedVehicle
 from gateway.offline.batches import batches_of_motion
-from gateway.offline.plans import ON_PALLETS, PAPER_SPEED_MPS, share_range_pct
-from gateway.offline.wiring import Wiring
 from gateway.sim.drive import Drive, constant, motorway, rural, urban
 from gateway.sim.obstacles import ObstacleRoad, UnevenRoad
 from gateway.sim.road import RoadRecipe, iso_road
@@ -23,6 +21,8 @@ from gateway.sim.scenario import simulate_drive
 from gateway.sim.sensors import REFERENCE
 from gateway.sim.vans import VANS
 from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg
+from gateway.workbench.campaigns import ON_PALLETS, PAPER_SPEED_MPS, share_range_pct
+from gateway.workbench.wiring import Wiring
 
 MAP_NAME: Final = "reference"
 CALIBRATED_PARTS: Final = (0.25, 0.6, 0.95)  # of the rated payload

@@ -20,8 +20,8 @@ from gateway.core.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
 from gateway.core.settings import BatchSettings
 from gateway.offline.calibrate import calibrate, judge
 from gateway.offline.known_runs import SplitRun, split_runs
-from gateway.offline.simulate import bench_of, write_campaign
 from gateway.records import F64
+from gateway.workbench.simulate import bench_of, write_campaign
 
 OnStep = Callable[[str, int, int], None]  # (what is being done, steps done, steps in all)
 

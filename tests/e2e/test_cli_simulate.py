@@ -16,8 +16,8 @@ from gateway.cli import reproduce as reproduce_command
 from gateway.cli.progress import StatusLine, bar
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.offline.demo_drive import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, frames_of
 from gateway.reports.reproduce_evidence import Scope
+from gateway.workbench.demo_drive import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, frames_of
 
 LINE = "({t:.6f}) can1 101#0102030405060708\n"
 

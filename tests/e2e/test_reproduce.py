@@ -10,12 +10,12 @@ import pytest
 
 from gateway.calibration.file import load_calibration
 from gateway.errors import ConfigurationError
-from gateway.offline import simulate
-from gateway.offline.plans import Plan, plan_of
 from gateway.reports.reproduce import reproduce
 from gateway.reports.reproduce_evidence import CAMPAIGNS, Scope
 from gateway.reports.reproduce_page import PLATES
 from gateway.reports.reproduce_table import PAPER_PCT, accuracy_page
+from gateway.workbench import simulate
+from gateway.workbench.campaigns import Plan, plan_of
 
 SMALL = Scope(seed=3, window_s=80.0, longest_s=125.0)  # two thirds of an experiment's drive make one batch
 THINNED = ("load-sweep", "share-sweep", "ident", "speeds")

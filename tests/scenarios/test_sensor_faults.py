@@ -7,7 +7,6 @@ from gateway.bus.decode import Decoder
 from gateway.bus.signal_map import load_signal_map
 from gateway.core.settings import BatchSettings
 from gateway.offline.batches import batches_of_motion
-from gateway.offline.wiring import Wiring
 from gateway.records import Why
 from gateway.sim.drive import constant
 from gateway.sim.faults import Fault, with_fault
@@ -16,6 +15,7 @@ from gateway.sim.scenario import START_NS, simulate_drive
 from gateway.sim.sensors import REFERENCE, Recording
 from gateway.sim.vans import PAPER_VAN
 from gateway.sim.vehicle import Load
+from gateway.workbench.wiring import Wiring
 
 EXPECTED = {
     Fault.ACCELEROMETER_STUCK: Why.ACCELERATION_STUCK,

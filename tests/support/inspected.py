@@ -14,7 +14,6 @@ from gateway.core.known_run import KnownRun
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
-from gateway.offline.wiring import Wiring
 from gateway.records import Motion, Signal
 from gateway.sim.drive import Drive
 from gateway.sim.road import iso_road
@@ -22,6 +21,7 @@ from gateway.sim.scenario import simulate_drive
 from gateway.sim.sensors import REFERENCE
 from gateway.sim.vehicle import Load
 from gateway.sim.vehicle import Vehicle as SimulatedVehicle
+from gateway.workbench.wiring import Wiring
 
 ACCELERATION, PITCH_RATE = Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE
 

@@ -14,11 +14,11 @@ from gateway.calibration.campaign import load_campaign
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.known_runs import split_runs
-from gateway.offline.plans import PLANS, plan_of
-from gateway.offline.simulate import BETWEEN_DRIVES_S, bench_of, simulated_frames, stream, write_campaign
 from gateway.records import Why
 from gateway.sim.vans import PAPER_VAN, VANS
 from gateway.sim.vehicle import front_share_pct, payload_kg
+from gateway.workbench.campaigns import PLANS, plan_of
+from gateway.workbench.simulate import BETWEEN_DRIVES_S, bench_of, simulated_frames, stream, write_campaign
 
 
 @pytest.mark.parametrize("vehicle", list(VANS))

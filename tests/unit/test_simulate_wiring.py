@@ -13,7 +13,6 @@ from gateway.bus.signal_map import load_signal_map, shipped_map
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.batches import batches_of_motion, motion_of_whole_log
-from gateway.offline.wiring import WIRED_MAPS, Wiring, unrelated_traffic
 from gateway.records import EXTENDED_ID, Motion, Signal
 from gateway.sim.drive import constant
 from gateway.sim.road import PaperRoad
@@ -21,6 +20,7 @@ from gateway.sim.scenario import simulate_drive
 from gateway.sim.sensors import REFERENCE, Clock, Gps, Imu, Recording, Sensors
 from gateway.sim.vans import PAPER_VAN
 from gateway.sim.vehicle import Load
+from gateway.workbench.wiring import WIRED_MAPS, Wiring, unrelated_traffic
 
 SENSORS = Sensors(
     imu=Imu(corner_hz=40.0),

@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from gateway.bus.candump_write import write_candump
-from gateway.offline.plans import PAPER_SPEED_MPS
-from gateway.offline.wiring import Wiring
 from gateway.records import Frames
 from gateway.sim.drive import constant
 from gateway.sim.road import iso_road
@@ -15,6 +13,8 @@ from gateway.sim.scenario import START_NS, LoadStep, simulate_drive
 from gateway.sim.sensors import REFERENCE
 from gateway.sim.vans import PAPER_VAN
 from gateway.sim.vehicle import Load
+from gateway.workbench.campaigns import PAPER_SPEED_MPS
+from gateway.workbench.wiring import Wiring
 
 LOAD = Load(270.0, 1.3)
 

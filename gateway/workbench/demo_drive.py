@@ -4,8 +4,6 @@ from typing import Final
 
 import numpy as np
 
-from gateway.offline.plans import PAPER_SPEED_MPS
-from gateway.offline.wiring import Wiring
 from gateway.records import Frames
 from gateway.sim.drive import Drive, Leg, constant, drive_of, standstill
 from gateway.sim.obstacles import UnevenRoad
@@ -14,6 +12,8 @@ from gateway.sim.scenario import START_NS, LoadStep, SimulatedDrive, simulate_dr
 from gateway.sim.sensors import REFERENCE
 from gateway.sim.vans import PAPER_VAN
 from gateway.sim.vehicle import Load
+from gateway.workbench.campaigns import PAPER_SPEED_MPS
+from gateway.workbench.wiring import Wiring
 
 MAP_NAME: Final = "reference"
 LOADS: Final = (Load(270.0, 1.3), Load(400.0, 1.8), Load(150.0, 0.6))  # in turn

@@ -18,8 +18,6 @@ from gateway.bus.frames import merge_frames
 from gateway.bus.signal_map import SignalMapFile, shipped_map
 from gateway.bus.sink import BusSink, OnProgress, Speed, replay_frames
 from gateway.errors import ConfigurationError, SignalMapError
-from gateway.offline.plans import PLANS, Carried, Plan, PlannedDrive, plan_of, share_range_pct
-from gateway.offline.wiring import Wiring, unrelated_traffic
 from gateway.records import Frames
 from gateway.sim.scenario import START_NS, SimulatedDrive, simulate_drive
 from gateway.sim.sensors import CANMOD, REFERENCE, Sensors
@@ -27,6 +25,8 @@ from gateway.sim.vans import VANS
 from gateway.sim.vehicle import Vehicle, front_share_pct, payload_kg
 from gateway.toml_file import load_toml
 from gateway.units import NS_PER_S
+from gateway.workbench.campaigns import PLANS, Carried, Plan, PlannedDrive, plan_of, share_range_pct
+from gateway.workbench.wiring import Wiring, unrelated_traffic
 
 OnDrive = Callable[[int, int], None]  # (drives done, drives in all)
 
