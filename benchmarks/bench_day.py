@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.bus.candump_write import append_candump
 from gateway.bus.frames import merge_frames
+from gateway.bus.logs.candump_write import append_candump
 from gateway.config import ESTIMATOR_NAMES
 from gateway.records import Frames
 from gateway.units import NS_PER_S

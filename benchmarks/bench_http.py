@@ -26,10 +26,10 @@ import numpy as np
 import uvicorn
 import uvloop
 
-from gateway.bus.decode import Decoder
-from gateway.bus.signal_map import load_signal_map
-from gateway.bus.socketcan import SocketCanReceiver
-from gateway.bus.source import LiveSource
+from gateway.bus.live.socketcan import SocketCanReceiver
+from gateway.bus.live.source import LiveSource
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.signal_map import load_signal_map
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.records import Estimate, Spectra, estimate_to_json

@@ -23,11 +23,11 @@ import can
 import cantools
 from can.interfaces.socketcan import socketcan as python_can_socketcan
 
-from gateway.bus.decode import Decoder
-from gateway.bus.mapping import SignalMap
-from gateway.bus.signal_map import load_signal_map, shipped_map
-from gateway.bus.socketcan import SocketCanReceiver, ask_for_stamps
-from gateway.bus.source import LiveSource
+from gateway.bus.live.socketcan import SocketCanReceiver, ask_for_stamps
+from gateway.bus.live.source import LiveSource
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.mapping import SignalMap
+from gateway.bus.signals.signal_map import load_signal_map, shipped_map
 
 OURS_SHARE = 0.084  # of the frames on the bus: two IMU messages at 100 Hz, GNSS at 10 Hz
 DRAIN_S = 0.1  # how often the pipeline looks into the inbox

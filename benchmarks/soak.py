@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.frames import empty_frames, take
-from gateway.bus.receiver import Burst
+from gateway.bus.live.receiver import Burst
 from gateway.config import load_settings
 from gateway.records import Frames
 from gateway.service.gateway import Gateway

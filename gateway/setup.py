@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from gateway.bus.signal_map import SignalMap, load_signal_map
+from gateway.bus.signals.signal_map import SignalMap, load_signal_map
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.tare_file import load_tares
 from gateway.config import Settings

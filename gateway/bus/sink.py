@@ -12,10 +12,10 @@ from typing import Any, Final, Literal
 import can
 
 from gateway.bus.frames import take
-from gateway.bus.log_report import LogReport
-from gateway.bus.logs import open_whole_log
+from gateway.bus.live.python_can import require_known_interface
+from gateway.bus.logs.open import open_whole_log
+from gateway.bus.logs.report import LogReport
 from gateway.bus.messages import message_of
-from gateway.bus.python_can import require_known_interface
 from gateway.errors import BusError
 from gateway.records import Frames
 from gateway.units import NS_PER_S

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.bus.log_report import LogReport
-from gateway.bus.logs import motion_of_log
-from gateway.bus.signal_map import SignalMap
+from gateway.bus.logs.open import motion_of_log
+from gateway.bus.logs.report import LogReport
+from gateway.bus.signals.signal_map import SignalMap
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.records import Batch, Motion

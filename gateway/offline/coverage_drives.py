@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.bus.decode import Decoder
-from gateway.bus.signal_map import SHIPPED_PREFIX, load_signal_map
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.signal_map import SHIPPED_PREFIX, load_signal_map
 from gateway.core.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle as StatedVehicle

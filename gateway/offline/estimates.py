@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from gateway.bus.logs import motion_of_log
+from gateway.bus.logs.open import motion_of_log
 from gateway.core.settings import BatchSettings
 from gateway.records import Estimate
 from gateway.setup import Setup

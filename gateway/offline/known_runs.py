@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.bus.log_report import LogReport
-from gateway.bus.signal_map import SignalMap, load_signal_map
+from gateway.bus.logs.report import LogReport
+from gateway.bus.signals.signal_map import SignalMap, load_signal_map
 from gateway.calibration.campaign import Campaign, RunTable
 from gateway.calibration.inspection_log import LogFacts
 from gateway.calibration.inspection_rows import RowFacts, row_facts

@@ -9,8 +9,8 @@ from dataclasses import asdict
 
 import uvicorn
 
-from gateway.bus.decode import Decoder
-from gateway.bus.source import LiveSource, OpenReceiver
+from gateway.bus.live.source import LiveSource, OpenReceiver
+from gateway.bus.signals.decode import Decoder
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.errors import SpringscaleError, StoreError
 from gateway.service.forwarding import uplink_of

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from gateway.bus.decode import Decoder
-from gateway.bus.inbox import Inbox
+from gateway.bus.live.inbox import Inbox
+from gateway.bus.signals.decode import Decoder
 from gateway.core.flow import Flow
 from gateway.core.tare import Weighed
 from gateway.records import Estimate, Motion, Signal, estimate_to_json

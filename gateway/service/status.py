@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from importlib.metadata import version
 
-from gateway.bus.source import LiveSource, SourceState
+from gateway.bus.live.source import LiveSource, SourceState
 from gateway.config import Settings
 from gateway.records import Signal
 from gateway.service.pipeline import Pipeline

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from support.patience import PATIENCE_S
 
-from gateway.bus.candump_write import write_candump
-from gateway.bus.decode import Decoder
-from gateway.bus.encode import Encoder
 from gateway.bus.frames import join, merge_frames
-from gateway.bus.logs import open_log
+from gateway.bus.live.source import LiveSource
+from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs.open import open_log
 from gateway.bus.messages import message_of
-from gateway.bus.signal_map import load_signal_map, shipped_map
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.encode import Encoder
+from gateway.bus.signals.signal_map import load_signal_map, shipped_map
 from gateway.bus.sink import BusSink, replay
-from gateway.bus.source import LiveSource
 from gateway.errors import LogUnreadableError
 from gateway.records import EXTENDED_ID, Frames, Motion, Signal
 

@@ -7,9 +7,9 @@ import can
 import pytest
 from click.testing import CliRunner, Result
 
-from gateway.bus.decode import Decoder
-from gateway.bus.logs import motion_of_log
-from gateway.bus.signal_map import load_signal_map
+from gateway.bus.logs.open import motion_of_log
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.signal_map import load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.cli import main, springscale
 from gateway.cli import reproduce as reproduce_command

@@ -18,7 +18,7 @@ from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
 from support.process import running_service
 
-from gateway.bus.candump_write import write_candump
+from gateway.bus.logs.candump_write import write_candump
 from gateway.bus.sink import replay
 from gateway.config import load_settings
 from gateway.errors import StoreError

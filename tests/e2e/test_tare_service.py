@@ -14,9 +14,9 @@ from support.calibrated import calibration_file
 from support.patience import wait_until
 from support.ports import first_answer
 
-from gateway.bus.candump_write import write_candump
-from gateway.bus.encode import Encoder
-from gateway.bus.signal_map import load_signal_map
+from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.signals.encode import Encoder
+from gateway.bus.signals.signal_map import load_signal_map
 from gateway.bus.sink import replay
 from gateway.cli import springscale
 from gateway.config import load_settings

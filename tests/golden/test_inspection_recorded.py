@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from support.recordings import recordings
 
-from gateway.bus.signal_map import load_signal_map
+from gateway.bus.signals.signal_map import load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection_rows import row_facts
 from gateway.calibration.inspection_run import Inspected, inspect_run

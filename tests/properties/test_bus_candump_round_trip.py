@@ -9,13 +9,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gateway.bus.candump import read_candump
-from gateway.bus.candump_line import LineFrame, read_line
-from gateway.bus.candump_write import write_candump
 from gateway.bus.frames import join
-from gateway.bus.log_report import LogReport
-from gateway.bus.logs import EVERY_FRAME
-from gateway.bus.mapping import exact_filter
+from gateway.bus.logs.candump import read_candump
+from gateway.bus.logs.candump_line import LineFrame, read_line
+from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs.open import EVERY_FRAME
+from gateway.bus.logs.report import LogReport
+from gateway.bus.signals.mapping import exact_filter
 from gateway.records import EXTENDED_ID, Frames
 
 identifiers = st.one_of(st.integers(0, 0x7FF), st.integers(0, 0x1FFF_FFFF).map(lambda i: i | EXTENDED_ID))

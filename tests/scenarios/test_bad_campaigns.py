@@ -10,7 +10,7 @@ import can
 import pytest
 from click.testing import CliRunner, Result
 
-from gateway.bus.logs import open_whole_log
+from gateway.bus.logs.open import open_whole_log
 from gateway.bus.messages import message_of
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file import load_calibration

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gateway.bus.decode import Decoder
-from gateway.bus.signal_map import load_signal_map
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.signal_map import load_signal_map
 from gateway.core.settings import BatchSettings
 from gateway.offline.batches import batches_of_motion
 from gateway.records import Why

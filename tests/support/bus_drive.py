@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from gateway.bus.encode import Encoder
-from gateway.bus.signal_map import load_signal_map
+from gateway.bus.signals.encode import Encoder
+from gateway.bus.signals.signal_map import load_signal_map
 from gateway.records import Frames, Signal
 
 START_NS = 1_790_000_000_000_000_000

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gateway.bus.decode import Decoder
-from gateway.bus.signal_map import SignalMap, load_signal_map
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.signal_map import SignalMap, load_signal_map
 from gateway.calibration.inspection import RunVerdict
 from gateway.calibration.inspection_rows import row_facts
 from gateway.calibration.inspection_run import Inspected, inspect_run

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.bus.candump_write import write_candump
-from gateway.bus.encode import Encoder
-from gateway.bus.signal_map import load_signal_map
+from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.signals.encode import Encoder
+from gateway.bus.signals.signal_map import load_signal_map
 from gateway.core.vehicle import front_share_pct
 from gateway.records import Signal
 from support.half_car_road import VAN, batch_over_road

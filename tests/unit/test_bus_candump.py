@@ -5,10 +5,10 @@ import gzip
 import numpy as np
 import pytest
 
-from gateway.bus.candump import read_candump
 from gateway.bus.frames import join
-from gateway.bus.log_report import LogReject, LogReport
-from gateway.bus.mapping import IdFilter, exact_filter, j1939_filter
+from gateway.bus.logs.candump import read_candump
+from gateway.bus.logs.report import LogReject, LogReport
+from gateway.bus.signals.mapping import IdFilter, exact_filter, j1939_filter
 from gateway.errors import LogUnreadableError
 from gateway.records import EXTENDED_ID, Frames
 

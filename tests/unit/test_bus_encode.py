@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gateway.bus.decode import Decoder
-from gateway.bus.encode import Encoder
-from gateway.bus.signal_map import load_signal_map, shipped_maps
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.encode import Encoder
+from gateway.bus.signals.signal_map import load_signal_map, shipped_maps
 from gateway.records import Signal
 
 TYPICAL = {

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gateway.bus.signal_map import load_signal_map, shipped_map, shipped_maps
+from gateway.bus.signals.signal_map import load_signal_map, shipped_map, shipped_maps
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID, Signal
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from support.patience import PATIENCE_S
 
-from gateway.bus.mapping import exact_filter, j1939_filter
-from gateway.bus.receiver import error_class_names
-from gateway.bus.socketcan import (
+from gateway.bus.live.receiver import error_class_names
+from gateway.bus.live.socketcan import (
     SocketCanReceiver,
     ask_for_stamps,
     interface_statistics,
     open_socketcan,
     packed_filters,
 )
+from gateway.bus.signals.mapping import exact_filter, j1939_filter
 from gateway.records import EXTENDED_ID
 
 SO_RXQ_OVFL = 40

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.bus import source as source_module
 from gateway.bus.frames import empty_frames
-from gateway.bus.receiver import Burst
-from gateway.bus.signal_map import load_signal_map
-from gateway.bus.source import LiveSource, SourceState
+from gateway.bus.live import source as source_module
+from gateway.bus.live.receiver import Burst
+from gateway.bus.live.source import LiveSource, SourceState
+from gateway.bus.signals.signal_map import load_signal_map
 from gateway.errors import BusError
 from gateway.records import Frames
 

@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 from pydantic import BaseModel
 
-from gateway.bus.source import SourceState
+from gateway.bus.live.source import SourceState
 from gateway.records import Signal
 from gateway.service.status import SENSOR_LOST_S, StatusReport
 from gateway.store.writer import StoreHealth

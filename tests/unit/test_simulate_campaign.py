@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.patience import wait_until
 
-from gateway.bus.source import LiveSource
+from gateway.bus.live.source import LiveSource
 from gateway.calibration.campaign import load_campaign
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
@@ -135,7 +135,7 @@ def test_drives_follow_one_another_with_the_vehicle_parked_between() -> None:
 
 
 def test_a_stream_reaches_a_listener_frame_by_frame() -> None:
-    from gateway.bus.signal_map import load_signal_map
+    from gateway.bus.signals.signal_map import load_signal_map
 
     bench = bench_of("test1", longest_s=3.0)
     source = LiveSource("virtual", "simulate-stream", load_signal_map("springscale:reference"))

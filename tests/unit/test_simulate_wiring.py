@@ -6,10 +6,10 @@ import cantools.database
 import numpy as np
 import pytest
 
-from gateway.bus.candump_write import write_candump
-from gateway.bus.decode import Decoder
-from gateway.bus.logs import motion_of_log
-from gateway.bus.signal_map import load_signal_map, shipped_map
+from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs.open import motion_of_log
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.signal_map import load_signal_map, shipped_map
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.batches import batches_of_motion, motion_of_whole_log

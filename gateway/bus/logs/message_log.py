@@ -10,10 +10,10 @@ from typing import Any, BinaryIO, Final, TextIO, cast
 import can
 from can.io.generic import MessageReader
 
-from gateway.bus.line_blocks import open_maybe_gzip
-from gateway.bus.log_report import LogReject, LogReport
-from gateway.bus.mapping import IdFilter
+from gateway.bus.logs.line_blocks import open_maybe_gzip
+from gateway.bus.logs.report import LogReject, LogReport
 from gateway.bus.messages import frames_of, message_id
+from gateway.bus.signals.mapping import IdFilter
 from gateway.errors import LogUnreadableError
 from gateway.records import Frames
 

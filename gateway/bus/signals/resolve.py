@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import Final, Protocol
 
-from gateway.bus.bit_field import BitField, Coding
-from gateway.bus.database import DatabaseMessage, DatabaseSignal, closest
-from gateway.bus.mapping import Condition, MappedSignal
+from gateway.bus.signals.bit_field import BitField, Coding
+from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, closest
+from gateway.bus.signals.mapping import Condition, MappedSignal
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID, Signal
 from gateway.units import si_factor

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Final
 
-from gateway.bus.log_report import LogReject
+from gateway.bus.logs.report import LogReject
 from gateway.records import EXTENDED_ID
 from gateway.units import NS_PER_S
 

@@ -17,11 +17,11 @@ from typing import Any, Final
 
 import can
 
-from gateway.bus.inbox import Inbox
-from gateway.bus.python_can import open_python_can, require_known_interface
-from gateway.bus.receiver import BUS_OFF, Burst, Receiver
-from gateway.bus.signal_map import SignalMap
-from gateway.bus.socketcan import interface_statistics, open_socketcan
+from gateway.bus.live.inbox import Inbox
+from gateway.bus.live.python_can import open_python_can, require_known_interface
+from gateway.bus.live.receiver import BUS_OFF, Burst, Receiver
+from gateway.bus.live.socketcan import interface_statistics, open_socketcan
+from gateway.bus.signals.signal_map import SignalMap
 
 log = logging.getLogger(__name__)
 

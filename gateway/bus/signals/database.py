@@ -10,7 +10,7 @@ from cantools.database.can import Message as CantoolsMessage
 from cantools.database.can import Signal as CantoolsSignal
 from cantools.database.errors import UnsupportedDatabaseFormatError
 
-from gateway.bus.bit_field import BitField, Coding
+from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID
 

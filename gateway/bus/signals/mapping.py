@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from gateway.bus.bit_field import BitField, Coding
+from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.records import EXTENDED_ID, U32, Bool, SensorTraits, Signal
 
 CLASSIC_BYTES = 8

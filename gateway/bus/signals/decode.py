@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gateway.bus.mapping import IdFilter, MappedMessage, SignalMap
-from gateway.bus.samples import Rejected, SampleReader
+from gateway.bus.signals.mapping import IdFilter, MappedMessage, SignalMap
+from gateway.bus.signals.samples import Rejected, SampleReader
 from gateway.records import F64, I64, Frames, Motion, Signal
 
 __all__ = ["Decoder", "Rejected", "SignalCounts"]

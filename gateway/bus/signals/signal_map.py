@@ -6,9 +6,9 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from gateway.bus.database import DatabaseMessage, closest, load_messages
-from gateway.bus.mapping import MappedMessage, MappedSignal, SignalMap, exact_filter, j1939_filter
-from gateway.bus.resolve import resolve_signal
+from gateway.bus.signals.database import DatabaseMessage, closest, load_messages
+from gateway.bus.signals.mapping import MappedMessage, MappedSignal, SignalMap, exact_filter, j1939_filter
+from gateway.bus.signals.resolve import resolve_signal
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID, Signal
 from gateway.toml_file import load_toml

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.bus.bit_field import U64, BitField, Coding
-from gateway.bus.mapping import Condition, MappedSignal
+from gateway.bus.signals.bit_field import U64, BitField, Coding
+from gateway.bus.signals.mapping import Condition, MappedSignal
 from gateway.records import F64, U8, Bool
 
 J1939_LAST_VALID_BYTE: Final = 0xFA  # SAE J1939-71: a most significant byte above this is no measurement

@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import can
 
-from gateway.bus.mapping import IdFilter
+from gateway.bus.live.receiver import Burst
 from gateway.bus.messages import ExactStamp, frames_of
-from gateway.bus.receiver import Burst
+from gateway.bus.signals.mapping import IdFilter
 from gateway.errors import BusError
 from gateway.records import EXTENDED_ID
 

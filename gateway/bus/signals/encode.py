@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gateway.bus.bit_field import U64, BitField, Coding
 from gateway.bus.frames import merge_frames
-from gateway.bus.mapping import MappedMessage, SignalMap
+from gateway.bus.signals.bit_field import U64, BitField, Coding
+from gateway.bus.signals.mapping import MappedMessage, SignalMap
 from gateway.records import F64, I64, U8, Frames, Signal
 
 _J1939_UNUSED = 0xFF  # SAE J1939: bits nobody sends are 1, "not available"
