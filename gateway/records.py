@@ -206,7 +206,7 @@ class Estimate:
     mean_speed_mps: float = math.nan
     gap_share: float = math.nan
     usable_share: float = math.nan
-    roughness_mps2: float = math.nan  # of the road (core.roughness)
+    roughness_mps2: float = math.nan  # of the road (core.spectrum)
     shares: Mapping[str, float] = field(default_factory=dict)
     rejected: tuple[Why, ...] = ()
     is_provisional: bool = False

@@ -8,7 +8,7 @@ import numpy as np
 from gateway.calibration.bands import partial_residuals, rank_correlations
 from gateway.calibration.index_table import IndexTable
 from gateway.calibration.spectral_scatter import bin_covariance, integral_covariance
-from gateway.core.ratio_index import UPPER_LIMIT_HZ
+from gateway.core.ratio_index.index import UPPER_LIMIT_HZ
 from gateway.records import F64, Bool
 
 Sensor = Literal["acceleration", "pitch_rate"]

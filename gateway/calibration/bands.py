@@ -8,7 +8,7 @@ from scipy.stats import rankdata
 
 from gateway.calibration.index_table import IndexTable
 from gateway.calibration.spectral_scatter import bin_covariance, integral_covariance
-from gateway.core.ratio_index import UPPER_LIMIT_HZ, Band, SpectrumKind, band_pass_gain
+from gateway.core.ratio_index.index import UPPER_LIMIT_HZ, Band, SpectrumKind, band_pass_gain
 from gateway.records import F64, I64
 
 WIDTHS_HZ: Final = (0.25, 0.5, 1.0)  # narrower ones scatter too much to be told from luck in a few runs

@@ -19,11 +19,11 @@ import numpy as np
 
 from gateway.calibration.design_loads import PlacedLoad
 from gateway.calibration.known_spectra import BAND_HZ, EVIDENCE_WEIGHT, N_SEGMENT
-from gateway.core.bounds import Drive, expected_of, steady_spectra
-from gateway.core.cross_spectra import Reading
-from gateway.core.drift import DRIFT_PRECISION, DRIFTING, STEADY
-from gateway.core.grey_model import PARAMETERS, Ground
-from gateway.core.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY
+from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
+from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.measured import Reading
+from gateway.core.cross_spectrum.parameters import PARAMETERS, Ground
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 

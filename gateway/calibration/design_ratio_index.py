@@ -11,12 +11,12 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.design_loads import PlacedLoad
-from gateway.core.bounds import Drive, expected_of, steady_spectra
-from gateway.core.cross_spectra import Reading
-from gateway.core.grey_model import Ground
-from gateway.core.likelihood import Point
-from gateway.core.ratio_index import UPPER_LIMIT_HZ, Band, RatioIndexCalibration, ratio_index
-from gateway.core.regression import RegressionModel, scaled_columns
+from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
+from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.measured import Reading
+from gateway.core.cross_spectrum.parameters import Ground
+from gateway.core.ratio_index.index import UPPER_LIMIT_HZ, Band, RatioIndexCalibration, ratio_index
+from gateway.core.ratio_index.regression import RegressionModel, scaled_columns
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 

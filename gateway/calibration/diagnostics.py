@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from gateway.calibration.regression_fit import FittedRegression
-from gateway.core.regression import scaled_columns
+from gateway.core.ratio_index.regression import scaled_columns
 from gateway.records import F64, I64
 
 SUSPICIOUS_P: Final = 0.01

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.calibration.file import CalibrationFile, CrossSpectrumPart, RegressionPart
-from gateway.core.grey_model import is_positive
+from gateway.core.cross_spectrum.parameters import is_positive
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,10 +5,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
 
-from gateway.core.cross_spectrum import CrossSpectrumCalibration
-from gateway.core.grey_model import PARAMETERS
-from gateway.core.ratio_index import Band, RatioIndexCalibration
-from gateway.core.regression import TERMS, RegressionModel
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.parameters import PARAMETERS
+from gateway.core.ratio_index.index import Band, RatioIndexCalibration
+from gateway.core.ratio_index.regression import TERMS, RegressionModel
 from gateway.errors import CalibrationFileError
 from gateway.records import F64
 

@@ -18,13 +18,13 @@ from gateway.calibration.grey_box_prior import Prior, prior_of
 from gateway.calibration.inflation import UNTESTED as UNTESTED_INFLATION
 from gateway.calibration.inflation import inflation_of
 from gateway.calibration.known_spectra import KnownSpectra, known_spectra
-from gateway.core.cross_spectra import cross_spectra_of
-from gateway.core.cross_spectrum import CrossSpectrumCalibration, locate
-from gateway.core.grey_model import PARAMETERS
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration, locate
+from gateway.core.cross_spectrum.likelihood import Curvature
+from gateway.core.cross_spectrum.measured import cross_spectra_of
+from gateway.core.cross_spectrum.parameters import PARAMETERS
+from gateway.core.cross_spectrum.reach import beyond
+from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.known_run import KnownRun
-from gateway.core.likelihood import Curvature
-from gateway.core.map_fit import Found, most_probable
-from gateway.core.reach import beyond
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 

@@ -17,8 +17,8 @@ from gateway.calibration.regression_fit import (
 )
 from gateway.calibration.stepwise import Selection, select_stepwise
 from gateway.calibration.structures import Family, Target, terms_of
-from gateway.core.ratio_index import PAPER_BANDS
-from gateway.core.regression import scaled_columns, term_columns
+from gateway.core.ratio_index.index import PAPER_BANDS
+from gateway.core.ratio_index.regression import scaled_columns, term_columns
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64

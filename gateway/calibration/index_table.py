@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import SpectrumKind, mean_spectrum
+from gateway.core.ratio_index.index import SpectrumKind, mean_spectrum
 from gateway.core.spectrum import segment_starts
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, I64, Batch, Bool

@@ -22,11 +22,11 @@ from gateway.calibration.grey_box_prior import prior_of
 from gateway.calibration.inspection import Finding, Severity
 from gateway.calibration.inspection_kinds import Kind, found
 from gateway.calibration.known_spectra import BAND_HZ, N_SEGMENT, KnownSpectra
-from gateway.core.cross_spectra import CrossSpectra, Reading
-from gateway.core.cross_spectrum import COHERENCE_BAND_HZ
-from gateway.core.grey_model import INDEX, Ground
+from gateway.core.cross_spectrum.estimator import COHERENCE_BAND_HZ
+from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
+from gateway.core.cross_spectrum.parameters import INDEX, Ground
 from gateway.core.known_run import KnownRun
-from gateway.core.model_spectra import expected_spectra, spectral_model
 from gateway.core.vehicle import Vehicle
 from gateway.records import C128, F64
 

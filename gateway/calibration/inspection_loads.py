@@ -17,11 +17,11 @@ from gateway.calibration.grey_box_prior import prior_of
 from gateway.calibration.inspection import Finding, Severity
 from gateway.calibration.inspection_kinds import Kind, found
 from gateway.calibration.known_spectra import KnownSpectra, known_spectra
-from gateway.core.cross_spectrum import locate
+from gateway.core.cross_spectrum.estimator import locate
+from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.reach import beyond
+from gateway.core.cross_spectrum.search import Found
 from gateway.core.known_run import KnownRun
-from gateway.core.likelihood import Point
-from gateway.core.map_fit import Found
-from gateway.core.reach import beyond
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64

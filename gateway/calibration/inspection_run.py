@@ -33,7 +33,7 @@ from gateway.calibration.inspection_rows import (
     unmapped_findings,
 )
 from gateway.core.batch import REASON_SHARE_MIN
-from gateway.core.cross_spectra import LEAST_SEGMENTS, CrossSpectra, cross_spectra_of
+from gateway.core.cross_spectrum.measured import LEAST_SEGMENTS, CrossSpectra, cross_spectra_of
 from gateway.core.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle

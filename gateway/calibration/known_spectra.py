@@ -6,10 +6,10 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
-from gateway.core.grey_model import Ground
+from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
+from gateway.core.cross_spectrum.parameters import Ground
 from gateway.core.known_run import KnownRun
-from gateway.core.likelihood import Point, Whittle
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64

@@ -29,8 +29,8 @@ from gateway.calibration.index_choice import (
 from gateway.calibration.index_table import IndexTable, index_table
 from gateway.calibration.structures import FAMILIES, Family, StructureChoice
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import RatioIndexCalibration, SpectrumKind
-from gateway.core.regression import RegressionModel
+from gateway.core.ratio_index.index import RatioIndexCalibration, SpectrumKind
+from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.regression import RegressionModel, scaled_columns, term_columns
+from gateway.core.ratio_index.regression import RegressionModel, scaled_columns, term_columns
 from gateway.records import F64, I64
 
 RIDGE: Final = 1e-12  # of the Gram matrix's mean diagonal: solves what a left-out run leaves without a solution

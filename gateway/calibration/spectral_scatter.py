@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from scipy.special import hyp2f1
 
-from gateway.core.ratio_index import SpectrumKind
+from gateway.core.ratio_index.index import SpectrumKind
 from gateway.records import F64
 
 # (standard deviation / mean)^2 of one transform's power (exponential law) or magnitude (Rayleigh's)

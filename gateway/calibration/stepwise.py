@@ -14,7 +14,7 @@ from scipy.special import fdtrc
 
 from gateway.calibration.bands import run_means
 from gateway.calibration.regression_fit import held_out_errors, without_each_run
-from gateway.core.regression import scaled_columns, term_columns
+from gateway.core.ratio_index.regression import scaled_columns, term_columns
 from gateway.records import F64, I64
 
 P_ENTER: Final = 0.05

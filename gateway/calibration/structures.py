@@ -3,7 +3,7 @@
 from typing import Final, Literal
 
 from gateway.calibration.index_table import IndexTable
-from gateway.core.regression import (
+from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
     MODEL_10_FRONT_SHARE,
     MODEL_11_FRONT_SHARE,

@@ -3,7 +3,7 @@
 import click
 
 from gateway.cli.options import as_json
-from gateway.core.bounds import Drive
+from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.offline.bounds import limits, limits_table
 from gateway.records import json_line
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from gateway.core.cross_spectrum import CrossSpectrumCalibration
-from gateway.core.ratio_index import RatioIndexCalibration
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
 
 RANGE_MARGIN = 0.25  # of the span seen in calibration, at either end

@@ -8,10 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum import CrossSpectrum
-from gateway.core.ratio_index import indexes_of
-from gateway.core.roughness import roughness_mps2
-from gateway.core.spectrum import spectra_of
+from gateway.core.cross_spectrum.estimator import CrossSpectrum
+from gateway.core.ratio_index.index import indexes_of
+from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.records import Batch, Estimate, Why
 
 SPEED_MARGIN = 0.15  # how far a batch's mean speed may lie outside those calibrated, as a share

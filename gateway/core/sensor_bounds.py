@@ -18,11 +18,11 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.bounds import RATE_HZ, Bound, Drive
-from gateway.core.cross_spectra import Reading
-from gateway.core.grey_model import INDEX, Ground, half_car
-from gateway.core.halfcar import frequency_response
-from gateway.core.likelihood import EFFECTIVE_SHARE, Point
+from gateway.core.cross_spectrum.half_car import frequency_response
+from gateway.core.cross_spectrum.ideal_drive import RATE_HZ, Bound, Drive
+from gateway.core.cross_spectrum.likelihood import EFFECTIVE_SHARE, Point
+from gateway.core.cross_spectrum.measured import Reading
+from gateway.core.cross_spectrum.parameters import INDEX, Ground, half_car
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import C128, F64
 
@@ -59,7 +59,7 @@ class Scene:
 def bound_of(seen: Seen, unknown: Mapping[str, float], scene: Scene) -> Bound:
     """The smallest standard deviations of payload and front share that any estimator without bias can have.
 
-    ``unknown`` maps names of grey_model.PARAMETERS, or "speed", to what is known of their logarithms beforehand
+    ``unknown`` maps names of parameters.PARAMETERS, or "speed", to what is known of their logarithms beforehand
     (standard deviations); all else about the vehicle is known.
     """
     freq_hz = _frequencies_hz(scene.reading)

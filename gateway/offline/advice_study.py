@@ -16,7 +16,7 @@ from gateway.calibration.design_loads import PlacedLoad, weighed_loads
 from gateway.calibration.evaluation import error_table
 from gateway.calibration.learning_curve import triples_at_different_positions
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError

@@ -8,10 +8,10 @@ from typing import Final
 
 from gateway.calibration.grey_box_prior import prior_of
 from gateway.calibration.known_spectra import BAND_HZ, N_SEGMENT
-from gateway.core.bounds import Bound, Drive
-from gateway.core.cross_spectra import Reading
-from gateway.core.grey_model import Ground
-from gateway.core.likelihood import Point
+from gateway.core.cross_spectrum.ideal_drive import Bound, Drive
+from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.measured import Reading
+from gateway.core.cross_spectrum.parameters import Ground
 from gateway.core.sensor_bounds import SPEED, Scene, Seen, bound_of
 from gateway.core.vehicle import Vehicle
 from gateway.units import STANDARD_GRAVITY_MPS2

@@ -26,12 +26,11 @@ from gateway.calibration.inspection import Finding, RunVerdict, Severity
 from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.structures import StructureChoice
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.core.estimator import estimate
 from gateway.core.known_run import KnownRun
-from gateway.core.roughness import roughness_mps2
 from gateway.core.settings import BatchSettings
-from gateway.core.spectrum import spectra_of
+from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.offline.inspect import Inspection, inspect
 from gateway.offline.known_runs import OnRun, SplitRun, file_sha256, split_runs

@@ -11,8 +11,8 @@ from scipy.special import stdtrit
 from gateway.calibration.evaluation import Judged
 from gateway.calibration.ratio_index_fit import RatioIndexFit
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import RatioIndexCalibration, indexes_of
-from gateway.core.regression import RegressionModel, scaled_columns
+from gateway.core.ratio_index.index import RatioIndexCalibration, indexes_of
+from gateway.core.ratio_index.regression import RegressionModel, scaled_columns
 from gateway.offline.calibrate import Outcome, judge
 from gateway.records import F64, I64, Bool
 

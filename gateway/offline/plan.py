@@ -17,7 +17,7 @@ from gateway.calibration.design_loads import PlacedLoad, drivable_loads, empty, 
 from gateway.calibration.design_ratio_index import IndexDesign, IndexSpread
 from gateway.calibration.grey_box_prior import prior_of
 from gateway.calibration.inflation import UNTESTED as UNTESTED_INFLATION
-from gateway.core.bounds import Drive
+from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError

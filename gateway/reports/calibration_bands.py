@@ -8,7 +8,7 @@ import numpy as np
 from gateway.calibration.band_map import BandMap
 from gateway.calibration.index_choice import Tried
 from gateway.calibration.ratio_index_fit import FamilyTrial, RatioIndexFit
-from gateway.core.ratio_index import Band
+from gateway.core.ratio_index.index import Band
 from gateway.records import F64
 from gateway.reports.calibration_text import NONE, shown
 from gateway.reports.chart import Axis, Cells, Chart, Marker, Panel, Points, Table

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.grey_box_prior import prior_of
-from gateway.core.cross_spectrum import CrossSpectrumCalibration
-from gateway.core.grey_model import INDEX, PARAMETERS, is_positive
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, is_positive
 from gateway.core.vehicle import Vehicle
 from gateway.reports.chart import Axis, Chart, Panel, Points, Rule, Table
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from gateway.calibration.ratio_index_fit import RatioIndexFit
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import Band, RatioIndexCalibration
-from gateway.core.regression import RegressionModel
+from gateway.core.ratio_index.index import Band, RatioIndexCalibration
+from gateway.core.ratio_index.regression import RegressionModel
 from gateway.offline.left_out import IndexRows, index_rows
 from gateway.records import F64
 from gateway.reports.calibration_bands import band_chart, model_table, steps_table, trials_table

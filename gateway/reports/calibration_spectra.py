@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import Band, RatioIndexCalibration
+from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import F64, Batch
 from gateway.reports.chart import Axis, Chart, Line, Mark, Panel, Ribbon, Section, Span

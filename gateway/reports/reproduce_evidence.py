@@ -15,8 +15,8 @@ from gateway.calibration.regression_fit import fit_regression
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import PAPER_BANDS, RatioIndexCalibration, indexes_of
-from gateway.core.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
+from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
+from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
 from gateway.core.settings import BatchSettings
 from gateway.offline.calibrate import calibrate, judge
 from gateway.offline.known_runs import SplitRun, split_runs

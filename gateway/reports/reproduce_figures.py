@@ -10,8 +10,8 @@ from gateway.calibration.evaluation import Judged
 from gateway.calibration.ratio_index_fit import N_SEGMENT
 from gateway.calibration.regression_fit import fit_regression
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum
-from gateway.core.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
+from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum
+from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64
 from gateway.reports.figures import COLOURS, panels
 from gateway.reports.reproduce_evidence import Evidence, Method, index_table

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from gateway.core.ratio_index import PAPER_BANDS, Band
+from gateway.core.ratio_index.index import PAPER_BANDS, Band
 from gateway.reports import reproduce_figures as draw
 from gateway.reports.reproduce_evidence import Evidence, Method
 from gateway.reports.reproduce_table import COLUMNS, Row

@@ -10,8 +10,8 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.modelled_spectra import Fitted, modelled_spectra
-from gateway.core.ratio_index import Band
+from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
+from gateway.core.ratio_index.index import Band
 from gateway.records import Spectra as SpectraSeen
 from gateway.records import json_line, spectra_from_json, spectra_to_json
 from gateway.web.board import Board, Record

@@ -10,7 +10,7 @@ from support.estimates import make_record
 from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.ratio_index import Band, RatioIndexCalibration
+from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
 from gateway.records import Why
 from gateway.web import Board, SignalHealth, State, Status, create_app

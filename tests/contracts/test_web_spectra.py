@@ -12,7 +12,7 @@ from support.web import Client, Gateway
 
 from gateway.calibration.file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.modelled_spectra import Fitted, modelled_spectra
+from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.spectrum import spectra_of
 from gateway.records import Estimate, Spectra, Why, estimate_to_json, spectra_from_json
 from gateway.web import Board, create_app

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gateway.calibration.grey_box_prior import prior_of
-from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
-from gateway.core.grey_model import PARAMETERS, Ground
-from gateway.core.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
+from gateway.core.cross_spectrum.parameters import PARAMETERS, Ground
 from tests.support.half_car_road import VAN, batch_over_road
 
 GROUND = Ground(VAN.empty_mass_kg, VAN.empty_front_share_pct / 100.0, VAN.wheelbase_m)
@@ -95,7 +95,7 @@ def test_masked_samples_leave_no_trace() -> None:
 
 def test_the_bound_shrinks_with_the_root_of_time() -> None:
     from gateway.calibration.grey_box import calibrate_cross_spectrum
-    from gateway.core.bounds import Drive, cramer_rao
+    from gateway.core.cross_spectrum.ideal_drive import Drive, cramer_rao
     from gateway.core.known_run import KnownRun
 
     run = KnownRun(1, "empty", 0.0, 52.0, (batch_over_road(0.0, 52.0, seed=4),))

@@ -13,7 +13,7 @@ from gateway.calibration.bands import run_means
 from gateway.calibration.diagnostics import diagnose
 from gateway.calibration.regression_fit import fit_regression, held_out_errors, without_each_run
 from gateway.calibration.stepwise import partial_f, select_stepwise
-from gateway.core.regression import TERMS, scaled_columns
+from gateway.core.ratio_index.regression import TERMS, scaled_columns
 from gateway.records import F64, I64
 
 LIBRARY = tuple(TERMS)

@@ -6,7 +6,7 @@ from scipy import signal
 
 from gateway.calibration.band_map import rectangle_weights
 from gateway.calibration.spectral_scatter import bin_covariance, integral_covariance
-from gateway.core.ratio_index import SpectrumKind, mean_spectrum
+from gateway.core.ratio_index.index import SpectrumKind, mean_spectrum
 from gateway.records import F64
 
 N_SEGMENT, RATE_HZ, N_DRIVES = 256, 50.0, 400

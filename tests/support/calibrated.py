@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from gateway.calibration.file import CalibrationFile, RatioIndexPart, content_id
-from gateway.core.ratio_index import PAPER_BANDS, RatioIndexCalibration
-from gateway.core.regression import RegressionModel
+from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
+from gateway.core.ratio_index.regression import RegressionModel
 
 
 def constant_model(answer: float, std: float) -> RegressionModel:

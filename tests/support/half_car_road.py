@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gateway.core.halfcar import Axle, HalfCar, frequency_response
+from gateway.core.cross_spectrum.half_car import Axle, HalfCar, frequency_response
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64, Batch
 

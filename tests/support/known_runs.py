@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gateway.core.halfcar import HalfCar
+from gateway.core.cross_spectrum.half_car import HalfCar
 from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import front_share_pct
 from gateway.offline.known_runs import SplitRun

@@ -19,7 +19,7 @@ from gateway.calibration.file import CalibrationFile, content_id, load_calibrati
 from gateway.calibration.file_comparison import differences
 from gateway.calibration.file_figures import Figure, figures_of
 from gateway.cli.calibration import calibration_commands
-from gateway.core.regression import term_columns
+from gateway.core.ratio_index.regression import term_columns
 from gateway.errors import CalibrationFileError
 from gateway.offline.calibration_check import check_against_campaign
 from gateway.offline.known_runs import file_sha256

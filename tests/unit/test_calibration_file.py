@@ -11,7 +11,7 @@ from support.calibrated import calibration_file
 
 from gateway.calibration.file import content_id, load_calibration
 from gateway.calibration.file_parts import CrossSpectrumPart
-from gateway.core.cross_spectrum import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.errors import CalibrationFileError
 
 Change = Callable[[dict[str, Any]], Any]

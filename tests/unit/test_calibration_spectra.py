@@ -7,7 +7,7 @@ from support.half_car_road import RATE_HZ, VAN, batch_of, batch_over_road
 
 from gateway.calibration.grey_box import calibrate_cross_spectrum
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import Band
+from gateway.core.ratio_index.index import Band
 from gateway.records import Batch
 from gateway.reports.calibration_half_car import fits_of
 from gateway.reports.calibration_spectra import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section

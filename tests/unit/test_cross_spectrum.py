@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from gateway.calibration.grey_box import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum
-from gateway.core.cross_spectra import cross_spectra_of
-from gateway.core.cross_spectrum import (
+from gateway.core.cross_spectrum.estimator import (
     UNSEEN_ROUGHNESS_SCALE,
     UNSEEN_SPEED_SCALE,
     CrossSpectrum,
     CrossSpectrumCalibration,
 )
+from gateway.core.cross_spectrum.measured import cross_spectra_of
+from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
-from gateway.core.grey_model import INDEX, PARAMETERS
 from gateway.core.known_run import KnownRun
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch, Estimate, Why

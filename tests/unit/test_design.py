@@ -15,13 +15,13 @@ from gateway.calibration.design_loads import PlacedLoad, drivable_loads, empty, 
 from gateway.calibration.grey_box import calibrate_cross_spectrum, fit_half_car, half_car_calibration
 from gateway.calibration.grey_box_prior import prior_of
 from gateway.calibration.known_spectra import known_spectra
-from gateway.core.bounds import Drive, cramer_rao, expected_of, steady_spectra
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectra import cross_spectra_of
-from gateway.core.cross_spectrum import CrossSpectrumCalibration, locate
-from gateway.core.drift import DRIFT_STD
+from gateway.core.cross_spectrum.drift import DRIFT_STD
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration, locate
+from gateway.core.cross_spectrum.ideal_drive import Drive, cramer_rao, expected_of, steady_spectra
+from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.known_run import KnownRun
-from gateway.core.likelihood import Point
 from gateway.core.vehicle import front_share_pct
 from gateway.core.weights import weights_of
 

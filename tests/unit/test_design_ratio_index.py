@@ -10,8 +10,8 @@ from support.known_runs import known_run
 from gateway.calibration.design_loads import PlacedLoad, empty, weighed_loads
 from gateway.calibration.design_ratio_index import IndexDesign
 from gateway.calibration.grey_box import calibrate_cross_spectrum
-from gateway.core.ratio_index import Band, RatioIndexCalibration, indexes_of
-from gateway.core.regression import MODEL_9_PAYLOAD, RegressionModel, term_columns
+from gateway.core.ratio_index.index import Band, RatioIndexCalibration, indexes_of
+from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, RegressionModel, term_columns
 from gateway.core.vehicle import front_share_pct
 from gateway.records import F64
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gateway.core.drift import (
+from gateway.core.cross_spectrum.drift import (
     DAMPERS_TOGETHER_STD,
     DRIFT_PRECISION,
     DRIFT_STD,
@@ -12,7 +12,7 @@ from gateway.core.drift import (
     STEADY,
     drift_covariance,
 )
-from gateway.core.grey_model import PARAMETERS
+from gateway.core.cross_spectrum.parameters import PARAMETERS
 from gateway.records import F64
 
 N_FITTED = len(DRIFTING) + 2  # and the load's two

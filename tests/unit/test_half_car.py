@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.core.halfcar import Axle, HalfCar, frequency_response
+from gateway.core.cross_spectrum.half_car import Axle, HalfCar, frequency_response
 from gateway.sim.vans import PAPER_VAN, SMALL_VAN
 from gateway.sim.vehicle import Axle as SimulatedAxle
 from gateway.sim.vehicle import Load, Vehicle, front_share_pct

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gateway.core.cross_spectra import Reading, cross_spectra_of
-from gateway.core.cross_spectrum import CrossSpectrumCalibration
-from gateway.core.grey_model import PARAMETERS, is_positive
-from gateway.core.modelled_spectra import Fitted, modelled_spectra
+from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.measured import Reading, cross_spectra_of
+from gateway.core.cross_spectrum.parameters import PARAMETERS, is_positive
 from gateway.core.spectrum import spectra_of
 from gateway.records import F64, Spectra
 from tests.support.half_car_road import CAR, VAN, batch_over_road

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.core.ratio_index import (
+from gateway.core.ratio_index.index import (
     PAPER_BANDS,
     Band,
     RatioIndexCalibration,
@@ -16,7 +16,7 @@ from gateway.core.ratio_index import (
     mean_spectrum,
     ratio_index,
 )
-from gateway.core.regression import RegressionModel
+from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import Batch
 
 bands = st.builds(Band, st.floats(0.5, 9.5), st.floats(0.05, 2.0))

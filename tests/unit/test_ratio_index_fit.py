@@ -10,8 +10,8 @@ from gateway.calibration.file_parts import RatioIndexPart
 from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.structures import StructureChoice
 from gateway.core.known_run import KnownRun
-from gateway.core.ratio_index import PAPER_BANDS, indexes_of
-from gateway.core.regression import (
+from gateway.core.ratio_index.index import PAPER_BANDS, indexes_of
+from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
     MODEL_10_FRONT_SHARE,
     MODEL_11_FRONT_SHARE,

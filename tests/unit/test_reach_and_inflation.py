@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.calibration.inflation import LEAST, UNTESTED, inflation_of
-from gateway.core.reach import beyond
+from gateway.core.cross_spectrum.reach import beyond
 
 EMPTY_KG = 1000.0
 Load = tuple[float, float]

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from gateway.calibration.regression_fit import fit_regression
-from gateway.core.regression import (
+from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
     MODEL_11_FRONT_SHARE,
     MODEL_11_PAYLOAD,

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from support.drives import drive
 
 from gateway.core.estimator import estimate
-from gateway.core.roughness import REFERENCE_SPEED_MPS, roughness_mps2
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
+from gateway.core.spectrum import REFERENCE_SPEED_MPS, roughness_mps2
 from gateway.records import Spectra, estimate_to_json
 
 

@@ -9,10 +9,10 @@ from click.testing import CliRunner
 
 from gateway.calibration.grey_box_prior import prior_of
 from gateway.cli import springscale
-from gateway.core.bounds import Drive
-from gateway.core.cross_spectra import Reading
-from gateway.core.grey_model import Ground
-from gateway.core.likelihood import Point
+from gateway.core.cross_spectrum.ideal_drive import Drive
+from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.measured import Reading
+from gateway.core.cross_spectrum.parameters import Ground
 from gateway.core.sensor_bounds import SPEED, Scene, Seen, bound_of
 from gateway.offline.bounds import MILD
 from tests.support.half_car_road import VAN

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gateway.core.cross_spectra import CrossSpectra, Reading
-from gateway.core.cross_spectrum import CrossSpectrumCalibration
-from gateway.core.grey_model import INDEX, Ground
-from gateway.core.likelihood import Point, Whittle
-from gateway.core.model_spectra import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
+from gateway.core.cross_spectrum.parameters import INDEX, Ground
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import F64
 
@@ -48,7 +48,7 @@ def cramer_rao(
 ) -> Bound:
     """The bound at one load, the vehicle being the calibrated one.
 
-    ``unknown`` maps parameter names (grey_model.PARAMETERS) to the standard deviation of what is
+    ``unknown`` maps parameter names (parameters.PARAMETERS) to the standard deviation of what is
     known of them beforehand (of the logarithm, where these are positive quantities); the others are
     taken as known. Slack counts as part of the vehicle: it is what model error and roll leave.
     """

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.grey_model import INDEX, PARAMETERS
+from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.records import F64
 
 DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gateway.core.cross_spectra import CrossSpectra
-from gateway.core.cross_spectrum import CrossSpectrumCalibration
-from gateway.core.grey_model import INDEX
-from gateway.core.model_spectra import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.measured import CrossSpectra
+from gateway.core.cross_spectrum.parameters import INDEX
 from gateway.records import F64, Bool, Spectra
 
 

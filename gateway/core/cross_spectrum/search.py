@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gateway.core.likelihood import Curvature
+from gateway.core.cross_spectrum.likelihood import Curvature
 from gateway.records import F64
 
 MOST_STEPS = 60

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from gateway.core.regression import RegressionModel
+from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import F64, Batch, Bool
 

@@ -16,13 +16,13 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectra import CrossSpectra, Reading, cross_spectra_of
-from gateway.core.drift import DRIFT_PRECISION, DRIFTING, STEADY, drift_covariance
+from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY, drift_covariance
+from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
+from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
+from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, Ground
+from gateway.core.cross_spectrum.reach import beyond
+from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
-from gateway.core.grey_model import INDEX, PARAMETERS, Ground
-from gateway.core.likelihood import Curvature, Point, Whittle
-from gateway.core.map_fit import Found, most_probable
-from gateway.core.reach import beyond
 from gateway.records import F64, Batch, Estimate, Why
 
 START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
@@ -44,7 +44,7 @@ Z95: Final = 1.959964
 class CrossSpectrumCalibration:
     """What known-load drives taught, as plain numbers and arrays.
 
-    parameters (p,) and covariance (p, p) follow ``names`` (grey_model.PARAMETERS; logarithms where
+    parameters (p,) and covariance (p, p) follow ``names`` (parameters.PARAMETERS; logarithms where
     these are positive quantities). The inflations widen standard deviations, by so much more per_reach
     as a load lies beyond ``known_loads`` (payload kg, front share %; core.reach); misfit_limit is the
     largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are

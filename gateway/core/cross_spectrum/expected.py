@@ -15,10 +15,17 @@ from typing import Final
 import numpy as np
 from scipy.special import k0, k1
 
-from gateway.core.cross_spectra import CrossSpectra
-from gateway.core.friction import at_levels, level_weights
-from gateway.core.grey_model import HALF_CAR_PARAMETERS, INDEX, SLACK_KNOTS_HZ, Ground, half_car, slack_weights
-from gateway.core.halfcar import frequency_response
+from gateway.core.cross_spectrum.friction import at_levels, level_weights
+from gateway.core.cross_spectrum.half_car import frequency_response
+from gateway.core.cross_spectrum.measured import CrossSpectra
+from gateway.core.cross_spectrum.parameters import (
+    HALF_CAR_PARAMETERS,
+    INDEX,
+    SLACK_KNOTS_HZ,
+    Ground,
+    half_car,
+    slack_weights,
+)
 from gateway.records import C128, F64
 
 ROAD_EXPONENT: Final = -2.0  # displacement density of a road falls about as frequency squared (ISO 8608)

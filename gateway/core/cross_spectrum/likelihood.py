@@ -17,9 +17,9 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectra import CrossSpectra
-from gateway.core.grey_model import Ground
-from gateway.core.model_spectra import expected_spectra, spectral_model, spectral_slopes
+from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model, spectral_slopes
+from gateway.core.cross_spectrum.measured import CrossSpectra
+from gateway.core.cross_spectrum.parameters import Ground
 from gateway.records import C128, F64
 
 EFFECTIVE_SHARE: Final = 0.5  # neighbouring Hann bins and half-overlapping segments repeat each other
