@@ -4,7 +4,7 @@ from pathlib import Path
 
 from generated import keep_up_to_date
 
-from gateway.calibration.file_schema import schema_text
+from gateway.calibration.file.schema import schema_text
 
 PAGE = Path(__file__).with_name("calibration.schema.json")
 

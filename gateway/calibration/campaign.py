@@ -1,6 +1,7 @@
 """The campaign file: which known-load drives were recorded, with which vehicle."""
 
-from collections.abc import Iterator
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,6 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CampaignError
 from gateway.toml_file import load_toml
+
+OnRun = Callable[[int, int], None]  # (runs done, runs in all)
 
 # Bounds that no road vehicle reaches, so that a fraction for percent, millimetres or tonnes are named at once
 Percent = Annotated[float, Field(ge=1.0, le=99.0)]
@@ -128,3 +131,33 @@ def _faults(campaign: Campaign, run: RunTable) -> Iterator[str]:
             f"payload_position_m: {run.payload_kg:g} kg at {run.payload_position_m:g} m would put {share_pct:.0f} % of "
             "the weight on the front axle and lift the other; it is measured from the front axle rearwards"
         )
+
+
+class DraftTable(CampaignTable):
+    """A campaign file in which signals and runs may still be missing."""
+
+    signals: str = ""
+    runs: tuple[RunTable, ...] = ()
+
+
+def load_draft(path: Path) -> Campaign:
+    """A campaign, complete or still without runs. Raises CampaignError as load_campaign does."""
+    draft = load_toml(path, DraftTable, CampaignError)
+    return load_campaign(path) if draft.runs else Campaign(path, draft)
+
+
+def chosen_runs(campaign: Campaign, numbers: Sequence[int] | None) -> list[tuple[int, RunTable]]:
+    """Runs with their numbers from 1; all, or those named. Raises CampaignError for a number that is not there."""
+    numbered = list(enumerate(campaign.runs, 1))
+    if numbers is None:
+        return numbered
+    unknown = [n for n in numbers if not 1 <= n <= len(numbered)]
+    if unknown:
+        raise CampaignError(f"{campaign.path}: there is no run {unknown[0]}: runs are numbered 1 to {len(numbered)}")
+    return [numbered[n - 1] for n in dict.fromkeys(numbers)]
+
+
+def file_sha256(path: Path) -> str:
+    """Hex digest of a file's bytes."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -11,7 +11,7 @@ from typing import Final, Literal
 
 from pydantic import Field, ValidationError
 
-from gateway.calibration.file_parts import Part
+from gateway.calibration.file.parts import Part
 from gateway.core.tare import Tare, Weighed, Zero
 from gateway.errors import ConfigurationError
 from gateway.records import iso_utc

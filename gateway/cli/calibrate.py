@@ -8,22 +8,21 @@ from typing import get_args
 
 import click
 
-from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.draft import load_draft
-from gateway.calibration.file import CalibrationFile
-from gateway.calibration.index_choice import BandChoice
-from gateway.calibration.learning_curve import LearningCurve
-from gateway.calibration.structures import StructureChoice
+from gateway.calibration.calibrate import Outcome, calibrate_inspected
+from gateway.calibration.campaign import Campaign, load_campaign, load_draft
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.inspection.inspection import Inspection
+from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
+from gateway.calibration.plan.plan import Plan, plan_first, plan_next
+from gateway.calibration.ratio_index.choice import BandChoice
+from gateway.calibration.ratio_index.structures import StructureChoice
 from gateway.cli.inspection_text import inspection_json, inspection_sentences
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
 from gateway.cli.plan_text import plan_sentences
 from gateway.cli.progress import bar, counted
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError, ConfigurationError
-from gateway.offline.calibrate import Outcome, calibrate_inspected
-from gateway.offline.inspect import Inspection, inspect
-from gateway.offline.learning_curve import curve_of
-from gateway.offline.plan import Plan, plan_first, plan_next
+from gateway.offline.campaigns import inspect
 from gateway.records import json_line
 
 

@@ -8,12 +8,12 @@ from typing import Any
 import click
 
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file import CalibrationFile, load_calibration
-from gateway.calibration.file_comparison import Difference, differences
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file.check import Check, Verdict, check_against_campaign
+from gateway.calibration.file.comparison import Difference, differences
 from gateway.cli.calibration_tare import tare_commands
 from gateway.cli.calibration_text import calibration_text
 from gateway.cli.options import FILE, as_json
-from gateway.offline.calibration_check import Check, Verdict, check_against_campaign
 from gateway.records import json_line
 
 

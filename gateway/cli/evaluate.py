@@ -6,12 +6,13 @@ from typing import Any
 import click
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.evaluation import Judged, error_table
-from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.judgement.evaluation import Judged, error_table
+from gateway.calibration.judgement.evidence import Part, evidence_of_evaluation
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.progress import bar, counted
 from gateway.errors import ConfigurationError
-from gateway.offline.calibrate import Split, judge_campaign
+from gateway.offline.campaigns import Split, judge_campaign
 from gateway.records import json_line
 
 
@@ -55,10 +56,10 @@ def evaluate(
 def _report(
     directory: Path, campaign: Campaign, held: CalibrationFile, estimator: str, split: Split, judged: list[Judged]
 ) -> None:
-    from gateway.reports import calibration_evidence, calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
+    from gateway.reports import calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
 
-    part = calibration_evidence.Part(split)
-    evidence = calibration_evidence.evidence_of_evaluation(campaign, held, estimator, part, judged)
+    part = Part(split)
+    evidence = evidence_of_evaluation(campaign, held, estimator, part, judged)
     with counted("drawing") as on_chart:
         written = calibration_report.write_evaluation_report(directory, evidence, on_chart)
     click.echo(str(written), err=True)

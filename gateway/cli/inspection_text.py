@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from gateway.calibration.inspection import Finding, RunVerdict
-from gateway.offline.inspect import Inspection
-from gateway.offline.known_runs import SplitRun
+from gateway.calibration.inspection.finding import Finding, RunVerdict
+from gateway.calibration.inspection.inspection import Inspection
+from gateway.calibration.inspection.split_run import SplitRun
 
 
 def inspection_sentences(inspection: Inspection) -> str:

@@ -1,7 +1,7 @@
 """A plan as sentences a fitter understands."""
 
-from gateway.calibration.design_loads import PlacedLoad
-from gateway.offline.plan import Advice, Expected, Plan
+from gateway.calibration.plan.loads import PlacedLoad
+from gateway.calibration.plan.plan import Advice, Expected, Plan
 
 
 def plan_sentences(plan: Plan) -> str:

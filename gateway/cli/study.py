@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from gateway.calibration.campaign import load_campaign
+from gateway.calibration.judgement.learning_curve import MOST_SUBSETS, SEED
 from gateway.cli.options import FILE, as_json, batch_settings, window
 from gateway.cli.progress import bar
 from gateway.cli.study_text import advice_table, learning_curve_table
@@ -15,7 +16,6 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.offline import coverage as coverage_study
 from gateway.offline.advice_study import advice_study
 from gateway.offline.coverage_drives import Scope
-from gateway.offline.learning_curve import MOST_SUBSETS, SEED
 from gateway.offline.learning_curve import learning_curve as study_learning_curve
 from gateway.records import json_line
 from gateway.reports.coverage_page import coverage_page

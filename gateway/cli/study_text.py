@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from gateway.calibration.advice_study import AdviceStudy, Comparison
-from gateway.calibration.learning_curve import LearningCurve, Rung, Spread
+from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, Spread
 
 _HEAD = (
     f"{'runs':>4}  {'estimator':15}{'tried':>6}{'refused':>8}   {'judged on':11}"

@@ -10,20 +10,19 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from gateway.calibration.advice_study import AdviceStudy, Choice, Errors, compared
-from gateway.calibration.campaign import Campaign
-from gateway.calibration.design import Design, Spread
-from gateway.calibration.design_loads import PlacedLoad, weighed_loads
-from gateway.calibration.evaluation import error_table
-from gateway.calibration.learning_curve import triples_at_different_positions
+from gateway.calibration.campaign import Campaign, OnRun
+from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.judgement.evaluation import error_table
+from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all, triples_at_different_positions
+from gateway.calibration.plan.design import Design, Spread
+from gateway.calibration.plan.loads import PlacedLoad, weighed_loads
+from gateway.calibration.plan.plan import usual_drive
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
-from gateway.offline.inspect import inspect
-from gateway.offline.known_runs import OnRun, SplitRun
-from gateway.offline.plan import usual_drive
-from gateway.offline.trials import calibrated_on, judged_all
+from gateway.offline.campaigns import inspect
 
 ESTIMATOR: Final = "cross_spectrum"
 LEAST_RUNS: Final = 5

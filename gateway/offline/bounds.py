@@ -6,8 +6,8 @@ from math import radians
 from types import MappingProxyType
 from typing import Final
 
-from gateway.calibration.grey_box_prior import prior_of
-from gateway.calibration.known_spectra import BAND_HZ, N_SEGMENT
+from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
+from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.ideal_drive import Bound, Drive
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import Reading

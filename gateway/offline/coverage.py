@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.coverage_table import CoverageTable, JudgedBatch, coverage_table, judged_batches
+from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError
 from gateway.offline.coverage_drives import (
@@ -25,7 +26,6 @@ from gateway.offline.coverage_drives import (
     stated,
     unseen_load,
 )
-from gateway.offline.trials import calibrated_on, judged_all
 
 SEED: Final = 20261
 OnVan = Callable[[int, int], None]  # (vans done, vans in all)

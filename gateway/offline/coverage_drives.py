@@ -9,7 +9,7 @@ import numpy as np
 
 from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.signal_map import SHIPPED_PREFIX, load_signal_map
-from gateway.core.known_run import KnownRun
+from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle as StatedVehicle
 from gateway.offline.batches import batches_of_motion

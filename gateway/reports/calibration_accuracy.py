@@ -6,10 +6,10 @@ from typing import Final
 import numpy as np
 from scipy.special import ndtri
 
+from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
+from gateway.calibration.judgement.evidence import PART_NAMES, PART_TEXT, Judgement, Part
 from gateway.records import F64
-from gateway.reports.calibration_answers import LEVELS, Answers, answers_of, observed_coverage, standardised
 from gateway.reports.calibration_error_tables import batches_table, runs_table, summary_table
-from gateway.reports.calibration_evidence import PART_NAMES, PART_TEXT, Judgement, Part
 from gateway.reports.calibration_text import estimator_name, percent, shown
 from gateway.reports.chart import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
 

@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.band_map import BandMap
-from gateway.calibration.index_choice import Tried
-from gateway.calibration.ratio_index_fit import FamilyTrial, RatioIndexFit
+from gateway.calibration.ratio_index.band_map import BandMap
+from gateway.calibration.ratio_index.choice import Tried
+from gateway.calibration.ratio_index.fit import FamilyTrial, RatioIndexFit
 from gateway.core.ratio_index.index import Band
 from gateway.records import F64
 from gateway.reports.calibration_text import NONE, shown

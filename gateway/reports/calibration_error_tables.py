@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from gateway.reports.calibration_evidence import PART_NAMES, Judgement, Part
+from gateway.calibration.judgement.evidence import PART_NAMES, Judgement, Part
 from gateway.reports.calibration_text import NONE, percent, shown
 from gateway.reports.chart import Table
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.known_run import KnownRun
 from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Vehicle
 from gateway.records import C128, F64, Spectra

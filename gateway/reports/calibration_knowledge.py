@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.grey_box_prior import prior_of
+from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, is_positive
 from gateway.core.vehicle import Vehicle

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gateway.calibration.learning_curve import LearningCurve, Rung, Spread
+from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, Spread
 from gateway.reports.calibration_text import NONE, estimator_name, percent, shown
 from gateway.reports.chart import Axis, Chart, Marker, Panel, Points, Rule, Section, Table
 

@@ -7,8 +7,8 @@ from html import escape
 from importlib.resources import files
 from typing import Final
 
+from gateway.calibration.judgement.verdict import Grade, Verdict
 from gateway.reports.calibration_text import estimator_name
-from gateway.reports.calibration_verdict import Grade, Verdict
 from gateway.reports.chart import Chart, Section, Table
 
 GRADE_TEXT: Final = {

@@ -5,11 +5,11 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.ratio_index_fit import RatioIndexFit
-from gateway.core.known_run import KnownRun
+from gateway.calibration.judgement.left_out import IndexRows, index_rows
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.ratio_index.fit import RatioIndexFit
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
-from gateway.offline.left_out import IndexRows, index_rows
 from gateway.records import F64
 from gateway.reports.calibration_bands import band_chart, model_table, steps_table, trials_table
 from gateway.reports.calibration_text import NONE

@@ -1,11 +1,11 @@
 """What was driven and whether it was sound, what to drive next, and where every number comes from."""
 
-from gateway.calibration.inspection import Finding, RunVerdict
-from gateway.offline.calibrate import Outcome
-from gateway.offline.known_runs import SplitRun
-from gateway.offline.plan import Advice, Expected, Plan
+from gateway.calibration.calibrate import Outcome
+from gateway.calibration.inspection.finding import Finding, RunVerdict
+from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.judgement.evidence import Evidence
+from gateway.calibration.plan.plan import Advice, Expected, Plan
 from gateway.records import Why
-from gateway.reports.calibration_evidence import Evidence
 from gateway.reports.calibration_text import NONE, percent, shown, span
 from gateway.reports.chart import Section, Table
 

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from scipy.special import gammaincinv
 
-from gateway.core.known_run import KnownRun
+from gateway.calibration.known_run import KnownRun
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import F64, Batch

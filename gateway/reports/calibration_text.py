@@ -16,11 +16,6 @@ def percent(share: float | None) -> str:
     return NONE if share is None else f"{100.0 * share:.0f} %"
 
 
-def counted(n: int, noun: str) -> str:
-    """ "1 run", "2 runs"."""
-    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
-
-
 def estimator_name(estimator: str) -> str:
     """As people call it."""
     return {"cross_spectrum": "cross-spectral estimator", "ratio_index": "ratio index"}.get(estimator, estimator)

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from gateway.calibration.coverage import PROMISED
 from gateway.calibration.coverage_table import ALL_KINDS
+from gateway.calibration.judgement.coverage import PROMISED
 
 COLUMNS: Final = (
     "Drive", "Estimator", "Runs", "Batches", "Rejected",

@@ -9,17 +9,17 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.evaluation import Judged, error_table
-from gateway.calibration.ratio_index_fit import N_SEGMENT
-from gateway.calibration.regression_fit import fit_regression
+from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.judgement.evaluation import Judged, error_table, judge
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.ratio_index.fit import N_SEGMENT
+from gateway.calibration.ratio_index.regression import fit_regression
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.known_run import KnownRun
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
 from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
 from gateway.core.settings import BatchSettings
-from gateway.offline.calibrate import calibrate, judge
-from gateway.offline.known_runs import SplitRun, split_runs
+from gateway.offline.campaigns import calibrate, split_runs
 from gateway.records import F64
 from gateway.workbench.simulate import bench_of, write_campaign
 

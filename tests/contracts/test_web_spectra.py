@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support.web import Client, Gateway
 
-from gateway.calibration.file import load_calibration
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.spectrum import spectra_of

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.calibration.file import load_calibration
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.errors import ConfigurationError
 from gateway.reports.reproduce import reproduce
 from gateway.reports.reproduce_evidence import CAMPAIGNS, Scope

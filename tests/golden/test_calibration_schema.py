@@ -10,8 +10,8 @@ import jsonschema_rs
 import pytest
 from support.calibrated import calibration_file
 
-from gateway.calibration.file import load_calibration
-from gateway.calibration.file_schema import DIALECT, schema_text
+from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file.schema import DIALECT, schema_text
 
 ROOT = Path(__file__).parents[2]
 PUBLISHED = (ROOT / "docs" / "calibration.schema.json").read_text(encoding="utf-8")

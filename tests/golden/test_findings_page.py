@@ -6,8 +6,8 @@ from pathlib import Path
 import make_findings
 import pytest
 
-from gateway.calibration.inspection import Severity
-from gateway.calibration.inspection_kinds import EXPLAINED, Kind, found
+from gateway.calibration.inspection.finding import Severity
+from gateway.calibration.inspection.kinds import EXPLAINED, Kind, found
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "findings.md").read_text(encoding="utf-8")

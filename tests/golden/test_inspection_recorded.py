@@ -10,12 +10,13 @@ from support.recordings import recordings
 
 from gateway.bus.signals.signal_map import load_signal_map
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.inspection_rows import row_facts
-from gateway.calibration.inspection_run import Inspected, inspect_run
-from gateway.core.known_run import KnownRun
+from gateway.calibration.inspection.inspection import Inspection
+from gateway.calibration.inspection.rows import row_facts
+from gateway.calibration.inspection.run import Inspected, inspect_run
+from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.offline.batches import Stretch, batches_of_motion, motion_of_whole_log, rows_within
-from gateway.offline.inspect import Inspection, inspect
+from gateway.offline.campaigns import inspect
 
 SETTINGS = BatchSettings()
 

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.calibration.grey_box import calibrate_cross_spectrum
-from gateway.calibration.grey_box_prior import prior_of
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import CrossSpectrum, CrossSpectrumCalibration
 from gateway.core.cross_spectrum.friction import LEAST_LEFT, LEVELS, MOST, at_levels, level_weights
 from gateway.core.cross_spectrum.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.measured import log_amplitude_of
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, in_units
-from gateway.core.known_run import KnownRun
 from gateway.records import Batch
 from tests.support.half_car_road import CAR, VAN, batch_over_road
 

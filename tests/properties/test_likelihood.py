@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gateway.calibration.grey_box_prior import prior_of
+from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
 from gateway.core.cross_spectrum.parameters import PARAMETERS, Ground
@@ -94,9 +94,9 @@ def test_masked_samples_leave_no_trace() -> None:
 
 
 def test_the_bound_shrinks_with_the_root_of_time() -> None:
-    from gateway.calibration.grey_box import calibrate_cross_spectrum
+    from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+    from gateway.calibration.known_run import KnownRun
     from gateway.core.cross_spectrum.ideal_drive import Drive, cramer_rao
-    from gateway.core.known_run import KnownRun
 
     run = KnownRun(1, "empty", 0.0, 52.0, (batch_over_road(0.0, 52.0, seed=4),))
     calibration = calibrate_cross_spectrum([run], VAN)

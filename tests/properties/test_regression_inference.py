@@ -9,10 +9,10 @@ from scipy import stats
 from statsmodels.stats.diagnostic import het_breuschpagan
 from statsmodels.stats.outliers_influence import variance_inflation_factor
 
-from gateway.calibration.bands import run_means
-from gateway.calibration.diagnostics import diagnose
-from gateway.calibration.regression_fit import fit_regression, held_out_errors, without_each_run
-from gateway.calibration.stepwise import partial_f, select_stepwise
+from gateway.calibration.ratio_index.bands import run_means
+from gateway.calibration.ratio_index.diagnostics import diagnose
+from gateway.calibration.ratio_index.regression import fit_regression, held_out_errors, without_each_run
+from gateway.calibration.ratio_index.stepwise import partial_f, select_stepwise
 from gateway.core.ratio_index.regression import TERMS, scaled_columns
 from gateway.records import F64, I64
 

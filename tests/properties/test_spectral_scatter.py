@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gateway.calibration.band_map import rectangle_weights
-from gateway.calibration.spectral_scatter import bin_covariance, integral_covariance
+from gateway.calibration.ratio_index.band_map import rectangle_weights
+from gateway.calibration.ratio_index.scatter import bin_covariance, integral_covariance
 from gateway.core.ratio_index.index import SpectrumKind, mean_spectrum
 from gateway.records import F64
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.signal_map import SignalMap, load_signal_map
-from gateway.calibration.inspection import RunVerdict
-from gateway.calibration.inspection_rows import row_facts
-from gateway.calibration.inspection_run import Inspected, inspect_run
+from gateway.calibration.inspection.finding import RunVerdict
+from gateway.calibration.inspection.rows import row_facts
+from gateway.calibration.inspection.run import Inspected, inspect_run
+from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import Traits
-from gateway.core.known_run import KnownRun
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct

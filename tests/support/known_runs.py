@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.half_car import HalfCar
-from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import front_share_pct
-from gateway.offline.known_runs import SplitRun
 from support.half_car_road import CAR, VAN, batch_over_road
 
 LOADS = ((0.0, None), (200.0, 0.5), (300.0, 1.4), (400.0, 2.6))  # payload, metres behind the front axle

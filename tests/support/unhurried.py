@@ -6,7 +6,8 @@ A stop that gives a thread one second, a sender that gives a full queue five: ri
 
 import pytest
 
-from gateway.bus import sink, source
+from gateway.bus import sink
+from gateway.bus.live import source
 from gateway.cli import calibration_tare, main
 from gateway.service.pipeline import Pipeline
 from gateway.store import Store, StoreReader

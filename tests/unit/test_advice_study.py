@@ -9,15 +9,15 @@ from support.half_car_road import VAN
 from support.known_runs import campaign, split_run
 
 from gateway.calibration.advice_study import AdviceStudy, Choice, compared
-from gateway.calibration.grey_box import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.known_run import KnownRun
 from gateway.cli.study_text import advice_table
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.offline import advice_study
 from gateway.offline.advice_study import advice_of
-from gateway.offline.known_runs import SplitRun
 from gateway.records import Why
 
 CHOICES = [

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gateway.calibration.band_map import BandMap, band_maps, rectangle_weights
-from gateway.calibration.bands import candidate_pairs, rank_correlations
-from gateway.calibration.index_table import IndexTable
+from gateway.calibration.ratio_index.band_map import BandMap, band_maps, rectangle_weights
+from gateway.calibration.ratio_index.bands import candidate_pairs, rank_correlations
+from gateway.calibration.ratio_index.table import IndexTable
 from gateway.records import F64
 
 FREQ_HZ = np.arange(1, 205) * (50.0 / 1024)

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtri, stdtrit
 
-from gateway.calibration.evaluation import Judged
+from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
+from gateway.calibration.judgement.evaluation import Judged
 from gateway.records import Estimate, Why
-from gateway.reports.calibration_answers import LEVELS, Answers, answers_of, observed_coverage, standardised
 
 DOF = st.one_of(st.none(), st.floats(2.0, 50.0))
 

@@ -14,15 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.calibrated import calibration_file, first_version
 
-from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file import CalibrationFile, content_id, load_calibration
-from gateway.calibration.file_comparison import differences
-from gateway.calibration.file_figures import Figure, figures_of
+from gateway.calibration.campaign import file_sha256, load_campaign
+from gateway.calibration.file.calibration_file import CalibrationFile, content_id, load_calibration
+from gateway.calibration.file.check import check_against_campaign
+from gateway.calibration.file.comparison import differences
+from gateway.calibration.file.figures import Figure, figures_of
 from gateway.cli.calibration import calibration_commands
 from gateway.core.ratio_index.regression import term_columns
 from gateway.errors import CalibrationFileError
-from gateway.offline.calibration_check import check_against_campaign
-from gateway.offline.known_runs import file_sha256
 
 SHIPPED = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from support.calibrated import calibration_file
 
-from gateway.calibration.file import content_id, load_calibration
-from gateway.calibration.file_parts import CrossSpectrumPart
+from gateway.calibration.file.calibration_file import content_id, load_calibration
+from gateway.calibration.file.parts import CrossSpectrumPart
 from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.errors import CalibrationFileError
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gateway.calibration.learning_curve import LearningCurve, Score, Trial
+from gateway.calibration.judgement.learning_curve import LearningCurve, Score, Trial
 from gateway.reports.calibration_learning import learning_section
 from gateway.reports.chart import Points
 from gateway.reports.chart_live import plotly_json

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 from support.calibrated import first_version
 
-from gateway.calibration.file import VERSION, load_calibration
-from gateway.calibration.file_migration import FIRST_VERSION, MIGRATIONS, migrated
+from gateway.calibration.file.calibration_file import FIRST_VERSION, MIGRATIONS, VERSION, load_calibration, migrated
 
 SHIPPED = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 

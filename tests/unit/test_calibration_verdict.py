@@ -7,15 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.calibrated import calibration_file
 
-from gateway.calibration.evaluation import Judged, error_table
-from gateway.calibration.inspection import Finding, RunVerdict, Severity
-from gateway.calibration.inspection_kinds import Kind
+from gateway.calibration.calibrate import Outcome
+from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
+from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.judgement.evaluation import Judged, error_table
+from gateway.calibration.judgement.evidence import Evidence, Judgement, Part
+from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
+from gateway.calibration.plan.plan import Expected
 from gateway.core.vehicle import Vehicle
-from gateway.offline.calibrate import Outcome
-from gateway.offline.plan import Expected
 from gateway.records import Estimate, Why
-from gateway.reports.calibration_evidence import Evidence, Judgement, Part
-from gateway.reports.calibration_verdict import Grade, Verdict, verdicts_of
 
 VAN = Vehicle("van", 1240.0, 2.8)  # ranges of 450 kg and of 20 points
 

@@ -7,8 +7,8 @@ import pytest
 from support.calibrated import ratio_index_calibration
 from support.half_car_road import batch_over_road
 
+from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import Vehicle
 from gateway.core.vehicle import front_share_pct as stated_share_pct
 from gateway.errors import CalibrationImpossibleError

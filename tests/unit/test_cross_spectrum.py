@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gateway.calibration.grey_box import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum
+from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import (
     UNSEEN_ROUGHNESS_SCALE,
     UNSEEN_SPEED_SCALE,
@@ -16,7 +17,6 @@ from gateway.core.cross_spectrum.estimator import (
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
-from gateway.core.known_run import KnownRun
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch, Estimate, Why
 from tests.support.half_car_road import CAR, VAN, batch_of, batch_over_road

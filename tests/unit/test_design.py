@@ -10,18 +10,18 @@ from hypothesis import strategies as st
 from support.half_car_road import CAR, VAN
 from support.known_runs import known_run
 
-from gateway.calibration.design import Design
-from gateway.calibration.design_loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
-from gateway.calibration.grey_box import calibrate_cross_spectrum, fit_half_car, half_car_calibration
-from gateway.calibration.grey_box_prior import prior_of
-from gateway.calibration.known_spectra import known_spectra
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum, fit_half_car, half_car_calibration
+from gateway.calibration.half_car.known_spectra import known_spectra
+from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.plan.design import Design
+from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.drift import DRIFT_STD
 from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration, locate
 from gateway.core.cross_spectrum.ideal_drive import Drive, cramer_rao, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import front_share_pct
 from gateway.core.weights import weights_of
 
@@ -70,7 +70,7 @@ def test_with_a_vehicle_fully_known_the_spread_is_the_cramer_rao_bound(
     """Of parameters that drift each by itself, as the bound takes them."""
     target = placed(220.0, 1.9)
     monkeypatch.setattr(
-        "gateway.calibration.design.DRIFT_PRECISION", np.diag(np.array(list(DRIFT_STD.values())) ** -2.0)
+        "gateway.calibration.plan.design.DRIFT_PRECISION", np.diag(np.array(list(DRIFT_STD.values())) ** -2.0)
     )
     found = Design(VAN, calibration.parameters, DRIVE, [target]).spread(np.zeros_like(UNKNOWN))
     bound = cramer_rao(calibration, 220.0, target.front_share_pct, Drive(300.0, 14.0), DRIFT_STD)

@@ -7,9 +7,9 @@ import pytest
 from support.half_car_road import VAN, batch_over_road
 from support.known_runs import known_run
 
-from gateway.calibration.design_loads import PlacedLoad, empty, weighed_loads
-from gateway.calibration.design_ratio_index import IndexDesign
-from gateway.calibration.grey_box import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.plan.index_design import IndexDesign
+from gateway.calibration.plan.loads import PlacedLoad, empty, weighed_loads
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration, indexes_of
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, RegressionModel, term_columns
 from gateway.core.vehicle import front_share_pct

@@ -6,15 +6,15 @@ import pytest
 from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS, campaign, known_run
 
-from gateway.calibration.inspection import Finding, RunVerdict, Severity
-from gateway.calibration.inspection_campaign import inspect_campaign, load_findings
-from gateway.calibration.inspection_kinds import Kind, found
-from gateway.calibration.inspection_loads import _Labelled, compare_loads
-from gateway.calibration.inspection_rows import RowFacts
-from gateway.calibration.inspection_run import Inspected
-from gateway.core.known_run import KnownRun
+from gateway.calibration.inspection.campaign import inspect_campaign, load_findings
+from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
+from gateway.calibration.inspection.inspection import Inspection
+from gateway.calibration.inspection.kinds import Kind, found
+from gateway.calibration.inspection.loads import _Labelled, compare_loads
+from gateway.calibration.inspection.rows import RowFacts
+from gateway.calibration.inspection.run import Inspected
+from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
-from gateway.offline.inspect import Inspection
 
 SETTINGS = BatchSettings(window_s=200.0)
 

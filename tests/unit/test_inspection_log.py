@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 from support.half_car_road import VAN
 
-from gateway.calibration.inspection_campaign import inspect_campaign
-from gateway.calibration.inspection_kinds import Kind
-from gateway.calibration.inspection_log import LogFacts, log_findings, same_drive_findings
-from gateway.calibration.inspection_rows import RowFacts
-from gateway.calibration.inspection_run import Inspected
-from gateway.core.known_run import KnownRun
+from gateway.calibration.inspection.campaign import inspect_campaign
+from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.log import LogFacts, log_findings, same_drive_findings
+from gateway.calibration.inspection.rows import RowFacts
+from gateway.calibration.inspection.run import Inspected
+from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 
 SOUND = LogFacts("a" * 64, 900.0, 0.0, (0, 900))

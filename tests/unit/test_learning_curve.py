@@ -10,21 +10,22 @@ from support.calibrated import ratio_index_calibration
 from support.half_car_road import VAN
 from support.known_runs import campaign
 
-from gateway.calibration.learning_curve import (
+from gateway.calibration.judgement import learning_curve
+from gateway.calibration.judgement.learning_curve import (
     LearningCurve,
     Score,
     Trial,
+    curve_of,
     spread_of,
     subsets_to_drive,
+    trial_of,
     triples_at_different_positions,
 )
+from gateway.calibration.known_run import KnownRun
 from gateway.cli.study_text import learning_curve_table
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.known_run import KnownRun
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError
-from gateway.offline import learning_curve
-from gateway.offline.learning_curve import curve_of, trial_of
 
 
 def run(number: int, payload_kg: float, position_m: float | None = None) -> KnownRun:

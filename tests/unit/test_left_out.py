@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from support.known_load_logs import write_known_loads
 
+from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.regression_fit import fit_regression
+from gateway.calibration.judgement.left_out import index_rows, judged_left_out
+from gateway.calibration.ratio_index.regression import fit_regression
 from gateway.core.settings import BatchSettings
-from gateway.offline.calibrate import Outcome, calibrate
-from gateway.offline.left_out import index_rows, judged_left_out
+from gateway.offline.campaigns import calibrate
 
 LOADS = ((0.0, None), (150.0, 0.5), (200.0, 2.6), (300.0, 1.4), (400.0, 0.7), (400.0, 2.4))
 

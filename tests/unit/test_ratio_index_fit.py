@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gateway.calibration.file_parts import RatioIndexPart
-from gateway.calibration.ratio_index_fit import RatioIndexFit, fit_ratio_index
-from gateway.calibration.structures import StructureChoice
-from gateway.core.known_run import KnownRun
+from gateway.calibration.file.parts import RatioIndexPart
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
+from gateway.calibration.ratio_index.structures import StructureChoice
 from gateway.core.ratio_index.index import PAPER_BANDS, indexes_of
 from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,

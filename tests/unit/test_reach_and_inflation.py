@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.calibration.inflation import LEAST, UNTESTED, inflation_of
+from gateway.calibration.half_car.inflation import LEAST, UNTESTED, inflation_of
 from gateway.core.cross_spectrum.reach import beyond
 
 EMPTY_KG = 1000.0

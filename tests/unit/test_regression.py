@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gateway.calibration.regression_fit import fit_regression
+from gateway.calibration.ratio_index.regression import fit_regression
 from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
     MODEL_11_FRONT_SHARE,

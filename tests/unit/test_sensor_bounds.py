@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from gateway.calibration.grey_box_prior import prior_of
+from gateway.calibration.half_car.prior import prior_of
 from gateway.cli import springscale
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.likelihood import Point

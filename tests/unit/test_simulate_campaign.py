@@ -13,7 +13,7 @@ from gateway.bus.live.source import LiveSource
 from gateway.calibration.campaign import load_campaign
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.offline.known_runs import split_runs
+from gateway.offline.campaigns import split_runs
 from gateway.records import Why
 from gateway.sim.vans import PAPER_VAN, VANS
 from gateway.sim.vehicle import front_share_pct, payload_kg

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from gateway.calibration.advice_study import AdviceStudy, Choice, compared
 from gateway.calibration.coverage_table import JudgedBatch, coverage_table
-from gateway.calibration.learning_curve import LearningCurve, Score, Trial
+from gateway.calibration.judgement.learning_curve import LearningCurve, Score, Trial
 from gateway.cli import springscale, study
 
 SCORE = Score(3, 1, 2.5, 1.0, 1.25, 0.5)

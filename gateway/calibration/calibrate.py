@@ -1,0 +1,178 @@
+"""From inspected drives to a calibration file."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+
+import numpy as np
+
+from gateway.calibration.campaign import Campaign, file_sha256
+from gateway.calibration.file.calibration_file import (
+    CalibrationFile,
+    CrossSpectrumPart,
+    ExpectedErrorsPart,
+    ProvenancePart,
+    RatioIndexPart,
+    RunPart,
+    SeenPart,
+    VehiclePart,
+)
+from gateway.calibration.half_car.fit import CrossSpectrumFit, fit_cross_spectrum
+from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
+from gateway.calibration.inspection.inspection import Inspection
+from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.ratio_index.choice import BandChoice
+from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
+from gateway.calibration.ratio_index.structures import StructureChoice
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.spectrum import roughness_mps2, spectra_of
+from gateway.errors import CalibrationImpossibleError
+from gateway.records import F64, Batch
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A calibration file with all that stands behind it. What no estimator gave is None.
+
+    verdicts are of every run, split holds those without a fault, which calibrated; campaign_findings are of
+    all together. cross_spectrum_without holds, by run number, what the other runs teach without that run.
+    """
+
+    file: CalibrationFile
+    verdicts: tuple[RunVerdict, ...]
+    split: tuple[SplitRun, ...]
+    ratio_index: RatioIndexFit | None
+    cross_spectrum: CrossSpectrumCalibration | None
+    cross_spectrum_without: Mapping[int, CrossSpectrumCalibration] = field(default_factory=dict)
+    campaign_findings: tuple[Finding, ...] = ()
+
+
+def calibrate_inspected(
+    campaign: Campaign,
+    inspection: Inspection,
+    *,
+    estimators: Sequence[str],
+    bands: BandChoice = "campaign",
+    structure: StructureChoice = "auto",
+    command: str = "",
+) -> Outcome:
+    """Fits every named estimator on the identification parts of the runs without a fault.
+
+    ``bands`` and ``structure`` are the ratio index's: found on the campaign, or named.
+
+    An estimator that these runs cannot carry is left out with a warning; raises CalibrationImpossibleError
+    when none is left, and where the faults of the runs leave no calibration worth its name.
+    """
+    if inspection.refusal is not None:
+        raise CalibrationImpossibleError(_refused(campaign, inspection, inspection.refusal))
+    split = inspection.usable
+    runs = [one.identification for one in split]
+    counted = [batch for run in runs for batch in run.batches if not batch.rejected]
+    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, bands, structure)
+    with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
+    speeds = [batch.mean_speed_mps for batch in counted]
+    file = CalibrationFile(
+        vehicle=VehiclePart(**asdict(campaign.vehicle)),
+        seen=SeenPart(
+            payload_kg=_span([run.payload_kg for run in with_batches]),
+            front_share_pct=_span([run.front_share_pct for run in with_batches]),
+            speed_mps=_span(speeds),
+            roughness_mps2=_roughness_span(counted),
+        ),
+        cross_spectrum=CrossSpectrumPart.of(cross_spectrum.calibration) if cross_spectrum else None,
+        ratio_index=RatioIndexPart.of(ratio_index.calibration) if ratio_index else None,
+        expected_errors=_expected_errors(ratio_index=ratio_index, cross_spectrum=cross_spectrum),
+        warnings=(*inspection.warnings, *warnings),
+        provenance=_provenance(campaign, split, command),
+    )
+    return Outcome(
+        file,
+        inspection.verdicts,
+        split,
+        ratio_index,
+        cross_spectrum.calibration if cross_spectrum else None,
+        cross_spectrum.without if cross_spectrum else {},
+        inspection.findings,
+    )
+
+
+def _fit(
+    estimators: Sequence[str],
+    runs: Sequence[KnownRun],
+    campaign: Campaign,
+    bands: BandChoice,
+    structure: StructureChoice,
+) -> tuple[RatioIndexFit | None, CrossSpectrumFit | None, list[str]]:
+    """What each named estimator learned, and a warning for each that these runs cannot carry."""
+    ratio_index: RatioIndexFit | None = None
+    cross_spectrum: CrossSpectrumFit | None = None
+    warnings: list[str] = []
+    for name in estimators:
+        try:
+            if name == "ratio_index":
+                ratio_index = fit_ratio_index(runs, campaign.vehicle, bands=bands, structure=structure)
+            else:
+                cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle)
+                warnings.extend(cross_spectrum.calibration.warnings)
+        except CalibrationImpossibleError as fault:
+            warnings.append(f"{name}: {fault}")
+    if ratio_index is None and cross_spectrum is None:
+        raise CalibrationImpossibleError(f"{campaign.path}: " + "; ".join(warnings))
+    return ratio_index, cross_spectrum, warnings
+
+
+def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
+    """The refusal with every fault that led to it."""
+    faults = [
+        f"run {verdict.number}: {finding.kind}: {finding.text}: {finding.advice}"
+        for verdict in inspection.verdicts
+        for finding in verdict.findings
+        if finding.severity is Severity.FAULT
+    ]
+    return "\n".join([f"{campaign.path}: {why}", *dict.fromkeys(faults)])
+
+
+def _span(found: Sequence[float]) -> tuple[float, float]:
+    return min(found), max(found)
+
+
+def _roughness_span(batches: Sequence[Batch]) -> tuple[float, float] | None:
+    """None where no batch holds an unbroken stretch for a spectrum."""
+    found = [roughness_mps2(spectra_of(batch), batch.mean_speed_mps) for batch in batches]
+    known = [one for one in found if math.isfinite(one)]
+    return _span(known) if known else None
+
+
+def _expected_errors(**fits: RatioIndexFit | CrossSpectrumFit | None) -> dict[str, ExpectedErrorsPart]:
+    return {
+        name: ExpectedErrorsPart(
+            payload_rms_kg=_rms(fit.payload_errors_kg), front_share_rms_pct=_rms(fit.front_share_errors_pct)
+        )
+        for name, fit in fits.items()
+        if fit is not None
+    }
+
+
+def _rms(errors: F64 | None) -> float | None:
+    return None if errors is None else float(np.sqrt(np.mean(errors**2)))
+
+
+def _provenance(campaign: Campaign, split: Sequence[SplitRun], command: str) -> ProvenancePart:
+    return ProvenancePart(
+        software=f"springscale {version('springscale')}",
+        command=command,
+        campaign_sha256=file_sha256(campaign.path),
+        runs=tuple(
+            RunPart(
+                number=one.identification.number,
+                log=one.identification.name,
+                sha256=one.sha256,
+                payload_kg=one.identification.payload_kg,
+                front_share_pct=one.identification.front_share_pct,
+                n_batches=len([batch for batch in one.identification.batches if not batch.rejected]),
+            )
+            for one in split
+        ),
+    )

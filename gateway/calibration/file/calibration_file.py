@@ -1,0 +1,194 @@
+"""The calibration file: versioned JSON whose id is the hash of its content. Written by the tool, never by hand."""
+
+import copy
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, Literal
+
+from pydantic import Field, ValidationError
+
+from gateway.calibration.file.parts import (
+    CrossSpectrumPart,
+    ExpectedErrorsPart,
+    Part,
+    ProvenancePart,
+    RatioIndexPart,
+    RegressionPart,
+    RunPart,
+    SeenPart,
+    VehiclePart,
+)
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.vehicle import Vehicle
+from gateway.errors import CalibrationFileError
+from gateway.toml_file import describe_faults
+
+Content = dict[str, Any]
+FIRST_VERSION: Final = 1
+
+__all__ = [
+    "FORMAT",
+    "VERSION",
+    "CalibrationFile",
+    "CrossSpectrumPart",
+    "ExpectedErrorsPart",
+    "ProvenancePart",
+    "RatioIndexPart",
+    "RegressionPart",
+    "RunPart",
+    "SeenPart",
+    "VehiclePart",
+    "content_id",
+    "load_calibration",
+]
+
+FORMAT: Final = "springscale-calibration"
+VERSION: Final = 2
+
+
+class CalibrationFile(Part):
+    """The whole file but for its id."""
+
+    format: Literal["springscale-calibration"] = FORMAT
+    version: Literal[2] = VERSION
+    migrated_from: str | None = Field(
+        None, description="id of the file of an older version that this content was read from; null: written as it is"
+    )
+    vehicle: VehiclePart
+    seen: SeenPart
+    cross_spectrum: CrossSpectrumPart | None = None
+    ratio_index: RatioIndexPart | None = None
+    expected_errors: dict[str, ExpectedErrorsPart] = Field(
+        default_factory=dict, description="by estimator: errors on runs left out of the fit"
+    )
+    warnings: tuple[str, ...] = ()
+    provenance: ProvenancePart
+
+    @property
+    def id(self) -> str:
+        """What estimates name: the hash of the file as it was first written, which a migration does not change."""
+        return self.migrated_from or self.content_id
+
+    @property
+    def content_id(self) -> str:
+        """sha256 of the canonical JSON of everything in the file but the id itself."""
+        return content_id(self.model_dump(mode="json"))
+
+    def to_json(self) -> str:
+        """The file's text, id first."""
+        content = {"id": self.content_id, **self.model_dump(mode="json")}
+        return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+    def for_core(self) -> CalibratedVehicle:
+        """What the estimators need of it."""
+        return CalibratedVehicle(
+            id=self.id,
+            vehicle=Vehicle(**dict(self.vehicle)),
+            payload_seen_kg=self.seen.payload_kg,
+            front_share_seen_pct=self.seen.front_share_pct,
+            ratio_index=self.ratio_index.for_core() if self.ratio_index else None,
+            cross_spectrum=self.cross_spectrum.for_core() if self.cross_spectrum else None,
+        )
+
+    @property
+    def estimators(self) -> tuple[str, ...]:
+        """Estimators that this file holds a calibration for, the better first."""
+        held = {"cross_spectrum": self.cross_spectrum, "ratio_index": self.ratio_index}
+        return tuple(name for name, part in held.items() if part is not None)
+
+
+def content_id(content: dict[str, Any]) -> str:
+    """sha256:... over the canonical JSON of ``content`` (keys sorted, no spaces), its own id left out."""
+    rest = {key: part for key, part in content.items() if key != "id"}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
+
+
+def load_calibration(path: Path) -> CalibrationFile:
+    """Reads, checks version, hash and shape; an older version is migrated, what it did not say is null.
+
+    Raises CalibrationFileError saying what to do.
+    """
+    content = _read(path)
+    if content.get("format") != FORMAT:
+        raise CalibrationFileError(f"{path}: not a springscale calibration file (format is {content.get('format')!r})")
+    _refuse_unknown_version(path, content.get("version"))
+    if not _matches_its_id(content):
+        raise CalibrationFileError(
+            f"{path}: content does not match its id: the file was changed after it was written; "
+            "restore it or calibrate again"
+        )
+    try:
+        current = migrated(content, VERSION)
+        return CalibrationFile.model_validate({key: part for key, part in current.items() if key != "id"})
+    except ValidationError as fault:
+        raise CalibrationFileError(describe_faults(path, fault)) from None
+    except (KeyError, TypeError, AttributeError):  # a migration met a shape that its version never had
+        raise CalibrationFileError(
+            f"{path}: not the shape of a calibration file of version {content['version']}: calibrate again"
+        ) from None
+
+
+def _refuse_unknown_version(path: Path, version: Any) -> None:
+    if type(version) is not int or version < FIRST_VERSION:
+        raise CalibrationFileError(
+            f"{path}: calibration file version {version!r} was never written by any springscale: "
+            "calibrate again with `springscale calibrate`"
+        )
+    if version > VERSION:
+        raise CalibrationFileError(
+            f"{path}: calibration file version {version}, this springscale reads up to version {VERSION}: "
+            "use the springscale that wrote it, or calibrate again with this one"
+        )
+
+
+def _matches_its_id(content: dict[str, Any]) -> bool:
+    try:
+        return bool(content.get("id") == content_id(content))
+    except ValueError:  # a number that is not finite, which is never written
+        return False
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise CalibrationFileError(f"{path}: no such calibration file") from None
+    except (OSError, UnicodeDecodeError) as fault:
+        raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
+    except json.JSONDecodeError as fault:
+        raise CalibrationFileError(f"{path}: not valid JSON: {fault}") from None
+    if not isinstance(content, dict):
+        raise CalibrationFileError(f"{path}: not a springscale calibration file")
+    return content
+
+
+def _to_version_2(content: Content) -> None:
+    """Version 2 says over which roads it was calibrated, and the expected errors of every estimator."""
+    content["seen"]["roughness_mps2"] = None
+    for estimator in ("cross_spectrum", "ratio_index"):
+        if content[estimator] is not None:
+            content["expected_errors"].setdefault(estimator, {"payload_rms_kg": None, "front_share_rms_pct": None})
+
+
+# Entry v turns version v into v + 1. Entries are never edited, only added.
+MIGRATIONS: Final[Mapping[int, Callable[[Content], None]]] = MappingProxyType({1: _to_version_2})
+
+
+def migrated(content: Content, version: int) -> Content:
+    """``content`` as ``version`` has it, with the id it had in ``migrated_from``; the same object where it is that.
+
+    ``content["version"]`` must lie between FIRST_VERSION and ``version``. Raises KeyError, TypeError or
+    AttributeError where the content has not the shape of its version.
+    """
+    if content["version"] == version:
+        return content
+    current = copy.deepcopy(content)
+    current["migrated_from"] = content.get("migrated_from") or content["id"]
+    for step in range(content["version"], version):
+        MIGRATIONS[step](current)
+        current["version"] = step + 1
+    return current

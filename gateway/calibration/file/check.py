@@ -1,0 +1,64 @@
+"""Is a calibration file what it says, and do the logs still lie there that it was made from?"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from gateway.calibration.campaign import Campaign, file_sha256
+from gateway.calibration.file.calibration_file import CalibrationFile, RunPart
+
+
+class Verdict(StrEnum):
+    """How a check went. A note does not touch the numbers."""
+
+    GOOD = "good"
+    NOTE = "note"
+    FAULT = "fault"
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that was looked at."""
+
+    what: str
+    verdict: Verdict
+    text: str
+
+
+def check_against_campaign(file: CalibrationFile, campaign: Campaign) -> tuple[Check, ...]:
+    """Logs, loads and campaign file against what the calibration says it was made from."""
+    return (_campaign_file(file, campaign), *(_run(run, campaign) for run in file.provenance.runs))
+
+
+def _campaign_file(file: CalibrationFile, campaign: Campaign) -> Check:
+    if file_sha256(campaign.path) == file.provenance.campaign_sha256:
+        return Check("campaign", Verdict.GOOD, f"{campaign.path} is the one it was made from")
+    return Check("campaign", Verdict.NOTE, f"{campaign.path} was changed since, or is another: its runs are checked")
+
+
+def _run(run: RunPart, campaign: Campaign) -> Check:
+    what = f"run {run.number}"
+    if run.number > len(campaign.runs):
+        return Check(what, Verdict.FAULT, f"{run.log}: the campaign has {len(campaign.runs)} runs only")
+    stated = campaign.runs[run.number - 1]
+    log = campaign.log_of(stated)
+    found = _hash_of(log)
+    if found is None:
+        return Check(what, Verdict.FAULT, f"{log}: cannot be read")
+    if found != run.sha256:
+        return Check(what, Verdict.FAULT, f"{log}: not the log it was calibrated from (sha256 {found[:12]}...)")
+    if stated.payload_kg != run.payload_kg or campaign.front_share_pct(stated) != run.front_share_pct:
+        return Check(
+            what,
+            Verdict.FAULT,
+            f"{log}: calibrated as {run.payload_kg:g} kg and {run.front_share_pct:.4g} %, "
+            f"the campaign says {stated.payload_kg:g} kg and {campaign.front_share_pct(stated):.4g} %",
+        )
+    return Check(what, Verdict.GOOD, f"{log}")
+
+
+def _hash_of(log: Path) -> str | None:
+    try:
+        return file_sha256(log)
+    except OSError:
+        return None

@@ -1,0 +1,230 @@
+"""Axes, signs, units and places of the two inertial sensors, read from how they move together.
+
+A half-car such as any road vehicle (the priors' centre, nothing fitted) says which phase and which
+size the pitch rate has beside the vertical acceleration, for a sensor anywhere along the vehicle.
+Its agreement with the measured cross-spectra is their normalised inner product,
+
+    Re sum n S_ga conj(M_ga) / sqrt(sum n |S_ga|^2 sum n |M_ga|^2),
+
+over groups of segments and frequencies, S and M each divided by the square root of its two
+auto-spectra: 1 for the same phases, -1 for opposite ones. The rear axle follows the front, so a
+sensor turned over at the rear is not the same as one at the front.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from gateway.calibration.half_car.fit import fit_half_car
+from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT, KnownSpectra
+from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.inspection.finding import Finding, Severity
+from gateway.calibration.inspection.kinds import Kind, found
+from gateway.calibration.known_run import KnownRun
+from gateway.core.cross_spectrum.estimator import COHERENCE_BAND_HZ
+from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
+from gateway.core.cross_spectrum.parameters import INDEX, Ground
+from gateway.core.vehicle import Vehicle
+from gateway.records import C128, F64
+
+LEAST_COHERENCE: Final = 0.4  # behind the axles right axes have 0.45 and more, roll or yaw for pitch below 0.35
+LEAST_AGREEMENT: Final = 0.62  # right axes amidships have 0.65 and more however the speed varies
+USUAL_SCALE: Final = (0.5, 1.6)  # right axes are within 0.6 to 1.15, roll above 2.3
+SCALE_RANGE: Final = (0.4, 2.5)  # no road vehicle's pitch rate is further from the usual half-car's
+UNIT_RANGE: Final = (0.5, 2.0)
+DEGREES: Final = 180.0 / np.pi
+REVERSED_BY: Final = 0.1
+BEYOND_AXLES_M: Final = 1.5
+STEP_M: Final = 0.25
+LOOSE_STD_M: Final = 1.0  # how far a place is looked for about the one stated
+POSITION_OFF_M: Final = 0.3
+POSITION_WRONG_M: Final = 1.0
+LEAST_SEGMENTS: Final = 20  # for a place; a sign needs fewer
+BELIEVED_AGREEMENT: Final = 0.92  # then the speed's unit is not asked for
+UNIT_GAIN: Final = 0.04
+SPEED_MISREAD: Final = {
+    "it reads in km/h what the signal map takes for m/s": 3.6,
+    "it reads in m/s what the signal map takes for km/h": 1.0 / 3.6,
+    "it reads in km/h what the signal map takes for mph": 1.609344,
+    "it reads in mph what the signal map takes for km/h": 1.0 / 1.609344,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """The best agreement (-1..1) over all sensor positions, where that is, and the size of the pitch rate there.
+
+    ``scale`` is the measured pitch rate over the half-car's, both beside the vertical acceleration.
+    """
+
+    best: float
+    position_m: float
+    scale: float
+
+
+def reading_of(vehicle: Vehicle, speed_misread: float = 1.0) -> Reading:
+    """How spectra are taken; a speed that reads ``speed_misread`` times too high has its delays corrected."""
+    return Reading(vehicle.wheelbase_m * speed_misread, BAND_HZ, N_SEGMENT)
+
+
+def mended(spectra: CrossSpectra, factor: float) -> CrossSpectra:
+    """As if one of the two signals had been multiplied by ``factor``, seen as pitch rate beside acceleration."""
+    size = abs(factor)
+    return replace(
+        spectra,
+        acceleration=spectra.acceleration / size,
+        pitch_rate=spectra.pitch_rate * size,
+        cross=spectra.cross * np.sign(factor),
+        pitch_rate_rms_radps=spectra.pitch_rate_rms_radps * size,
+    )
+
+
+def mean_coherence(spectra: CrossSpectra) -> float:
+    """Over the band in which body and pitch move."""
+    freq_hz = spectra.freq_hz[1:-1]
+    seen = (freq_hz >= COHERENCE_BAND_HZ[0]) & (freq_hz <= COHERENCE_BAND_HZ[1])
+    return float(np.mean(spectra.coherence[seen]))
+
+
+def agreement(spectra: CrossSpectra, load: tuple[float, float], vehicle: Vehicle) -> Agreement:
+    """The best over sensor positions from 1.5 m ahead of the front axle to 1.5 m behind the rear one.
+
+    ``load`` is the payload (kg) and front share (%) of the half-car.
+    """
+    positions_m = np.arange(-BEYOND_AXLES_M, vehicle.wheelbase_m + BEYOND_AXLES_M + STEP_M / 2.0, STEP_M)
+    m_aa, m_gg, m_ga = _half_cars(spectra, load, vehicle, positions_m)
+    n = spectra.n_segments
+    seen: C128 = spectra.cross / np.sqrt(spectra.acceleration * spectra.pitch_rate)
+    expected: C128 = m_ga / np.sqrt(m_aa * m_gg)
+    inner = np.sum(n * np.real(seen * np.conj(expected)), axis=(1, 2))
+    norms = np.sum(n * np.abs(expected) ** 2, axis=(1, 2)) * np.sum(n * np.abs(seen) ** 2)
+    at = int(np.argmax(inner / np.sqrt(norms)))
+    log_ratio = 0.5 * np.log(spectra.pitch_rate / spectra.acceleration * m_aa[at] / m_gg[at])
+    scale = float(np.exp(np.sum(n * log_ratio) / np.sum(n * np.ones_like(log_ratio))))
+    return Agreement(float((inner / np.sqrt(norms))[at]), float(positions_m[at]), scale)
+
+
+def _half_cars(
+    spectra: CrossSpectra, load: tuple[float, float], vehicle: Vehicle, positions_m: F64
+) -> tuple[F64, F64, C128]:
+    """The usual half-car's spectra (p, b, m) with its sensor at each of positions_m (p,)."""
+    theta = np.repeat(prior_of(vehicle).mean[None], len(positions_m), axis=0)
+    theta[:, INDEX["sensor_position_m"]] = positions_m
+    ground = Ground(vehicle.empty_mass_kg, vehicle.empty_front_share_pct / 100.0, vehicle.wheelbase_m)
+    payload_kg, share = np.full(len(theta), load[0]), np.full(len(theta), load[1] / 100.0)
+    return expected_spectra(spectral_model(theta, payload_kg, share, ground, spectra.freq_hz), spectra)
+
+
+@dataclass(frozen=True, slots=True)
+class Phases:
+    """How well the vehicle explains the phases with the pitch rate as it is, and with it turned over."""
+
+    upright: Agreement
+    turned: Agreement
+
+    @property
+    def best(self) -> float:
+        """The better of the two agreements."""
+        return max(self.upright.best, self.turned.best)
+
+    @property
+    def likely(self) -> Agreement:
+        """With the sign that the data speak for."""
+        return self.turned if self.is_turned else self.upright
+
+    @property
+    def is_turned(self) -> bool:
+        """True where the pitch rate fits only when turned over."""
+        return self.turned.best > self.upright.best + REVERSED_BY
+
+
+def phases(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Phases:
+    """Both signs of the pitch rate beside the usual half-car.
+
+    It carries the load stated or none, whichever explains more: a load noted wrong shall not look like a wrong axis.
+    """
+    loads = dict.fromkeys([_stated(run), (0.0, vehicle.empty_front_share_pct)])
+    upright, turned = (
+        _likeliest([agreement(seen, load, vehicle) for load in loads])
+        for seen in (spectra, spectra.with_pitch_reversed())
+    )
+    return Phases(upright, turned)
+
+
+def _stated(run: KnownRun) -> tuple[float, float]:
+    return run.payload_kg, run.front_share_pct
+
+
+def _likeliest(found: Sequence[Agreement]) -> Agreement:
+    """The best agreement, with the most usual of the scales."""
+    best = max(found, key=lambda one: one.best)
+    return replace(best, scale=min((one.scale for one in found), key=lambda scale: abs(np.log(scale))))
+
+
+def likeliest_speed(as_read: Phases, misread: Mapping[str, Phases]) -> tuple[str | None, Phases]:
+    """The mistake of the speed's unit that explains the phases far better than none, if one does, and its phases."""
+    what = max(misread, key=lambda mistake: misread[mistake].best, default=None)
+    if what is not None and misread[what].best > as_read.best + UNIT_GAIN:
+        return what, misread[what]
+    return None, as_read
+
+
+def apart_findings(spectra: CrossSpectra, seen: Phases) -> Iterator[Finding]:
+    """Do the two sensors move together as one body does?
+
+    Amidships heave and pitch are nearly independent where the speed varies, so a low coherence alone proves
+    nothing: there the phases and the size must at least be a vehicle's.
+    """
+    coherence, likely = mean_coherence(spectra), seen.likely
+    is_vehicle = likely.best >= LEAST_AGREEMENT and USUAL_SCALE[0] <= likely.scale <= USUAL_SCALE[1]
+    if coherence < LEAST_COHERENCE and not is_vehicle:
+        text = f"coherence of pitch_rate and vertical_acceleration is {coherence:.2f}, their phases agree with a "
+        yield found(Kind.PITCH_RATE_AXIS, Severity.FAULT, f"{text}vehicle's by {likely.best:.2f}")
+
+
+def phase_findings(seen: Phases, speed_misread: str | None) -> Iterator[Finding]:
+    """Unit of the speed, unit and sign of the pitch rate beside a vertical acceleration that is right."""
+    if speed_misread is not None:
+        text = f"phases agree with the vehicle's by {seen.best:.2f} if {speed_misread}, by far less as it is"
+        yield found(Kind.SPEED_UNIT, Severity.FAULT, text)
+    yield from _scale_findings(seen.likely)
+    if seen.is_turned:
+        text = f"phases agree with the vehicle's by {seen.turned.best:.2f} turned over, "
+        yield found(Kind.PITCH_RATE_SIGN, Severity.FAULT, f"{text}by {seen.upright.best:.2f} as they are")
+
+
+def _scale_findings(seen: Agreement) -> Iterator[Finding]:
+    if SCALE_RANGE[0] <= seen.scale <= SCALE_RANGE[1]:
+        return
+    text = f"pitch_rate is {seen.scale:.3g} times what a vehicle has beside this vertical acceleration"
+    if UNIT_RANGE[0] <= seen.scale / DEGREES <= UNIT_RANGE[1]:
+        yield found(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text}: deg/s taken for rad/s")
+    elif UNIT_RANGE[0] <= seen.scale * DEGREES <= UNIT_RANGE[1]:
+        yield found(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text}: rad/s taken for deg/s")
+    else:
+        yield found(Kind.PITCH_RATE_UNIT, Severity.FAULT, text)
+
+
+def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Iterator[Finding]:
+    """Where the sensor sits by this run alone, beside where the campaign says; signs and units being right."""
+    if spectra.n_total < LEAST_SEGMENTS:
+        return
+    position_m, std_m = fitted_position_m(spectra, run, vehicle)
+    off_m = abs(position_m - vehicle.sensor_position_m)
+    doubt_m = 3.0 * float(np.hypot(std_m, vehicle.sensor_position_std_m))
+    if off_m > max(POSITION_OFF_M, doubt_m):
+        is_wrong = off_m > max(POSITION_WRONG_M, doubt_m)
+        text = f"sensor_position_m is {vehicle.sensor_position_m:g}, the spectra say {position_m:.2f} +- {std_m:.2f}"
+        yield found(Kind.SENSOR_POSITION, Severity.FAULT if is_wrong else Severity.WARNING, text)
+
+
+def fitted_position_m(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> tuple[float, float]:
+    """The most probable sensor position of one run and its standard deviation, the rest of the vehicle unknown too."""
+    start_m = agreement(spectra, _stated(run), vehicle).position_m
+    loose = prior_of(replace(vehicle, sensor_position_m=start_m, sensor_position_std_m=LOOSE_STD_M))
+    at_rest = fit_half_car([KnownSpectra(run, vehicle, spectra)], loose, loose.start(0.0, 0.0))
+    at = INDEX["sensor_position_m"]
+    return float(at_rest.x[at]), float(np.sqrt(at_rest.covariance[at, at]))

@@ -1,0 +1,181 @@
+"""Are the loads of a campaign file those that were driven? Each run weighed by what the others teach.
+
+A half-car is fitted to all runs as labelled. Two runs that trade their loads must explain all runs
+better, by far, before they are called swapped: evidence is the natural logarithm of how much more
+probable the drives become, at the calibration's own small weight of evidence.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from gateway.calibration.half_car.fit import fit_half_car, half_car_calibration
+from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
+from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.inspection.finding import Finding, Severity
+from gateway.calibration.inspection.kinds import Kind, found
+from gateway.calibration.known_run import KnownRun
+from gateway.core.cross_spectrum.estimator import locate
+from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.reach import beyond
+from gateway.core.cross_spectrum.search import Found
+from gateway.core.vehicle import Vehicle
+from gateway.errors import CalibrationImpossibleError
+from gateway.records import F64
+
+LEAST_EVIDENCE: Final = 20.0
+PAIRS_TRIED: Final = 4
+PAIRS_OF_FEW: Final = 2
+FEW_RUNS: Final = 4  # so few can bend the fit to their labels: pairs are tried whatever the fit says
+STRAINED_MISFIT: Final = 4.0  # 1 is perfect, true labels have stayed below 3
+LEAST_OTHERS: Final = 3  # to weigh a run by
+DOUBT_STDS: Final = 6.0  # of the run's own spread, which does not hold the model's errors
+DOUBT_PAYLOAD_SHARE: Final = 0.08  # of the empty mass
+DOUBT_FRONT_SHARE: Final = 0.03
+
+
+def compare_loads(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[tuple[int, Finding]]:
+    """Run numbers with what is to say of their loads: pairs that are swapped, then any that disagrees with the others.
+
+    The pair that explains most is set aside and the others are asked again, until no pair is left.
+    """
+    try:
+        known = known_spectra(runs, vehicle)
+    except CalibrationImpossibleError:
+        return
+    least = 2
+    while len(known) >= least:
+        labelled = _Labelled(known, vehicle)
+        swapped = labelled.swapped_pair()
+        if swapped is None:
+            yield from _disagreements(labelled)
+            return
+        yield from _swap_findings(labelled, *swapped)
+        known = [one for n, one in enumerate(known) if n not in swapped[:2]]
+        least = LEAST_OTHERS
+
+
+class _Labelled:
+    """Runs with the loads that the campaign file gives them, and the half-car that explains them best."""
+
+    def __init__(self, known: Sequence[KnownSpectra], vehicle: Vehicle) -> None:
+        self.known = known
+        self.vehicle = vehicle
+        self._prior = prior_of(vehicle)
+        self.found = fit_half_car(known, self._prior, self._prior.start(0.0, 0.0))
+
+    def costs(self) -> F64:
+        """(n, n) cost of run i with the load of run j."""
+        loads = [(k.run.payload_kg, k.run.front_share_pct / 100.0) for k in self.known]
+        return np.array([[k.whittle.cost(Point(self.found.x, *load)) for load in loads] for k in self.known])
+
+    def swapped_pair(self) -> tuple[int, int, float] | None:
+        """The pair whose exchange explains the drives best, with its evidence; None where none does by enough.
+
+        Where enough other runs are there to weigh both, these must agree: one wrong label improves by many exchanges.
+        """
+        costs = self.costs()
+        own = np.diag(costs)
+        gains = own[:, None] + own[None, :] - costs - costs.T
+        pairs = [pair for pair in combinations(range(len(self.known)), 2) if self._differ(*pair)]
+        pairs.sort(key=lambda pair: -gains[pair])
+        if len(self.known) > FEW_RUNS:
+            likely = [pair for pair in pairs[:PAIRS_TRIED] if gains[pair] > 0.0]
+        else:
+            likely = pairs if self._is_strained() else pairs[:PAIRS_OF_FEW]
+        tried = [(i, j, self.found.cost - self._with_exchanged(i, j).cost) for i, j in likely]
+        evident = sorted((one for one in tried if one[2] > LEAST_EVIDENCE), key=lambda one: -one[2])
+        return next((one for one in evident if self._is_confirmed(one[0], one[1])), None)
+
+    def _is_confirmed(self, i: int, j: int) -> bool:
+        """False where the runs besides these two weigh one of them nearer to its own label than to the other's."""
+        if len(self.known) - 2 < LEAST_OTHERS:
+            return True
+        return all(self._is_nearer(one, other, (i, j)) for one, other in ((i, j), (j, i)))
+
+    def _is_nearer(self, one: int, other: int, left_out: Sequence[int]) -> bool:
+        point, _ = self.weighed_by_others(one, left_out)
+        weighed = (point.payload_kg, 100.0 * point.front_share)
+        own, exchanged = (
+            beyond(weighed, [(run.payload_kg, run.front_share_pct)], self.vehicle.empty_mass_kg)
+            for run in (self.known[one].run, self.known[other].run)
+        )
+        return exchanged < own
+
+    def _is_strained(self) -> bool:
+        """True where no half-car explains some run with its label."""
+        misfits = [k.whittle.misfit(k.at(self.found.x)) for k in self.known]
+        return float(np.nanmax(misfits)) > STRAINED_MISFIT
+
+    def _differ(self, i: int, j: int) -> bool:
+        one, other = self.known[i].run, self.known[j].run
+        return (one.payload_kg, one.front_share_pct) != (other.payload_kg, other.front_share_pct)
+
+    def _with_exchanged(self, i: int, j: int) -> Found:
+        one, other = self.known[i], self.known[j]
+        runs = list(self.known)
+        runs[i], runs[j] = self._carrying(one, other.run), self._carrying(other, one.run)
+        return fit_half_car(runs, self._prior, self.found.x)
+
+    def _carrying(self, one: KnownSpectra, other: KnownRun) -> KnownSpectra:
+        run = replace(one.run, payload_kg=other.payload_kg, front_share_pct=other.front_share_pct)
+        return KnownSpectra(run, self.vehicle, one.spectra)
+
+    def weighed_by_others(self, i: int, left_out: Sequence[int]) -> tuple[Point, F64]:
+        """Run i by a half-car that has not seen the runs left out: the load, and its (payload, share) deviations."""
+        others = [k for n, k in enumerate(self.known) if n not in left_out]
+        refound = fit_half_car(others, self._prior, self.found.x)
+        located = locate(self.known[i].spectra, half_car_calibration(others, self.vehicle, refound))
+        return located.point, np.sqrt(np.diag(located.load_covariance))
+
+
+def _swap_findings(all_runs: _Labelled, i: int, j: int, evidence: float) -> Iterator[tuple[int, Finding]]:
+    numbers = [all_runs.known[n].run.number for n in (i, j)]
+    text = f"exchanging the loads of runs {numbers[0]} and {numbers[1]} explains the drives better: "
+    text += f"evidence {evidence:.0f}, {LEAST_EVIDENCE:g} is beyond doubt"
+    for n in (i, j):
+        yield (
+            all_runs.known[n].run.number,
+            found(Kind.LOADS_SWAPPED, Severity.FAULT, text + _weighed(all_runs, n, (i, j))),
+        )
+
+
+def _weighed(all_runs: _Labelled, i: int, left_out: Sequence[int]) -> str:
+    """What the runs that are not left out weigh run i at, in words; nothing where too few are left."""
+    if len(all_runs.known) - len(left_out) < LEAST_OTHERS:
+        return ""
+    point, _ = all_runs.weighed_by_others(i, left_out)
+    return (
+        f"; the other runs weigh this one at {_load(point.payload_kg, point.front_share)}, not {_stated(all_runs, i)}"
+    )
+
+
+def _disagreements(all_runs: _Labelled) -> Iterator[tuple[int, Finding]]:
+    """Runs that another run's load explains better than their own, weighed by the others."""
+    if len(all_runs.known) <= LEAST_OTHERS:
+        return
+    costs = all_runs.costs()
+    excess = np.diag(costs) - costs.min(axis=1)
+    for i in np.flatnonzero(excess > LEAST_EVIDENCE).tolist():
+        run = all_runs.known[i].run
+        point, std = all_runs.weighed_by_others(i, (i,))
+        off = np.abs([point.payload_kg - run.payload_kg, point.front_share - run.front_share_pct / 100.0])
+        allowed = [DOUBT_PAYLOAD_SHARE * all_runs.vehicle.empty_mass_kg, DOUBT_FRONT_SHARE]
+        if np.any((off > allowed) & (off > DOUBT_STDS * std)):
+            text = f"the other runs weigh this one at {_load(point.payload_kg, point.front_share)}"
+            yield (
+                run.number,
+                found(Kind.LOAD_DISAGREES, Severity.WARNING, f"{text}, the file says {_stated(all_runs, i)}"),
+            )
+
+
+def _stated(all_runs: _Labelled, i: int) -> str:
+    run = all_runs.known[i].run
+    return _load(run.payload_kg, run.front_share_pct / 100.0)
+
+
+def _load(payload_kg: float, front_share: float) -> str:
+    return f"{payload_kg:.0f} kg with {100.0 * front_share:.1f} % in front"

@@ -1,0 +1,54 @@
+"""What reading a drive's log says before any of its rows is looked at: can it be read, and is it this drive's alone?"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from gateway.calibration.inspection.finding import Finding, Severity
+from gateway.calibration.inspection.kinds import Kind, found
+
+
+@dataclass(frozen=True, slots=True)
+class LogFacts:
+    """How the log of a run was read.
+
+    ``duration_s`` is of the whole log, ``span_ns`` the first and last stamp of the run's piece of it, None where
+    that piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it.
+    """
+
+    sha256: str = ""
+    duration_s: float = 0.0
+    start_s: float = 0.0
+    span_ns: tuple[int, int] | None = (0, 0)
+    unreadable: str | None = None
+    damage: str | None = None
+
+
+def log_findings(facts: LogFacts) -> Iterator[Finding]:
+    """At most one fault: no log, or no piece of it; or a warning that some of it was lost."""
+    if facts.unreadable is not None:
+        yield found(Kind.LOG_UNREADABLE, Severity.FAULT, facts.unreadable)
+    elif facts.span_ns is None:
+        text = f"the log lasts {facts.duration_s:.0f} s, the run begins at {facts.start_s:g} s"
+        yield found(Kind.CUT_AWAY, Severity.FAULT, text)
+    elif facts.damage is not None:
+        yield found(Kind.LOG_DAMAGED, Severity.WARNING, facts.damage)
+
+
+def same_drive_findings(
+    logs: Mapping[int, LogFacts], loads: Mapping[int, tuple[float, float]]
+) -> Iterator[tuple[int, Finding]]:
+    """Runs, by number, that are the same piece of the same log: all but the first; all of them if loads differ."""
+    for one, other in combinations(logs, 2):
+        if _is_same_drive(logs[one], logs[other]):
+            is_same_load = loads[one] == loads[other]
+            text = f"runs {one} and {other} are the same drive" + ("" if is_same_load else " with two different loads")
+            numbers: Sequence[int] = (other,) if is_same_load else (one, other)
+            for number in numbers:
+                yield number, found(Kind.SAME_DRIVE, Severity.FAULT, text)
+
+
+def _is_same_drive(one: LogFacts, other: LogFacts) -> bool:
+    if not one.sha256 or one.sha256 != other.sha256 or one.span_ns is None or other.span_ns is None:
+        return False
+    return one.span_ns[0] < other.span_ns[1] and other.span_ns[0] < one.span_ns[1]

@@ -1,0 +1,177 @@
+"""What the decoded rows of a drive say before they are cut into batches: rates, gaps, means, speeds."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import isfinite, nan, pi
+from typing import Final
+
+import numpy as np
+
+from gateway.calibration.inspection.finding import Finding, Severity
+from gateway.calibration.inspection.kinds import Kind, found
+from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE, Traits
+from gateway.core.settings import BatchSettings
+from gateway.core.timeline import sample_rate_hz
+from gateway.records import Motion, SensorTraits, Signal
+from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
+
+INERTIAL: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
+JITTER_SHARE_MAX: Final = 0.25  # of a sample's interval, half the width that holds 80 % of them
+BIAS_MAX_RADPS: Final = 3.0 * pi / 180.0  # what an uncalibrated automotive gyroscope may have
+UNIT_TOLERANCE: Final = 0.15
+STEADY_SHARE: Final = 0.2  # scatter over mean below which that mean is gravity and no acceleration
+SHAKING_MPS2: Final = 0.2  # a vehicle at rest with its engine running stays below
+MISREAD_AS_MPS2: Final = {  # what gravity then reads, over 9.81
+    "it reads in g what the signal map takes for m/s2": 1.0 / STANDARD_GRAVITY_MPS2,
+    "it reads in m/s2 what the signal map takes for g": STANDARD_GRAVITY_MPS2,
+    "it reads in mg what the signal map takes for m/s2": 1000.0 / STANDARD_GRAVITY_MPS2,
+    "it reads in mg what the signal map takes for g": 1000.0,
+    "it reads in m/s2 what the signal map takes for mg": STANDARD_GRAVITY_MPS2 / 1000.0,
+    "it reads in g what the signal map takes for mg": 1.0 / 1000.0,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """One signal's samples: rate, unevenness as a share of the interval, and its distribution in SI."""
+
+    n: int
+    rate_hz: float
+    jitter_share: float
+    mean: float
+    std: float
+    low: float
+    middle: float
+    high: float
+    resolution: float
+
+
+@dataclass(frozen=True, slots=True)
+class RowFacts:
+    """What one drive's rows say; ``streams`` has every mapped signal."""
+
+    duration_s: float = 0.0
+    streams: Mapping[Signal, Stream] = field(default_factory=dict)
+
+    def mean(self, signal: Signal) -> float:
+        """NaN where there is no sample."""
+        return self.streams[signal].mean if signal in self.streams else nan
+
+
+def row_facts(motion: Motion, traits: Traits) -> RowFacts:
+    """Facts of the rows in any order; low, middle and high of a stream are its 5, 50 and 95 % quantiles."""
+    duration_s = float(np.ptp(motion.t_ns)) / NS_PER_S if len(motion) else 0.0
+    streams = {signal: _stream(motion, signal, traits.get(signal, SensorTraits())) for signal in motion.signals}
+    return RowFacts(duration_s, streams)
+
+
+def _stream(motion: Motion, signal: Signal, trait: SensorTraits) -> Stream:
+    t_ns, x = motion.of(signal)
+    if len(x) < 2:
+        return Stream(len(x), 0.0, nan, nan, nan, nan, nan, nan, trait.resolution)
+    intervals_ns = np.diff(np.sort(t_ns))
+    early, usual, late = np.quantile(intervals_ns, [0.1, 0.5, 0.9])
+    low, middle, high = (float(q) for q in np.quantile(x, [0.05, 0.5, 0.95]))
+    return Stream(
+        n=len(x),
+        rate_hz=sample_rate_hz(np.unique(t_ns)),
+        jitter_share=float((late - early) / 2.0 / usual) if usual > 0.0 else nan,
+        mean=float(np.mean(x)),
+        std=float(np.std(x)),
+        low=low,
+        middle=middle,
+        high=high,
+        resolution=trait.resolution,
+    )
+
+
+def unmapped_findings(facts: RowFacts) -> Iterator[Finding]:
+    """Signals that no log can hold because the map has no place for them; every mapped one has a stream."""
+    if not facts.streams:
+        return
+    if Signal.SPEED not in facts.streams and Signal.WHEEL_SPEED not in facts.streams:
+        yield found(Kind.SIGNAL_UNMAPPED, Severity.FAULT, "neither speed nor wheel_speed is in the signal map")
+    absent = [signal for signal in INERTIAL if signal not in facts.streams]
+    if absent:
+        severity = Severity.FAULT if len(absent) == len(INERTIAL) else Severity.WARNING
+        text = f"{' and '.join(absent)} {'are' if len(absent) > 1 else 'is'} not in the signal map"
+        yield found(Kind.SIGNAL_UNMAPPED, severity, f"{text}; axes and loads cannot be checked")
+
+
+def rate_findings(facts: RowFacts, settings: BatchSettings) -> Iterator[Finding]:
+    """Sensors that are silent, slow or unevenly stamped."""
+    for signal in INERTIAL:
+        stream = facts.streams.get(signal)
+        if stream is None:
+            continue
+        if stream.n < 2:
+            yield found(Kind.SENSOR_SILENT, Severity.FAULT, f"{signal} has {stream.n} samples in the whole run")
+        elif stream.rate_hz < RATE_MIN_SHARE * settings.rate_hz:
+            text = (
+                f"{signal} comes at {stream.rate_hz:.3g} Hz, at least {RATE_MIN_SHARE * settings.rate_hz:g} are needed"
+            )
+            yield found(Kind.RATE_LOW, Severity.FAULT, text)
+        elif not stream.jitter_share <= JITTER_SHARE_MAX:
+            share = f"{100.0 * stream.jitter_share:.0f} %" if isfinite(stream.jitter_share) else "more than a whole one"
+            yield found(Kind.JITTER, Severity.WARNING, f"intervals of {signal} are off by {share} of their length")
+
+
+@dataclass(frozen=True, slots=True)
+class Mended:
+    """By what vertical acceleration must be multiplied to be what it should be; whether its axis is vertical at all."""
+
+    factor: float = 1.0
+    is_axis_sound: bool = True
+
+
+def gravity_findings(facts: RowFacts) -> tuple[Mended, list[Finding]]:
+    """Does vertical acceleration carry +9.81 m/s2, and if not, what does it carry?"""
+    stream = facts.streams.get(Signal.VERTICAL_ACCELERATION)
+    if stream is None or stream.n < 2 or abs(stream.mean - STANDARD_GRAVITY_MPS2) <= GRAVITY_TOLERANCE_MPS2:
+        return Mended(), []
+    if _carries_gravity_instead(facts):
+        text = f"vertical_acceleration has mean {stream.mean:.3g}, pitch_rate has {facts.mean(Signal.PITCH_RATE):.3g}"
+        return Mended(is_axis_sound=False), [found(Kind.CHANNELS_SWAPPED, Severity.FAULT, text)]
+    reads = f"vertical_acceleration has mean {stream.mean:.3g} m/s2"
+    if abs(stream.mean + STANDARD_GRAVITY_MPS2) <= GRAVITY_TOLERANCE_MPS2:
+        return Mended(factor=-1.0), [found(Kind.ACCELERATION_SIGN, Severity.FAULT, reads)]
+    for misread, ratio in MISREAD_AS_MPS2.items():
+        is_unit = abs(abs(stream.mean) / STANDARD_GRAVITY_MPS2 / ratio - 1.0) <= UNIT_TOLERANCE
+        if is_unit and stream.std < STEADY_SHARE * abs(stream.mean):
+            factor = np.sign(stream.mean) / ratio
+            turned = "" if factor > 0.0 else ", and its axis points down"
+            return Mended(factor=float(factor)), [
+                found(Kind.ACCELERATION_UNIT, Severity.FAULT, f"{reads}: {misread}{turned}")
+            ]
+    return Mended(is_axis_sound=False), [found(Kind.ACCELERATION_AXIS, Severity.FAULT, reads + _elsewhere(facts))]
+
+
+def _carries_gravity_instead(facts: RowFacts) -> bool:
+    """Gravity in what is mapped as pitch rate, whatever unit it was taken for."""
+    rate = facts.streams.get(Signal.PITCH_RATE)
+    if rate is None or not rate.std < STEADY_SHARE * abs(rate.mean):
+        return False
+    over_gravity = [abs(rate.mean) / STANDARD_GRAVITY_MPS2 / to_si for to_si in (1.0, pi / 180.0)]
+    return any(abs(ratio - 1.0) <= UNIT_TOLERANCE for ratio in over_gravity)
+
+
+def _elsewhere(facts: RowFacts) -> str:
+    along = facts.mean(Signal.LONGITUDINAL_ACCELERATION)
+    if abs(abs(along) - STANDARD_GRAVITY_MPS2) <= GRAVITY_TOLERANCE_MPS2:
+        return f", longitudinal_acceleration has {along:.3g}: exchange the two"
+    return ""
+
+
+def bias_findings(facts: RowFacts) -> Iterator[Finding]:
+    """A pitch rate whose mean no vehicle has."""
+    bias = facts.mean(Signal.PITCH_RATE)
+    if abs(bias) > BIAS_MAX_RADPS:
+        yield found(Kind.PITCH_RATE_BIAS, Severity.WARNING, f"pitch_rate has mean {np.degrees(bias):.3g} deg/s")
+
+
+def stands_still_but_shakes(facts: RowFacts) -> bool:
+    """The speed says at rest all along; the vertical acceleration says otherwise."""
+    speed, acceleration = facts.streams.get(Signal.SPEED), facts.streams.get(Signal.VERTICAL_ACCELERATION)
+    if speed is None or acceleration is None or speed.n < 2:
+        return False
+    return speed.high < BatchSettings().standstill_speed_mps and acceleration.std > SHAKING_MPS2

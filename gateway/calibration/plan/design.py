@@ -1,0 +1,105 @@
+"""Which known-load run would teach most: optimal design on the half-car's posterior.
+
+    design = Design(vehicle, theta, drive, targets)
+    design.spread(covariance)             how well loads would be weighed, given what is known of the vehicle
+    design.after(covariance, load)        what would be known after one more known-load run
+
+One more run adds its expected information I to what is known of the parameters, C' = (C^-1 + I)^-1.
+A batch of load y has the covariance  own + moves C moves'  (core.cross_spectrum): its own noise, and
+what calibration left open. The run to drive next is the one after which the mean of that variance over
+the loads that the vehicle carries is least (I-optimality; G. E. P. Box and N. R. Draper, "A basis for the
+selection of a response surface design", J. Am. Stat. Assoc. 54, 1959). It is a statement of the model
+about itself, to first order: errors of the model are in it only as far as its slack and priors admit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gateway.calibration.half_car.known_spectra import BAND_HZ, EVIDENCE_WEIGHT, N_SEGMENT
+from gateway.calibration.plan.loads import PlacedLoad
+from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY
+from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
+from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.measured import Reading
+from gateway.core.cross_spectrum.parameters import PARAMETERS, Ground
+from gateway.core.vehicle import Vehicle
+from gateway.records import F64
+
+BATCH_S = 300.0
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Root mean square standard deviation of an estimate over the loads a vehicle carries."""
+
+    payload_std_kg: float
+    front_share_std_pct: float
+
+
+class Design:
+    """What runs of a vehicle with parameters ``theta`` (p,) would teach, each driven as ``drive``."""
+
+    def __init__(self, vehicle: Vehicle, theta: F64, drive: Drive, targets: Sequence[PlacedLoad]) -> None:
+        self._theta = theta
+        self._ground = Ground(vehicle.empty_mass_kg, vehicle.empty_front_share_pct / 100.0, vehicle.wheelbase_m)
+        self._reading = Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT)
+        self._drive = drive
+        self._information: dict[PlacedLoad, F64] = {}
+        span_kg = vehicle.payload_range_kg[1] - vehicle.payload_range_kg[0]
+        span_share = (vehicle.front_share_range_pct[1] - vehicle.front_share_range_pct[0]) / 100.0
+        self._spans: F64 = np.array([span_kg, span_share], dtype=float)
+        weighed = [self._weighed(load) for load in targets]
+        self._own: F64 = np.array([own for own, _ in weighed], dtype=float)
+        self._moves: F64 = np.array([moves for _, moves in weighed], dtype=float)
+
+    def after(self, covariance: F64, load: PlacedLoad) -> F64:
+        """Covariance (p, p) of the parameters after one more run with ``load``, from ``covariance`` before it."""
+        if load not in self._information:
+            whittle, point = self._seen(load, self._drive, EVIDENCE_WEIGHT)
+            everything = list(range(len(PARAMETERS)))
+            self._information[load] = whittle.curvature(point, everything, is_load_free=False).information
+        return np.asarray(np.linalg.inv(np.linalg.inv(covariance) + self._information[load]), float)
+
+    def spread(self, covariance: F64) -> Spread:
+        """How well the targets would be weighed in batches of five minutes, before any inflation."""
+        payload_var, share_var = self._variances(covariance).mean(axis=0)
+        return Spread(float(np.sqrt(payload_var)), 100.0 * float(np.sqrt(share_var)))
+
+    def loss(self, covariance: F64) -> float:
+        """Mean variance of payload and front share over the targets, each in its range (12)."""
+        return float(np.sum(self._variances(covariance).mean(axis=0) / self._spans**2))
+
+    def best(self, covariance: F64, loads: Sequence[PlacedLoad]) -> PlacedLoad:
+        """Which of ``loads`` leaves least loss; the first of equals."""
+        return min(loads, key=lambda load: self.loss(self.after(covariance, load)))
+
+    def worst(self, covariance: F64, loads: Sequence[PlacedLoad]) -> PlacedLoad:
+        """Which of ``loads`` leaves most loss; the first of equals."""
+        return max(loads, key=lambda load: self.loss(self.after(covariance, load)))
+
+    def _variances(self, covariance: F64) -> F64:
+        """Variances (t, 2) of payload (kg) and front share (0..1) at each target."""
+        left_open = np.einsum("tij,jk,tik->ti", self._moves, covariance, self._moves)
+        found: F64 = self._own + left_open
+        return found
+
+    def _weighed(self, load: PlacedLoad) -> tuple[F64, F64]:
+        """A batch's own variances (2,), and how (payload, share) move with each parameter (2, p).
+
+        With x the fitted and t the other parameters, x moves by -C_xx I_xt for each t.
+        """
+        whittle, point = self._seen(load, Drive(BATCH_S, self._drive.speed_mps), 1.0)
+        n = len(PARAMETERS)
+        information = whittle.curvature(point, list(range(n)), is_load_free=True).information
+        fitted = [*DRIFTING, n, n + 1]
+        own = np.linalg.inv(information[np.ix_(fitted, fitted)] + np.pad(DRIFT_PRECISION, (0, 2)))
+        moves = np.zeros((2, n))
+        moves[:, STEADY] = -(own @ information[np.ix_(fitted, STEADY)])[-2:]
+        return np.diag(own)[-2:], moves
+
+    def _seen(self, load: PlacedLoad, drive: Drive, weight: float) -> tuple[Whittle, Point]:
+        point = Point(self._theta, load.payload_kg, load.front_share_pct / 100.0)
+        spectra = expected_of(steady_spectra(self._reading, drive), point, self._ground)
+        return Whittle(spectra, self._ground, weight), point

@@ -1,0 +1,195 @@
+"""Which known load to drive next, and how much that would help.
+
+    plan_first(vehicle)                   nothing driven yet: a first campaign, from priors alone
+    plan_next(outcome, vehicle)           after a calibration: the runs that would teach most, one after the other
+
+Runs are chosen by gateway.calibration.plan.design. What it expects is stated as the service would state
+it: standard deviations of five-minute batches over the loads the vehicle carries, inflation included.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from gateway.calibration.calibrate import Outcome
+from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATION
+from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.plan.design import Design
+from gateway.calibration.plan.index_design import IndexDesign, IndexSpread
+from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
+from gateway.core.cross_spectrum.ideal_drive import Drive
+from gateway.core.vehicle import Vehicle
+from gateway.errors import CalibrationImpossibleError
+from gateway.records import F64
+from gateway.units import NS_PER_S
+
+FIRST_DRIVE: Final = Drive(600.0, 50.0 / 3.6)
+N_FIRST: Final = 4
+N_NEXT: Final = 3
+WORTH_DRIVING: Final = 0.1  # by how much a run should narrow the spread to be worth a quarter of an hour
+
+Loads = tuple[PlacedLoad, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """How well the vehicle would be weighed: standard deviations over the loads it carries.
+
+    ``reach_share`` (0..1) of those loads lie within what was driven, so that an answer is not refused
+    as ``out_of_range``; None while one load alone was driven. ``ratio_index`` is None where it is not
+    calibrated.
+    """
+
+    payload_std_kg: float
+    front_share_std_pct: float
+    reach_share: float | None
+    ratio_index: IndexSpread | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """One run to drive, and what is expected once it and those advised before it are driven."""
+
+    load: PlacedLoad
+    expected: Expected
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Runs to drive, in order. ``now`` is None where nothing was driven yet.
+
+    ``least`` is the run that would help least, for comparison with the first of ``advice``.
+    """
+
+    vehicle: str
+    n_driven: int
+    drive: Drive
+    now: Expected | None
+    advice: tuple[Advice, ...]
+    least: Advice | None
+
+    @property
+    def is_enough_driven(self) -> bool:
+        """True where not even the first of ``advice`` would narrow answers, or widen the reach, by a tenth."""
+        if self.now is None or not self.advice or self.now.reach_share is None:
+            return False
+        now, then = self.now, self.advice[0].expected
+        widths = (
+            (then.payload_std_kg, now.payload_std_kg),
+            (then.front_share_std_pct, now.front_share_std_pct),
+            (now.reach_share or 0.0, then.reach_share or 0.0),
+        )
+        return all(after > (1.0 - WORTH_DRIVING) * before for after, before in widths)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain numbers for a file or a report."""
+        return asdict(self) | {"is_enough_driven": self.is_enough_driven}
+
+
+def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST) -> Plan:
+    """A first campaign: empty, then what the priors of any vehicle let expect the most of."""
+    prior = prior_of(vehicle)
+    planner = _Planner(vehicle, prior.mean, FIRST_DRIVE)
+    unloaded = empty(vehicle)
+    known = planner.after(np.diag(prior.std**2), unloaded)
+    first = Advice(unloaded, planner.expected(known, (unloaded,)))
+    return Plan(
+        vehicle=vehicle.name,
+        n_driven=0,
+        drive=FIRST_DRIVE,
+        now=None,
+        advice=(first, *planner.advice(known, (unloaded,), n_runs - 1)),
+        least=None,
+    )
+
+
+def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> Plan:
+    """The next runs after a calibration.
+
+    Raises CalibrationImpossibleError where it holds no cross-spectral part: the advice is of the half-car.
+    """
+    found = outcome.cross_spectrum
+    if found is None:
+        raise CalibrationImpossibleError(
+            "a plan needs the cross-spectral calibration: leave out --estimator, and see its warning if it has one"
+        )
+    runs = [one.identification for one in outcome.split]
+    drive = usual_drive(runs)
+    index = None
+    if outcome.ratio_index is not None:
+        calibration = outcome.ratio_index.calibration
+        index = IndexDesign(calibration, vehicle, found.parameters, drive.speed_mps, weighed_loads(vehicle))
+    inflation = found.payload_inflation, found.front_share_inflation
+    planner = _Planner(vehicle, found.parameters, drive, inflation, index)
+    driven = tuple(PlacedLoad(run.payload_kg, None, run.front_share_pct) for run in runs)
+    return Plan(
+        vehicle=vehicle.name,
+        n_driven=len(runs),
+        drive=drive,
+        now=planner.expected(found.covariance, driven),
+        advice=planner.advice(found.covariance, driven, n_runs),
+        least=planner.least(found.covariance, driven),
+    )
+
+
+def usual_drive(runs: list[KnownRun]) -> Drive:
+    """How these runs were driven on the whole: usable seconds a run, mean speed of a batch (medians)."""
+    counted = [[batch for batch in run.batches if not batch.rejected] for run in runs]
+    durations_s = [
+        sum(batch.usable_share * (batch.t_end_ns - batch.t_start_ns) / NS_PER_S for batch in batches)
+        for batches in counted
+        if batches
+    ]
+    speeds_mps = [batch.mean_speed_mps for batches in counted for batch in batches]
+    if not durations_s:
+        return FIRST_DRIVE
+    return Drive(float(np.median(durations_s)), float(np.median(speeds_mps)))
+
+
+class _Planner:
+    """A design together with how its spread is stated."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        theta: F64,
+        drive: Drive,
+        inflation: tuple[float, float] = (UNTESTED_INFLATION, UNTESTED_INFLATION),
+        index: IndexDesign | None = None,
+    ) -> None:
+        self._loads = drivable_loads(vehicle)
+        self._targets = weighed_loads(vehicle)
+        self._design = Design(vehicle, theta, drive, self._targets)
+        self._inflation = inflation
+        self._index = index
+
+    def advice(self, covariance: F64, driven: Loads, n_runs: int) -> tuple[Advice, ...]:
+        """The most useful run, then the most useful after that one, and so on."""
+        steps: list[Advice] = []
+        for _ in range(n_runs):
+            load = self._design.best(covariance, self._loads)
+            covariance = self._design.after(covariance, load)
+            new = (*(step.load for step in steps), load)
+            steps.append(Advice(load, self.expected(covariance, driven, new)))
+        return tuple(steps)
+
+    def least(self, covariance: F64, driven: Loads) -> Advice:
+        """The least useful single run."""
+        load = self._design.worst(covariance, self._loads)
+        return Advice(load, self.expected(self._design.after(covariance, load), driven, (load,)))
+
+    def after(self, covariance: F64, load: PlacedLoad) -> F64:
+        """What is known once ``load`` is driven too."""
+        return self._design.after(covariance, load)
+
+    def expected(self, covariance: F64, driven: Loads, new: Loads = ()) -> Expected:
+        """As the service would state it."""
+        spread = self._design.spread(covariance)
+        return Expected(
+            payload_std_kg=self._inflation[0] * spread.payload_std_kg,
+            front_share_std_pct=self._inflation[1] * spread.front_share_std_pct,
+            reach_share=share_within_reach(self._targets, (*driven, *new)),
+            ratio_index=self._index.spread(new) if self._index else None,
+        )

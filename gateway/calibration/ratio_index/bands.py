@@ -1,0 +1,142 @@
+"""Which frequency bands tell load from road: found on the vehicle's own known-load drives."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.stats import rankdata
+
+from gateway.calibration.ratio_index.scatter import bin_covariance, integral_covariance
+from gateway.calibration.ratio_index.table import IndexTable
+from gateway.core.ratio_index.index import UPPER_LIMIT_HZ, Band, SpectrumKind, band_pass_gain
+from gateway.records import F64, I64
+
+WIDTHS_HZ: Final = (0.25, 0.5, 1.0)  # narrower ones scatter too much to be told from luck in a few runs
+CENTRES_HZ: Final = np.arange(1.0, UPPER_LIMIT_HZ - 0.4, 0.25)
+
+
+@dataclass(frozen=True, slots=True)
+class BandPair:
+    """Numerator and denominator, and how their log ratio follows its target over the runs of a campaign.
+
+    ``significance`` is the squared partial correlation, the other target taken out, with a residual no
+    smaller than the spectra's own scatter; ``monotonicity`` is the rank correlation of the same
+    residuals. Both are NaN for bands that were given, not searched.
+    """
+
+    bands: tuple[Band, Band]
+    significance: float = float("nan")
+    monotonicity: float = float("nan")
+
+
+def band_weights(freq_hz: F64, bands: list[Band], kind: SpectrumKind) -> F64:
+    """Gains (b, m) of the band-passes (6) as they weigh a spectrum of this kind."""
+    order = 1 if kind == "amplitude" else 2
+    return np.array([band_pass_gain(freq_hz, band) ** order for band in bands])
+
+
+def band_levels(freq_hz: F64, spectra: F64, bands: list[Band], kind: SpectrumKind) -> F64:
+    """Integrals (n, b) of the spectra (n, m) through each band-pass (6): either half of (7) and (8)."""
+    passed: F64 = spectra @ band_weights(freq_hz, bands, kind).T
+    return passed
+
+
+def ratios(table: IndexTable, spectra: F64 | None, pair: BandPair | None) -> F64:
+    """R_a or R_g (n,) of every batch; NaN without the sensor."""
+    if pair is None or spectra is None:
+        return np.full(len(table.run), np.nan)
+    passed = band_levels(table.freq_hz, spectra, list(pair.bands), table.kind)
+    return np.asarray(passed[:, 0] / passed[:, 1])
+
+
+def candidate_pairs(
+    table: IndexTable, spectra: F64, target: F64, other: F64, width_hz: float, n_best: int
+) -> list[BandPair]:
+    """The ``n_best`` pairs of one width whose log ratio follows ``target`` (n,) best, neighbours left out.
+
+    Runs are the independent observations, so the batches of a run are averaged first; what goes with
+    ``other`` (the other of payload and share) linearly is taken out of both sides, because a
+    campaign's loads and shares are correlated. The numerator rises with the target against the
+    denominator, as J > 0 over J < 0 in (4) and (5); the measure is significance times monotonicity, not
+    the raw difference, which would be largest where the bands are narrowest and scatter most.
+    """
+    bands = [Band(float(centre), width_hz) for centre in CENTRES_HZ]
+    levels = np.log(band_levels(table.freq_hz, spectra, bands, table.kind))
+    rest, aim = partial_residuals(table.run, levels, target, other)
+    scatter = _log_scatter(table, spectra, bands) * (1.0 - 2.0 / len(rest))
+    strength = _significance(rest, aim, scatter)
+    peaks = _peaks(strength, n_best)
+    if not peaks:
+        return []
+    order = rank_correlations(np.column_stack([rest[:, i] - rest[:, j] for i, j in peaks]), aim)
+    found = [
+        BandPair((bands[i], bands[j]), float(strength[i, j]), float(rho))
+        for (i, j), rho in zip(peaks, order, strict=True)
+    ]
+    return sorted(found, key=lambda pair: -pair.significance * pair.monotonicity)
+
+
+def partial_residuals(run: I64, levels: F64, target: F64, other: F64) -> tuple[F64, F64]:
+    """Run means of levels (r, b) and target (r,) less what is linear in ``other``; all inputs (n, ...)."""
+    by_run = run_means(run, np.column_stack([levels, target, other]))
+    nuisance = np.column_stack([np.ones(len(by_run)), by_run[:, -1]])
+    residual = by_run[:, :-1] - nuisance @ np.linalg.lstsq(nuisance, by_run[:, :-1], rcond=None)[0]
+    return residual[:, :-1], residual[:, -1]
+
+
+def run_means(run: I64, columns: F64) -> F64:
+    """Means (r, ...) of columns (n, ...) over the batches of each run, runs by rising number."""
+    return np.array([columns[run == number].mean(axis=0) for number in np.unique(run)])
+
+
+def rank_correlations(columns: F64, target: F64) -> F64:
+    """Spearman's, of each column (r, b) with target (r,): 1 where it rises whenever the target does. 0 if constant."""
+    ranks, aim = rankdata(columns.round(12), axis=0), rankdata(target.round(12))
+    ranks, aim = ranks - ranks.mean(axis=0), aim - aim.mean()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found: F64 = np.nan_to_num(aim @ ranks / (np.linalg.norm(ranks, axis=0) * np.linalg.norm(aim)))
+    return found
+
+
+def _log_scatter(table: IndexTable, spectra: F64, bands: list[Band]) -> F64:
+    """Sum over runs of the covariance (b, b) that log band levels have by the scatter of spectra alone."""
+    weights = band_weights(table.freq_hz, bands, table.kind)
+    mean = spectra.mean(axis=0)
+    level = weights @ mean
+    covariance = bin_covariance(table.n_segment, len(table.freq_hz), table.kind)
+    of_one_segment = integral_covariance(weights, mean, 1.0, covariance) / np.outer(level, level)
+    per_run = [table.n_segments[table.run == number].sum() for number in np.unique(table.run)]
+    scatter: F64 = of_one_segment * np.sum(1.0 / np.array(per_run))
+    return scatter
+
+
+def _significance(rest: F64, aim: F64, scatter: F64) -> F64:
+    """Squared partial correlations (b, b) of every log ratio with the target; 0 where the ratio falls."""
+    slope = rest.T @ aim
+    joint = slope[:, None] - slope[None, :]
+    total = _of_differences(rest.T @ rest)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        explained = joint**2 / (aim @ aim)
+        residual = np.maximum(total - explained, _of_differences(scatter))
+        strength = np.where((joint > 0.0) & (total > 0.0), explained / (explained + residual), 0.0)
+    found: F64 = np.nan_to_num(strength)
+    return found
+
+
+def _of_differences(covariance: F64) -> F64:
+    """Variances (b, b) of all differences of two of b variables."""
+    own = np.diag(covariance)
+    spread: F64 = own[:, None] + own[None, :] - 2.0 * covariance
+    return spread
+
+
+def _peaks(strength: F64, n_best: int) -> list[tuple[int, int]]:
+    strength = strength.copy()
+    found: list[tuple[int, int]] = []
+    while len(found) < n_best:
+        i, j = (int(k) for k in np.unravel_index(int(np.argmax(strength)), strength.shape))
+        if strength[i, j] <= 0.0:
+            break
+        found.append((i, j))
+        strength[max(0, i - 1) : i + 2, max(0, j - 1) : j + 2] = 0.0
+    return found

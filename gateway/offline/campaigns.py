@@ -1,0 +1,187 @@
+"""A campaign's drives: read, cut into identification and validation, inspected, calibrated from and judged by."""
+
+from collections.abc import Sequence
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from gateway.bus.logs.report import LogReport
+from gateway.bus.signals.signal_map import SignalMap, load_signal_map
+from gateway.calibration.calibrate import Outcome, calibrate_inspected
+from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
+from gateway.calibration.inspection.campaign import inspect_campaign
+from gateway.calibration.inspection.inspection import Inspection
+from gateway.calibration.inspection.log import LogFacts
+from gateway.calibration.inspection.rows import row_facts
+from gateway.calibration.inspection.run import Inspected
+from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.judgement.evaluation import Judged, error_table, judge
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.ratio_index.choice import BandChoice
+from gateway.calibration.ratio_index.structures import StructureChoice
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.settings import BatchSettings
+from gateway.errors import CalibrationImpossibleError, LogUnreadableError
+from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
+from gateway.records import Motion
+from gateway.units import NS_PER_S
+
+Split = Literal["identification", "validation", "all"]
+
+LOST_LINES_SHARE: Final = 1e-3
+
+
+def split_runs(
+    campaign: Campaign,
+    settings: BatchSettings,
+    *,
+    numbers: Sequence[int] | None = None,
+    on_run: OnRun = lambda done, of: None,
+    keeps_unreadable: bool = False,
+) -> list[SplitRun]:
+    """Reads the logs of the chosen runs. Batches begin anew at the cut between the two parts.
+
+    Raises LogUnreadableError for a log that cannot be read, or keeps it as a run without rows whose ``read`` says why.
+    """
+    signal_map = load_signal_map(campaign.signals)
+    runs = chosen_runs(campaign, numbers)
+    found = []
+    for done, (number, run) in enumerate(runs):
+        on_run(done, len(runs))
+        try:
+            found.append(_split_run(campaign, number, run, signal_map, settings))
+        except LogUnreadableError as fault:
+            if not keeps_unreadable:
+                raise
+            blank = KnownRun(number, str(run.log), run.payload_kg, campaign.front_share_pct(run), ())
+            found.append(SplitRun(campaign.log_of(run), "", blank, blank, read=LogFacts(unreadable=str(fault))))
+    on_run(len(runs), len(runs))
+    return found
+
+
+def _split_run(
+    campaign: Campaign, number: int, run: RunTable, signal_map: SignalMap, settings: BatchSettings
+) -> SplitRun:
+    log = campaign.log_of(run)
+    whole, report = read_whole_log(log, signal_map)
+    motion = rows_within(whole, Stretch(run.start_s, run.end_s))
+    parts = []
+    stretches = _parts(motion, run, campaign.identification_fraction)
+    for stretch in stretches:
+        rows = rows_within(motion, stretch) if stretch and len(motion) else motion.part(0, 0)
+        batches = batches_of_motion(rows, signal_map, settings)
+        parts.append(KnownRun(number, str(run.log), run.payload_kg, campaign.front_share_pct(run), batches))
+    sha256 = file_sha256(log)
+    read = LogFacts(
+        sha256=sha256,
+        duration_s=float(np.ptp(whole.t_ns)) / NS_PER_S,
+        start_s=run.start_s,
+        span_ns=(int(motion.t_ns.min()), int(motion.t_ns.max())) if len(motion) else None,
+        damage=_damage(report),
+    )
+    facts = row_facts(motion, signal_map.traits)
+    return SplitRun(log, sha256, parts[0], parts[1], facts, stretches[0] is not None, read)
+
+
+def _damage(report: LogReport) -> str | None:
+    """What of a log was lost on its way, in words; None where hardly a line was."""
+    if report.ended_early is not None:
+        return f"the log ends early: {report.ended_early}"
+    if report.n_rejected > LOST_LINES_SHARE * report.lines:
+        return f"{report.n_rejected} of {report.lines} lines cannot be read"
+    return None
+
+
+def _parts(motion: Motion, run: RunTable, fraction: float) -> tuple[Stretch | None, Stretch | None]:
+    """Identification and validation stretch of a run; None where there is none."""
+    if run.split is not None:
+        whole = Stretch()
+        return (whole, None) if run.split == "identification" else (None, whole)
+    duration_s = float(motion.t_ns[-1] - motion.t_ns[0]) / NS_PER_S if len(motion) else 0.0
+    cut_s = fraction * duration_s
+    return (
+        Stretch(0.0, cut_s if fraction < 1.0 else None) if fraction > 0.0 else None,
+        Stretch(cut_s, None) if fraction < 1.0 else None,
+    )
+
+
+def inspect(
+    campaign: Campaign,
+    settings: BatchSettings,
+    *,
+    numbers: Sequence[int] | None = None,
+    on_run: OnRun = lambda done, of: None,
+) -> Inspection:
+    """Reads the logs of the chosen runs and tells of each what is wrong with it, if anything."""
+    split = split_runs(campaign, settings, numbers=numbers, on_run=on_run, keeps_unreadable=True)
+    inspected = [
+        Inspected(one.identification, one.validation, one.facts, one.has_identification, one.read) for one in split
+    ]
+    verdicts, findings = inspect_campaign(inspected, campaign.vehicle, settings)
+    return Inspection(tuple(split), verdicts, findings)
+
+
+def calibrate(
+    campaign: Campaign,
+    settings: BatchSettings,
+    *,
+    estimators: Sequence[str],
+    numbers: Sequence[int] | None = None,
+    bands: BandChoice = "campaign",
+    structure: StructureChoice = "auto",
+    command: str = "",
+    on_run: OnRun = lambda done, of: None,
+) -> Outcome:
+    """Inspects the chosen runs and fits every named estimator on the identification parts of those without a fault.
+
+    Raises as :func:`calibrate_inspected` does.
+    """
+    inspection = inspect(campaign, settings, numbers=numbers, on_run=on_run)
+    return calibrate_inspected(
+        campaign, inspection, estimators=estimators, bands=bands, structure=structure, command=command
+    )
+
+
+def evaluate(
+    campaign: Campaign,
+    calibrated: CalibratedVehicle,
+    settings: BatchSettings,
+    *,
+    estimator: str,
+    split: Split = "validation",
+    on_run: OnRun = lambda done, of: None,
+) -> dict[str, Any]:
+    """The error table of (12) over one part of every run, normalised by the campaign's ranges.
+
+    Raises as :func:`judge_campaign` does.
+    """
+    judged = judge_campaign(campaign, calibrated, settings, estimator=estimator, split=split, on_run=on_run)
+    return error_table(judged, campaign.vehicle, estimator)
+
+
+def judge_campaign(
+    campaign: Campaign,
+    calibrated: CalibratedVehicle,
+    settings: BatchSettings,
+    *,
+    estimator: str,
+    split: Split = "validation",
+    on_run: OnRun = lambda done, of: None,
+) -> list[Judged]:
+    """Every batch of one part of every run with its estimate.
+
+    Raises CalibrationImpossibleError where that part holds no batch, for then there is nothing to judge.
+    """
+    runs = split_runs(campaign, settings, on_run=on_run)
+    judged = [one for run in runs for part in _judged_parts(run, split) for one in judge(part, calibrated, estimator)]
+    if not judged:
+        raise CalibrationImpossibleError(
+            f"{campaign.path}: the {split} part of its runs holds no batch: identification_fraction "
+            f"{campaign.identification_fraction:g} and the runs' split leave nothing to evaluate"
+        )
+    return judged
+
+
+def _judged_parts(run: SplitRun, split: Split) -> list[KnownRun]:
+    parts = {"identification": [run.identification], "validation": [run.validation]}
+    return parts.get(split, [run.identification, run.validation])

@@ -1,0 +1,6 @@
+"""How numbers are told to people, wherever they are."""
+
+
+def counted(n: int, noun: str) -> str:
+    """ "1 run", "2 runs"."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
