@@ -16,10 +16,10 @@ from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
 from gateway.calibration.plan.plan import Plan, plan_first, plan_next
 from gateway.calibration.ratio_index.choice import BandChoice
 from gateway.calibration.ratio_index.structures import StructureChoice
-from gateway.cli.inspection_text import inspection_json, inspection_sentences
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
-from gateway.cli.plan_text import plan_sentences
 from gateway.cli.progress import bar, counted
+from gateway.cli.text.inspection import inspection_json, inspection_sentences
+from gateway.cli.text.plan import plan_sentences
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError, ConfigurationError
 from gateway.offline.campaigns import inspect

@@ -12,8 +12,8 @@ from gateway.calibration.file.calibration_file import CalibrationFile, load_cali
 from gateway.calibration.file.check import Check, Verdict, check_against_campaign
 from gateway.calibration.file.comparison import Difference, differences
 from gateway.cli.calibration_tare import tare_commands
-from gateway.cli.calibration_text import calibration_text
 from gateway.cli.options import FILE, as_json
+from gateway.cli.text.calibration import calibration_text
 from gateway.records import json_line
 
 

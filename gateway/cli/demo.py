@@ -12,7 +12,7 @@ from typing import Any, Final, Literal
 import click
 
 from gateway.bus.sink import BusSink, replay_frames
-from gateway.cli.sentence import sentence
+from gateway.cli.text.estimate import sentence
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
 from gateway.records import json_line
 from gateway.service.gateway import Gateway

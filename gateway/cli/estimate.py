@@ -6,7 +6,7 @@ import click
 
 from gateway.calibration.tare_file import FILE_NAME
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
-from gateway.cli.sentence import sentence
+from gateway.cli.text.estimate import sentence
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError

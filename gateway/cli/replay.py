@@ -7,7 +7,7 @@ import click
 from gateway.bus.logs.report import LogReport
 from gateway.bus.sink import ReplayProgress, Speed
 from gateway.bus.sink import replay as send_log
-from gateway.cli import bus_options
+from gateway.cli import options
 from gateway.cli.options import FILE, as_json
 from gateway.cli.progress import StatusLine
 from gateway.errors import LogUnreadableError
@@ -16,10 +16,10 @@ from gateway.records import json_line
 
 @click.command("replay")
 @click.argument("log", type=FILE)
-@bus_options.interface
-@bus_options.channel
+@options.interface
+@options.channel
 @click.option("--from-channel", default=None, help="send the frames of this channel of the log only [default: all]")
-@bus_options.speed
+@options.speed
 @as_json
 def replay(log: Path, interface: str, channel: str, from_channel: str | None, speed: Speed, as_json: bool) -> None:
     """Send every data frame of LOG to a bus, paced by its time stamps."""

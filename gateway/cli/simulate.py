@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from gateway.bus.sink import ReplayProgress, Speed
-from gateway.cli import bus_options
+from gateway.cli import options
 from gateway.cli.options import FILE, as_json
 from gateway.cli.progress import StatusLine, bar
 from gateway.records import json_line
@@ -76,9 +76,9 @@ def campaign(directory: Path, workers: int, as_json: bool, **bench_options: Any)
 
 @simulate.command("stream")
 @_takes_bench
-@bus_options.interface
-@bus_options.channel
-@bus_options.speed
+@options.interface
+@options.channel
+@options.speed
 @as_json
 def stream(interface: str, channel: str, speed: Speed, as_json: bool, **bench_options: Any) -> None:
     """Send the drives of this KIND to a bus, one after the other."""

@@ -14,7 +14,7 @@ from gateway.calibration.calibrate import Outcome
 from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST, Expected, Plan, plan_first, plan_next, usual_drive
 from gateway.cli import springscale
-from gateway.cli.plan_text import plan_sentences
+from gateway.cli.text.plan import plan_sentences
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.reports.calibration_runs import best_next
