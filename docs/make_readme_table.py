@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from generated import keep_up_to_date
 
-from gateway.reports.reproduce_table import PAPER_PCT, TITLES
+from gateway.reports.paper.table import PAPER_PCT, TITLES
 
 DOCS = Path(__file__).parent
 README = DOCS.parent / "README.md"

@@ -147,7 +147,7 @@ def _curve(campaign: Campaign, outcome: Outcome) -> LearningCurve:
 
 
 def _report(directory: Path, campaign: Campaign, outcome: Outcome, curve: LearningCurve | None) -> None:
-    from gateway.reports.calibration_report import write_calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
+    from gateway.reports.calibration.report import write_calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
 
     with counted("judging and drawing") as on_chart:
         written = write_calibration_report(directory, campaign, outcome, on_chart, curve=curve)

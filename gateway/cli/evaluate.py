@@ -56,7 +56,7 @@ def evaluate(
 def _report(
     directory: Path, campaign: Campaign, held: CalibrationFile, estimator: str, split: Split, judged: list[Judged]
 ) -> None:
-    from gateway.reports import calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
+    from gateway.reports.calibration import report as calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
 
     part = Part(split)
     evidence = evidence_of_evaluation(campaign, held, estimator, part, judged)

@@ -8,8 +8,8 @@ import click
 from gateway.cli.options import FILE, as_json
 from gateway.cli.progress import bar
 from gateway.records import json_line
-from gateway.reports.reproduce import reproduce as write_report
-from gateway.reports.reproduce_evidence import N_STEPS, Scope
+from gateway.reports.paper.evidence import N_STEPS, Scope
+from gateway.reports.paper.reproduce import reproduce as write_report
 
 QUICK_WINDOW_S: Final = 100.0
 QUICK_LONGEST_S: Final = 155.0  # two thirds of it, which identify, hold one batch

@@ -14,7 +14,7 @@ from support.known_load_logs import write_known_loads
 
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.cli import main, springscale
-from gateway.reports.calibration_text import percent, shown
+from gateway.reports.calibration.text import percent, shown
 
 WINDOW = ("--window-s", "100")
 VOID = {"meta", "img", "br", "link", "input", "hr"}

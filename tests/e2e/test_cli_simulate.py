@@ -16,7 +16,7 @@ from gateway.cli import reproduce as reproduce_command
 from gateway.cli.progress import StatusLine, bar
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.reports.reproduce_evidence import Scope
+from gateway.reports.paper.evidence import Scope
 from gateway.workbench.demo_drive import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, frames_of
 
 LINE = "({t:.6f}) can1 101#0102030405060708\n"

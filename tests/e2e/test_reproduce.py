@@ -10,10 +10,10 @@ import pytest
 
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.errors import ConfigurationError
-from gateway.reports.reproduce import reproduce
-from gateway.reports.reproduce_evidence import CAMPAIGNS, Scope
-from gateway.reports.reproduce_page import PLATES
-from gateway.reports.reproduce_table import PAPER_PCT, accuracy_page
+from gateway.reports.paper.evidence import CAMPAIGNS, Scope
+from gateway.reports.paper.page import PLATES
+from gateway.reports.paper.reproduce import reproduce
+from gateway.reports.paper.table import PAPER_PCT, accuracy_page
 from gateway.workbench import simulate
 from gateway.workbench.campaigns import Plan, plan_of
 

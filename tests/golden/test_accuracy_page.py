@@ -6,7 +6,7 @@ Both come from `springscale reproduce --output DIR`: accuracy.md, and results.js
 import json
 from pathlib import Path
 
-from gateway.reports.reproduce_table import PAPER_PCT, TITLES, accuracy_page
+from gateway.reports.paper.table import PAPER_PCT, TITLES, accuracy_page
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from gateway.calibration.judgement.learning_curve import LearningCurve, Score, Trial
-from gateway.reports.calibration_learning import learning_section
-from gateway.reports.chart import Points
-from gateway.reports.chart_live import plotly_json
+from gateway.reports.calibration.learning import learning_section
+from gateway.reports.charts.chart import Points
+from gateway.reports.charts.live import plotly_json
 
 SCORES = {2: (20.0, 30.0), 4: (8.0, 12.0)}
 

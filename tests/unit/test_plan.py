@@ -17,7 +17,7 @@ from gateway.cli import springscale
 from gateway.cli.text.plan import plan_sentences
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError
-from gateway.reports.calibration_runs import best_next
+from gateway.reports.calibration.runs import best_next
 
 DRAFT = """
 [vehicle]

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.reports.chart import COLOURS, Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
-from gateway.reports.chart_live import live, plotly_json, plotly_script
-from gateway.reports.chart_still import draw, save_still
+from gateway.reports.charts.chart import COLOURS, Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts.live import live, plotly_json, plotly_script
+from gateway.reports.charts.still import draw, save_still
 
 X = np.linspace(1.0, 3.0, 5)
 MARKS: tuple[Mark, ...] = (

@@ -10,8 +10,8 @@ from matplotlib.axis import XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from gateway.reports.chart import COLOURS, Axis, Cells, Chart, Line, Panel, Points, Ribbon, Rule, Span
-from gateway.reports.figures import panels, save
+from gateway.reports.charts.chart import COLOURS, Axis, Cells, Chart, Line, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts.figures import panels, save
 
 _INCHES_PER_PX: Final = 1.0 / 105.0
 _DASHES: Final = {"solid": "-", "dash": "--", "dot": ":"}

@@ -10,7 +10,7 @@ from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, is_positive
 from gateway.core.vehicle import Vehicle
-from gateway.reports.chart import Axis, Chart, Panel, Points, Rule, Table
+from gateway.reports.charts.chart import Axis, Chart, Panel, Points, Rule, Table
 
 UNTOLD_SHARE: Final = 0.9  # of a prior's standard deviation left over: the data said next to nothing
 

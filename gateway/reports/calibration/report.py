@@ -19,17 +19,17 @@ from gateway.calibration.judgement.learning_curve import LearningCurve
 from gateway.calibration.judgement.verdict import Verdict, verdicts_of
 from gateway.calibration.plan.plan import Plan, plan_next
 from gateway.errors import ConfigurationError
-from gateway.reports.calibration_accuracy import accuracy_section
-from gateway.reports.calibration_half_car import half_car_section
-from gateway.reports.calibration_learning import learning_section
-from gateway.reports.calibration_page import Page, page_html
-from gateway.reports.calibration_ratio_index import ratio_index_section
-from gateway.reports.calibration_runs import best_next, plan_section, provenance_section, runs_section
-from gateway.reports.calibration_spectra import spectra_section
-from gateway.reports.calibration_text import shown, span
-from gateway.reports.chart import Chart, Section
-from gateway.reports.chart_live import plotly_json, plotly_script
-from gateway.reports.chart_still import save_still
+from gateway.reports.calibration.accuracy import accuracy_section
+from gateway.reports.calibration.half_car import half_car_section
+from gateway.reports.calibration.learning import learning_section
+from gateway.reports.calibration.page import Page, page_html
+from gateway.reports.calibration.ratio_index import ratio_index_section
+from gateway.reports.calibration.runs import best_next, plan_section, provenance_section, runs_section
+from gateway.reports.calibration.spectra import spectra_section
+from gateway.reports.calibration.text import shown, span
+from gateway.reports.charts.chart import Chart, Section
+from gateway.reports.charts.live import plotly_json, plotly_script
+from gateway.reports.charts.still import save_still
 from gateway.words import counted
 
 OnChart = Callable[[int, int], None]  # (charts drawn, charts in all)

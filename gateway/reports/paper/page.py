@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gateway.core.ratio_index.index import PAPER_BANDS, Band
-from gateway.reports import reproduce_figures as draw
-from gateway.reports.reproduce_evidence import Evidence, Method
-from gateway.reports.reproduce_table import COLUMNS, Row
+from gateway.reports.paper import figures as draw
+from gateway.reports.paper.evidence import Evidence, Method
+from gateway.reports.paper.table import COLUMNS, Row
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.judgement.evidence import Evidence
 from gateway.calibration.plan.plan import Advice, Expected, Plan
 from gateway.records import Why
-from gateway.reports.calibration_text import NONE, percent, shown, span
-from gateway.reports.chart import Section, Table
+from gateway.reports.calibration.text import NONE, percent, shown, span
+from gateway.reports.charts.chart import Section, Table
 
 
 def runs_section(outcome: Outcome) -> Section:

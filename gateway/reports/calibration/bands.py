@@ -10,8 +10,8 @@ from gateway.calibration.ratio_index.choice import Tried
 from gateway.calibration.ratio_index.fit import FamilyTrial, RatioIndexFit
 from gateway.core.ratio_index.index import Band
 from gateway.records import F64
-from gateway.reports.calibration_text import NONE, shown
-from gateway.reports.chart import Axis, Cells, Chart, Marker, Panel, Points, Table
+from gateway.reports.calibration.text import NONE, shown
+from gateway.reports.charts.chart import Axis, Cells, Chart, Marker, Panel, Points, Table
 
 _NAMES: Final = {"acceleration": ("J_L", "kg"), "pitch_rate": ("J_D", "% front")}
 _MARKERS: Final[tuple[tuple[str, Marker], ...]] = (("numerator of the index", "circle"), ("denominator", "diamond"))

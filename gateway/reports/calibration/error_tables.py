@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from gateway.calibration.judgement.evidence import PART_NAMES, Judgement, Part
-from gateway.reports.calibration_text import NONE, percent, shown
-from gateway.reports.chart import Table
+from gateway.reports.calibration.text import NONE, percent, shown
+from gateway.reports.charts.chart import Table
 
 _COLUMNS: Final = ("mean |e|", "bias", "std", "max", "mean |e| %", "with misses %", "of gross %", "95 % covers")
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from gateway.errors import ConfigurationError
-from gateway.reports import reproduce_figures as draw
-from gateway.reports.figures import save
-from gateway.reports.reproduce_evidence import N_STEPS, Evidence, Method, OnStep, Scope, gather
-from gateway.reports.reproduce_page import PLATES, page
-from gateway.reports.reproduce_table import accuracy_page, rows_of, tables_of
+from gateway.reports.charts.figures import save
+from gateway.reports.paper import figures as draw
+from gateway.reports.paper.evidence import N_STEPS, Evidence, Method, OnStep, Scope, gather
+from gateway.reports.paper.page import PLATES, page
+from gateway.reports.paper.table import accuracy_page, rows_of, tables_of
 
 
 def reproduce(output: Path, scope: Scope, on_step: OnStep = lambda what, done, of: None) -> Path:

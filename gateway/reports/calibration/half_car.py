@@ -14,8 +14,8 @@ from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Vehicle
 from gateway.records import C128, F64, Spectra
-from gateway.reports.calibration_knowledge import knowledge_chart, knowledge_of, knowledge_table, told
-from gateway.reports.chart import Axis, Chart, Line, Panel, Section, Table
+from gateway.reports.calibration.knowledge import knowledge_chart, knowledge_of, knowledge_table, told
+from gateway.reports.charts.chart import Axis, Chart, Line, Panel, Section, Table
 
 
 @dataclass(frozen=True, slots=True, eq=False)

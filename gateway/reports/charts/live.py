@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
 
-from gateway.reports.chart import COLOURS, Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts.chart import COLOURS, Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
 
 _LEGEND_PX: Final = 90
 _GAP_PX: Final = 95

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.reports.reproduce_evidence import Evidence
+from gateway.reports.paper.evidence import Evidence
 
 PAPER_PCT: Final = {  # mean |error| of payload and of share, percent of 450 kg and of 20 points: the paper's section 4
     ("test1", "validation"): (5.46, 6.02),

@@ -13,8 +13,8 @@ from gateway.calibration.ratio_index.regression import fit_regression
 from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64
-from gateway.reports.figures import COLOURS, panels
-from gateway.reports.reproduce_evidence import Evidence, Method, index_table
+from gateway.reports.charts.figures import COLOURS, panels
+from gateway.reports.paper.evidence import Evidence, Method, index_table
 from gateway.units import NS_PER_S
 
 ACCELERATION = "acceleration"

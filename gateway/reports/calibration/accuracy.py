@@ -9,9 +9,9 @@ from scipy.special import ndtri
 from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
 from gateway.calibration.judgement.evidence import PART_NAMES, PART_TEXT, Judgement, Part
 from gateway.records import F64
-from gateway.reports.calibration_error_tables import batches_table, runs_table, summary_table
-from gateway.reports.calibration_text import estimator_name, percent, shown
-from gateway.reports.chart import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
+from gateway.reports.calibration.error_tables import batches_table, runs_table, summary_table
+from gateway.reports.calibration.text import estimator_name, percent, shown
+from gateway.reports.charts.chart import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
 
 _MARKERS: Final[Mapping[Part, Marker]] = {Part.LEFT_OUT: "circle", Part.VALIDATION: "diamond"}
 _COLOURS: Final[Mapping[Part, int]] = {Part.LEFT_OUT: 0, Part.VALIDATION: 1, Part.IDENTIFICATION: GREY, Part.ALL: 0}
