@@ -9,25 +9,22 @@ from dataclasses import asdict
 
 import uvicorn
 
-from gateway.bus.live.source import LiveSource, OpenReceiver
+from gateway.bus.live.source import OpenReceiver
 from gateway.bus.signals.decode import Decoder
-from gateway.config import BusSection, Settings, StoreSection
+from gateway.config import Settings
 from gateway.errors import SpringscaleError, StoreError
-from gateway.service.forwarding import uplink_of
 from gateway.service.log import log_event
 from gateway.service.notify import Notifier
+from gateway.service.parts import _source_of, _store_of, uplink_of
 from gateway.service.pipeline import Pipeline
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.setup import Setup
-from gateway.store import Retention, Store
 from gateway.uplink import uplink_settings
 from gateway.web import Board, KnownLoads, TokenFile, create_app, refuse_open_address, server_config
 
 SUPERVISE_S = 0.25
-SECONDS_PER_DAY = 86_400.0
-BYTES_PER_MB = 1_000_000
 
 OnStarted = Callable[["Gateway"], None]
 
@@ -43,25 +40,6 @@ class _Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         """Signals are the gateway's."""
         yield
-
-
-def _store_of(wanted: StoreSection) -> Store:
-    keep = Retention(
-        max_age_s=wanted.max_age_days * SECONDS_PER_DAY, max_bytes=round(wanted.max_size_mb * BYTES_PER_MB)
-    )
-    return Store.open(wanted.directory, keep)
-
-
-def _source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:
-    return LiveSource(
-        wanted.interface,
-        wanted.channel,
-        setup.signal_map,
-        options=wanted.options,
-        inbox_frames=wanted.inbox_frames,
-        silence_s=wanted.silence_s,
-        open_receiver=open_receiver,
-    )
 
 
 class Gateway:

@@ -2,9 +2,14 @@
 
 from importlib.metadata import version
 
+from gateway.bus.live.source import LiveSource, OpenReceiver
+from gateway.config import BusSection, StoreSection
 from gateway.setup import Setup
-from gateway.store import Store
+from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings
+
+SECONDS_PER_DAY = 86_400.0
+BYTES_PER_MB = 1_000_000
 
 
 def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store) -> Uplink | None:
@@ -20,3 +25,22 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store) -> Upli
     }
     # the place in the queue belongs to where letters go: another broker or branch begins from the first row
     return Uplink(wanted, Outbox(store.reader(), store, f"mqtt://{wanted.broker}/{wanted.topic}"), birth)
+
+
+def _store_of(wanted: StoreSection) -> Store:
+    keep = Retention(
+        max_age_s=wanted.max_age_days * SECONDS_PER_DAY, max_bytes=round(wanted.max_size_mb * BYTES_PER_MB)
+    )
+    return Store.open(wanted.directory, keep)
+
+
+def _source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:
+    return LiveSource(
+        wanted.interface,
+        wanted.channel,
+        setup.signal_map,
+        options=wanted.options,
+        inbox_frames=wanted.inbox_frames,
+        silence_s=wanted.silence_s,
+        open_receiver=open_receiver,
+    )
