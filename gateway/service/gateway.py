@@ -15,7 +15,7 @@ from gateway.config import Settings
 from gateway.errors import SpringscaleError, StoreError
 from gateway.service.log import log_event
 from gateway.service.notify import Notifier
-from gateway.service.parts import _source_of, _store_of, uplink_of
+from gateway.service.parts import source_of, store_of, uplink_of
 from gateway.service.pipeline import Pipeline
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
@@ -65,12 +65,12 @@ class Gateway:
         tokens = token_file if token_file.tokens() else None
         refuse_open_address(settings.web.host, has_tokens=tokens is not None)
         forwarding = uplink_settings(settings.uplink, settings.vehicle)
-        self.store = _store_of(settings.store)
+        self.store = store_of(settings.store)
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
         self.board = Board(stale_after_s=settings.web.stale_after_s)
         self._restore_board()
-        self.source = _source_of(settings.bus, setup, open_receiver)
+        self.source = source_of(settings.bus, setup, open_receiver)
         flow = setup.flow(settings.batch.for_core(is_live=True))
         self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board)
         self.uplink = uplink_of(forwarding, setup, self.store)

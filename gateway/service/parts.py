@@ -1,4 +1,4 @@
-"""The uplink of a service."""
+"""The parts of a service, each built from its section of the settings."""
 
 from importlib.metadata import version
 
@@ -27,14 +27,14 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store) -> Upli
     return Uplink(wanted, Outbox(store.reader(), store, f"mqtt://{wanted.broker}/{wanted.topic}"), birth)
 
 
-def _store_of(wanted: StoreSection) -> Store:
+def store_of(wanted: StoreSection) -> Store:
     keep = Retention(
         max_age_s=wanted.max_age_days * SECONDS_PER_DAY, max_bytes=round(wanted.max_size_mb * BYTES_PER_MB)
     )
     return Store.open(wanted.directory, keep)
 
 
-def _source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:
+def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:
     return LiveSource(
         wanted.interface,
         wanted.channel,

@@ -1,10 +1,11 @@
 """The HTTP side: latest estimate, history, stream, status, health, metrics, dashboard."""
 
 from gateway.web.app import create_app
-from gateway.web.board import Board, boot_clock_s
-from gateway.web.known_loads import KnownLoad, KnownLoads
+from gateway.web.door.serving import Tls, refuse_open_address, renew_certificate, server_config
+from gateway.web.door.tokens import Scope, Token, TokenFile
+from gateway.web.live.board import Board, boot_clock_s
 from gateway.web.reader import Reader
-from gateway.web.serving import Tls, refuse_open_address, renew_certificate, server_config
+from gateway.web.routes.known_loads import KnownLoad, KnownLoads
 from gateway.web.settings import WebSettings
 from gateway.web.status import (
     BatchCounts,
@@ -16,7 +17,6 @@ from gateway.web.status import (
     StoreStatus,
     UplinkStatus,
 )
-from gateway.web.tokens import Scope, Token, TokenFile
 
 __all__ = [
     "BatchCounts",

@@ -9,28 +9,29 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.web import pages, problems
-from gateway.web.api import api_router
-from gateway.web.board import Board
-from gateway.web.export import export_router
-from gateway.web.guard import Failures, Guard, describe_guard
-from gateway.web.headers import AnswersHead, SecurityHeaders
-from gateway.web.health import health_router
-from gateway.web.j1939 import j1939_router
-from gateway.web.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
-from gateway.web.latest import LatestFirst
-from gateway.web.metrics import metrics_registry
+from gateway.web import pages
+from gateway.web.door import problems
+from gateway.web.door.guard import Failures, Guard, describe_guard
+from gateway.web.door.headers import AnswersHead, SecurityHeaders
+from gateway.web.door.tokens import TokenFile
+from gateway.web.live.board import Board
+from gateway.web.live.latest import LatestFirst
 from gateway.web.reader import Reader
-from gateway.web.reasons import reasons_router
-from gateway.web.rfms import rfms_router
+from gateway.web.routes.estimates import api_router
+from gateway.web.routes.export import export_router
+from gateway.web.routes.health import health_router
+from gateway.web.routes.j1939 import j1939_router
+from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
+from gateway.web.routes.metrics import metrics_registry
+from gateway.web.routes.reasons import reasons_router
+from gateway.web.routes.rfms import rfms_router
+from gateway.web.routes.spectra import spectra_router
+from gateway.web.routes.tare import NoTareDesk, TareDesk, tare_router
+from gateway.web.routes.vehicle import vehicle_router
+from gateway.web.routes.vss import vss_router
+from gateway.web.routes.weights import Scales, weights_router
 from gateway.web.settings import WebSettings
-from gateway.web.spectra import spectra_router
 from gateway.web.status import Status
-from gateway.web.tare import NoTareDesk, TareDesk, tare_router
-from gateway.web.tokens import TokenFile
-from gateway.web.vehicle import vehicle_router
-from gateway.web.vss import vss_router
-from gateway.web.weights import Scales, weights_router
 
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.

@@ -10,7 +10,7 @@ from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from gateway.web.charting import LIBRARY_URL, library_response, style_ids
-from gateway.web.headers import content_security_policy
+from gateway.web.door.headers import content_security_policy
 
 ASSETS: Final = Path(str(files("gateway.web"))) / "assets"
 SWAGGER_FILES: Final = Path(str(files("fastapi_offline"))) / "static"

@@ -13,7 +13,7 @@ from support.web import Client, Gateway, serving
 
 from gateway.errors import ConfigurationError
 from gateway.web import Scope, Tls, TokenFile, WebSettings, refuse_open_address, server_config
-from gateway.web.guard import Failures, is_loopback
+from gateway.web.door.guard import Failures, is_loopback
 
 GUARDED = ["/api/v1/estimates/latest", "/api/v1/estimates", "/api/v1/status", "/api/v1/stream", "/metrics"]
 GUARDED += ["/api/v1/vehicle", "/api/v1/export.csv", "/health/ready", "/nothing", "/api/v1/estimates/latest/"]

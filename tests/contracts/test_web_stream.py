@@ -14,8 +14,9 @@ from support.patience import PATIENCE_S, until
 from support.web import Client, Gateway, Server, serving
 
 from gateway.records import Why
-from gateway.web import WebSettings, stream
-from gateway.web.fanout import QUEUE, Fanout, StreamEvent
+from gateway.web import WebSettings
+from gateway.web.live import stream
+from gateway.web.live.fanout import QUEUE, Fanout, StreamEvent
 
 
 class Listener:

@@ -12,7 +12,7 @@ import pytest
 from support.patience import PATIENCE_S, until
 from support.web import Gateway, Server, serving
 
-from gateway.web import connection
+from gateway.web.door import connection
 
 STRANGER = "127.0.0.2"  # another address of this machine
 

@@ -12,7 +12,7 @@ from gateway.cli import calibration_tare, main
 from gateway.service.pipeline import Pipeline
 from gateway.store import Store, StoreReader
 from gateway.uplink import Uplink, link
-from gateway.web import connection
+from gateway.web.door import connection
 from support.patience import PATIENCE_S
 
 CONSTANTS = (

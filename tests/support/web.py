@@ -16,7 +16,7 @@ from fastapi import FastAPI
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, State, Status, TokenFile, WebSettings, create_app, server_config
-from gateway.web.tare import TareDesk
+from gateway.web.routes.tare import TareDesk
 from support.patience import PATIENCE_S
 
 

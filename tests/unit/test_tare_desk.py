@@ -15,7 +15,7 @@ from gateway.core.tare import Refusal
 from gateway.errors import ConfigurationError, TareRefusedError
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.units import NS_PER_S
-from gateway.web.tare import TareState
+from gateway.web.routes.tare import TareState
 
 NOW_NS = 1_790_000_000 * NS_PER_S
 

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from gateway.web.headers import SECURITY_HEADERS
-from gateway.web.problems import problem_response
+from gateway.web.door.headers import SECURITY_HEADERS
+from gateway.web.door.problems import problem_response
 
 REQUEST_S: Final = 10.0  # from a connection's or a request's first byte to its last
 HEAD_BYTES: Final = 32_768  # request line and headers

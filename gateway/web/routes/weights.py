@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import Place, Weights, is_over_limit, place_of, weights_of
-from gateway.web.board import Board
+from gateway.web.live.board import Board
 
 
 class WeightFigure(BaseModel):

@@ -9,8 +9,8 @@ from typing import Any, Final
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from gateway.web.board import kind_of
-from gateway.web.fanout import Fanout, StreamEvent, Subscription
+from gateway.web.live.board import kind_of
+from gateway.web.live.fanout import Fanout, StreamEvent, Subscription
 from gateway.web.reader import Reader
 
 GRACE_S: Final = 0.2  # for the last words of a stream that ends

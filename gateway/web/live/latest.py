@@ -5,7 +5,7 @@ from typing import Final
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from gateway.web.board import Board
+from gateway.web.live.board import Board
 
 LATEST_PATH: Final = "/api/v1/estimates/latest"
 

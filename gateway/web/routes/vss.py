@@ -7,8 +7,8 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.weights import unsprung_kg
-from gateway.web.board import Board
-from gateway.web.weights import LatestWeights, Scales, weigh_latest
+from gateway.web.live.board import Board
+from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 
 _UINT16_LAST: Final = 65_535
 

@@ -9,8 +9,8 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.weights import Weights
-from gateway.web.board import Board
-from gateway.web.weights import Scales
+from gateway.web.live.board import Board
+from gateway.web.routes.weights import Scales
 
 NOT_AVAILABLE: Final = 0xFFFF  # of a two-byte parameter (SAE J1939-71, table 1)
 LARGEST: Final = 0xFAFF  # its largest valid count

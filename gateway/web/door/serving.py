@@ -9,8 +9,8 @@ import uvicorn
 from fastapi import FastAPI
 
 from gateway.errors import ConfigurationError
-from gateway.web.connection import GuardedConnection
-from gateway.web.guard import is_loopback
+from gateway.web.door.connection import GuardedConnection
+from gateway.web.door.guard import is_loopback
 
 
 @dataclass(frozen=True, slots=True)

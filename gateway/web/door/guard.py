@@ -10,8 +10,8 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Send
 from starlette.types import Scope as AsgiScope
 
-from gateway.web.problems import problem_response
-from gateway.web.tokens import Scope, TokenFile
+from gateway.web.door.problems import problem_response
+from gateway.web.door.tokens import Scope, TokenFile
 
 # Nothing of the vehicle is in these: the pages' own files, the API's description, and whether the process lives.
 PUBLIC: Final = ("/assets/", "/swagger/")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.records import Estimate, Why, estimate_to_json, json_line
-from gateway.web.fanout import Fanout, StreamEvent
+from gateway.web.live.fanout import Fanout, StreamEvent
 
 Record = Mapping[str, Any]
 

@@ -13,14 +13,14 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
 from gateway.records import json_line
-from gateway.web.board import Board
 from gateway.web.instant import Instant
-from gateway.web.latest import LatestResponse
+from gateway.web.live.board import Board
+from gateway.web.live.latest import LatestResponse
+from gateway.web.live.stream import EVENT_SCHEMA, EventStream
 from gateway.web.reader import Page, Reader
 from gateway.web.schemas import EstimatesPage, Latest, problem_responses
 from gateway.web.settings import PAGE_LIMIT, WebSettings
 from gateway.web.status import Status
-from gateway.web.stream import EVENT_SCHEMA, EventStream
 
 PREFIX: Final = "/api/v1"
 JSON: Final = "application/json"

@@ -14,7 +14,7 @@ from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.ratio_index.index import Band
 from gateway.records import Spectra as SpectraSeen
 from gateway.records import json_line, spectra_from_json, spectra_to_json
-from gateway.web.board import Board, Record
+from gateway.web.live.board import Board, Record
 from gateway.web.schemas import Spectra
 
 HEAD = ("id", "t_start", "t_end", "estimator", "rejected", "payload_kg", "front_share_pct")

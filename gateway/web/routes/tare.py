@@ -11,7 +11,7 @@ from starlette.responses import Response
 
 from gateway.errors import TareRefusedError
 from gateway.records import json_line
-from gateway.web.problems import problem_response
+from gateway.web.door.problems import problem_response
 from gateway.web.schemas import problem_responses
 
 TARE_PATH: Final = "/calibration/tare"
