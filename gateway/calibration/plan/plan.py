@@ -17,7 +17,6 @@ from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATIO
 from gateway.calibration.half_car.prior import prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import Design
-from gateway.calibration.plan.index_design import IndexDesign, IndexSpread
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.vehicle import Vehicle
@@ -38,14 +37,12 @@ class Expected:
     """How well the vehicle would be weighed: standard deviations over the loads it carries.
 
     ``reach_share`` (0..1) of those loads lie within what was driven, so that an answer is not refused
-    as ``out_of_range``; None while one load alone was driven. ``ratio_index`` is None where it is not
-    calibrated.
+    as ``out_of_range``; None while one load alone was driven.
     """
 
     payload_std_kg: float
     front_share_std_pct: float
     reach_share: float | None
-    ratio_index: IndexSpread | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,12 +114,8 @@ def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> Plan:
         )
     runs = [one.identification for one in outcome.split]
     drive = usual_drive(runs)
-    index = None
-    if outcome.ratio_index is not None:
-        calibration = outcome.ratio_index.calibration
-        index = IndexDesign(calibration, vehicle, found.parameters, drive.speed_mps, weighed_loads(vehicle))
     inflation = found.payload_inflation, found.front_share_inflation
-    planner = _Planner(vehicle, found.parameters, drive, inflation, index)
+    planner = _Planner(vehicle, found.parameters, drive, inflation)
     driven = tuple(PlacedLoad(run.payload_kg, None, run.front_share_pct) for run in runs)
     return Plan(
         vehicle=vehicle.name,
@@ -157,13 +150,11 @@ class _Planner:
         theta: F64,
         drive: Drive,
         inflation: tuple[float, float] = (UNTESTED_INFLATION, UNTESTED_INFLATION),
-        index: IndexDesign | None = None,
     ) -> None:
         self._loads = drivable_loads(vehicle)
         self._targets = weighed_loads(vehicle)
         self._design = Design(vehicle, theta, drive, self._targets)
         self._inflation = inflation
-        self._index = index
 
     def advice(self, covariance: F64, driven: Loads, n_runs: int) -> tuple[Advice, ...]:
         """The most useful run, then the most useful after that one, and so on."""
@@ -191,5 +182,4 @@ class _Planner:
             payload_std_kg=self._inflation[0] * spread.payload_std_kg,
             front_share_std_pct=self._inflation[1] * spread.front_share_std_pct,
             reach_share=share_within_reach(self._targets, (*driven, *new)),
-            ratio_index=self._index.spread(new) if self._index else None,
         )

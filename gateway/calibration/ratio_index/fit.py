@@ -26,7 +26,6 @@ from gateway.calibration.ratio_index.choice import (
     n_answered,
     truth,
 )
-from gateway.calibration.ratio_index.diagnostics import Diagnostics, diagnose
 from gateway.calibration.ratio_index.structures import FAMILIES, Family, StructureChoice
 from gateway.calibration.ratio_index.table import IndexTable, index_table
 from gateway.core.ratio_index.index import RatioIndexCalibration, SpectrumKind
@@ -83,8 +82,6 @@ class RatioIndexFit:
     table: IndexTable
     trials: tuple[FamilyTrial, ...]
     band_maps: tuple[BandMap, ...] = ()
-    payload_diagnostics: Diagnostics | None = None
-    front_share_diagnostics: Diagnostics | None = None
 
     @property
     def chosen(self) -> FamilyTrial:
@@ -131,16 +128,7 @@ def fit_ratio_index(
         table=table,
         trials=trials,
         band_maps=band_maps(table),
-        payload_diagnostics=_diagnosed(table, chosen.choice, 0),
-        front_share_diagnostics=_diagnosed(table, chosen.choice, 1),
     )
-
-
-def _diagnosed(table: IndexTable, choice: Choice, row: int) -> Diagnostics | None:
-    tried = choice.tried[row]
-    if tried is None:
-        return None
-    return diagnose(tried.fitted, *indexes(table, choice.pairs), truth(table, TARGETS[row]), table.run)
 
 
 def _family_trials(

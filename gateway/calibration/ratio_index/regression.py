@@ -15,14 +15,12 @@ RIDGE: Final = 1e-12  # of the Gram matrix's mean diagonal: solves what a left-o
 class FittedRegression:
     """A regression and its errors (n,) on runs left out, estimate less truth.
 
-    residuals (n,) are of the fit itself, target less fit. covariance (p + 1, p + 1) is of the
-    coefficients, by jackknife over runs, so batches of a run may share whatever error they like
-    (Efron and Tibshirani, An Introduction to the Bootstrap, ch. 11).
+    covariance (p + 1, p + 1) is of the coefficients, by jackknife over runs, so batches of a run may share
+    whatever error they like (Efron and Tibshirani, An Introduction to the Bootstrap, ch. 11).
     """
 
     model: RegressionModel
     held_out_errors: F64
-    residuals: F64
     covariance: F64
 
 
@@ -54,7 +52,7 @@ def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I
         dof=float(n_runs - 1),
     )
     covariance = (n_runs - 1.0) / n_runs * moved.T @ moved
-    return FittedRegression(model, errors, target - columns @ coefficients, covariance)
+    return FittedRegression(model, errors, covariance)
 
 
 def without_each_run(columns: F64, target: F64, run: I64) -> tuple[F64, F64]:

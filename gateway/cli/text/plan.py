@@ -1,7 +1,7 @@
 """A plan as sentences a fitter understands."""
 
 from gateway.calibration.plan.loads import PlacedLoad
-from gateway.calibration.plan.plan import Advice, Expected, Plan
+from gateway.calibration.plan.plan import Expected, Plan
 
 
 def plan_sentences(plan: Plan) -> str:
@@ -17,8 +17,7 @@ def plan_sentences(plan: Plan) -> str:
     ]
     if plan.least is not None:
         lines.append(f"least useful would be: {_load(plan.least.load)}: then {_expected(plan.least.expected)}")
-    index = _ratio_index(plan)
-    return "\n".join([*lines, index] if index else lines)
+    return "\n".join(lines)
 
 
 def _now(plan: Plan) -> str:
@@ -38,23 +37,3 @@ def _expected(expected: Expected) -> str:
     if expected.reach_share is None:
         return text
     return f"{text}, {100.0 * expected.reach_share:.0f} % of the loads it may carry within reach"
-
-
-def _ratio_index(plan: Plan) -> str | None:
-    """One line for the other estimator, where it is calibrated."""
-    if plan.now is None or plan.now.ratio_index is None or not plan.advice:
-        return None
-    now, then = plan.now.ratio_index, _first(plan.advice).ratio_index
-    pairs = [
-        f"{what} +- {before:.{digits}f} to +- {after:.{digits}f} {unit}"
-        for what, before, after, unit, digits in (
-            ("payload", now.payload_std_kg, then and then.payload_std_kg, "kg", 0),
-            ("share", now.front_share_std_pct, then and then.front_share_std_pct, "points", 1),
-        )
-        if before is not None and after is not None
-    ]
-    return f"for the ratio index the first of these would bring {', '.join(pairs)}" if pairs else None
-
-
-def _first(advice: tuple[Advice, ...]) -> Expected:
-    return advice[0].expected

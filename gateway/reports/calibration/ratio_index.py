@@ -44,17 +44,10 @@ def ratio_index_section(
     return Section(
         "ratio-index",
         "Ratio index",
-        tuple(_warnings(fit)),
+        (),
         (*((maps,) if maps else ()), chart),
         (_bands_table(calibration), trials_table(fit), *_model_tables(fit)),
     )
-
-
-def _warnings(fit: RatioIndexFit) -> Iterator[str]:
-    """What residuals and columns say against the regressions."""
-    for target, found in (("payload", fit.payload_diagnostics), ("front share", fit.front_share_diagnostics)):
-        if found is not None and found.warnings:
-            yield f"Against the regression of {target}: {'; '.join(found.warnings)}."
 
 
 def _panels(name: str, fitted: IndexRows, later: IndexRows, model: RegressionModel | None) -> list[Panel]:
