@@ -39,7 +39,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_readme_table.py --check
 
 bench: .venv/.development
-	for bench in benchmarks/bench_*.py; do echo "== $$bench"; $(BIN)/python $$bench || exit 1; done
+	for what in day decode live simulator web; do echo "== $$what"; $(BIN)/python -m benchmarks.speed.$$what || exit 1; done
 
 # The installed package on a real vcan0 under real systemd, in a small virtual machine: wants root, /dev/net/tun and the
 # Debian packages that .ci/run names; skips with a reason without them. One machine on each of two processors.
@@ -60,7 +60,7 @@ vcan: .venv/.package
 SOAK_TESTS := tests/vm/test_4_process_faults.py::test_killed_again_and_again_it_loses_and_doubles_nothing \
 	tests/vm/test_6_power.py
 soak: .venv/.development deb
-	$(BIN)/python benchmarks/soak.py --output build/soak.json
+	$(BIN)/python -m benchmarks.speed.soak --output build/soak.json
 	rm -f build/vm-soak.json
 	SPRINGSCALE_VM_RESULTS=vm-soak.json SPRINGSCALE_KILLS=200 SPRINGSCALE_POWER_CUTS=30 \
 		$(BIN)/python -m pytest -n 2 --dist loadfile $(SOAK_TESTS)

@@ -1,7 +1,7 @@
 """Writes README.md's table of errors from the numbers beside this file; with --check only tells if it is up to date.
 
-accuracy.json comes from `springscale reproduce`, coverage.json from `springscale study coverage`, learning_curve.json
-from `springscale study learning-curve` on the recorded campaign of another simulator.
+accuracy.json comes from `springscale reproduce`, coverage.json from `python -m benchmarks.accuracy coverage`,
+learning_curve.json from its `learning-curve` on the recorded campaign of another simulator.
 """
 
 import json

@@ -12,7 +12,6 @@ import click
 from gateway.errors import SpringscaleError
 
 _COMMANDS = {
-    "bounds": ("gateway.cli.bounds", "bounds", "Theoretical limits of accuracy: what no estimator can beat."),
     "calibrate": ("gateway.cli.calibrate", "calibrate", "Make a calibration file from drives with known loads."),
     "calibration": (
         "gateway.cli.calibration",
@@ -35,11 +34,6 @@ _COMMANDS = {
     ),
     "run": ("gateway.cli.run", "run", "Run the service."),
     "simulate": ("gateway.cli.simulate", "simulate", "Simulate drives, as log files or onto a bus."),
-    "study": (
-        "gateway.cli.study",
-        "study",
-        "Experiments on calibration: fewer runs, advised runs, coverage.",
-    ),
     "token": ("gateway.cli.token", "token_commands", "Make, list and revoke access tokens for other machines."),
 }
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.half_car_road import batch_over_road
 from support.web import Client, Gateway
 
 from gateway.calibration.file.calibration_file import load_calibration
@@ -16,7 +17,6 @@ from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.spectrum import spectra_of
 from gateway.records import Estimate, Spectra, Why, estimate_to_json, spectra_from_json
 from gateway.web import Board, create_app
-from tests.support.half_car_road import batch_over_road
 
 SPEED_MPS = 14.0
 

@@ -1,6 +1,6 @@
 """docs/learning_curve.md, advice.md and coverage.md say what the numbers beside them say, and nothing else.
 
-They come from `springscale study NAME --output DIR`: NAME.md, and its numbers NAME.json.
+They come from `python -m benchmarks.accuracy NAME --output DIR`: NAME.md, and its numbers NAME.json.
 """
 
 import json
@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from gateway.calibration.coverage_table import ALL_KINDS
-from gateway.offline.coverage_drives import TRIPS
-from gateway.reports.coverage_page import coverage_page
-from gateway.reports.study_pages import advice_page, learning_curve_page
+from benchmarks.accuracy.coverage_drives import TRIPS
+from benchmarks.accuracy.coverage_page import coverage_page
+from benchmarks.accuracy.coverage_table import ALL_KINDS
+from benchmarks.accuracy.pages import advice_page, learning_curve_page
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.half_car_road import CAR, VAN, batch_over_road
 
 from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.half_car.prior import prior_of
@@ -17,7 +18,6 @@ from gateway.core.cross_spectrum.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.measured import log_amplitude_of
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, in_units
 from gateway.records import Batch
-from tests.support.half_car_road import CAR, VAN, batch_over_road
 
 ROADS_MPS2 = (0.4, 0.8, 1.4)
 MOVED_MPS2 = 0.8  # where friction makes up these shares of a rate

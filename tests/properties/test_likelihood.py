@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.half_car_road import VAN, batch_over_road
 
 from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
 from gateway.core.cross_spectrum.parameters import PARAMETERS, Ground
-from tests.support.half_car_road import VAN, batch_over_road
 
 GROUND = Ground(VAN.empty_mass_kg, VAN.empty_front_share_pct / 100.0, VAN.wheelbase_m)
 READING = Reading(VAN.wheelbase_m, (1.1, 14.0), 256)
@@ -94,9 +94,10 @@ def test_masked_samples_leave_no_trace() -> None:
 
 
 def test_the_bound_shrinks_with_the_root_of_time() -> None:
+    from benchmarks.accuracy.sensor_bounds import cramer_rao
     from gateway.calibration.half_car.fit import calibrate_cross_spectrum
     from gateway.calibration.known_run import KnownRun
-    from gateway.core.cross_spectrum.ideal_drive import Drive, cramer_rao
+    from gateway.core.cross_spectrum.ideal_drive import Drive
 
     run = KnownRun(1, "empty", 0.0, 52.0, (batch_over_road(0.0, 52.0, seed=4),))
     calibration = calibrate_cross_spectrum([run], VAN)

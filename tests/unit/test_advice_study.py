@@ -8,16 +8,15 @@ import pytest
 from support.half_car_road import VAN
 from support.known_runs import campaign, split_run
 
-from gateway.calibration.advice_study import AdviceStudy, Choice, compared
+from benchmarks.accuracy import advice
+from benchmarks.accuracy.advice import AdviceStudy, Choice, advice_of, compared
+from benchmarks.accuracy.pages import advice_page
 from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
-from gateway.cli.study_text import advice_table
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
-from gateway.offline import advice_study
-from gateway.offline.advice_study import advice_of
 from gateway.records import Why
 
 CHOICES = [
@@ -51,7 +50,7 @@ def test_the_comparison_by_hand() -> None:
     assert found.best == (1.5, 2.0)  # (2, 3) before (4, 2): the smaller sum
     assert found.worst == (7.0, 7.5)
     assert found.better_share == (0.5, 0.5)
-    assert "over 2 triples" in advice_table(AdviceStudy("van", found, found))
+    assert "each of 2 triples" in advice_page(AdviceStudy("van", found, found).to_json())
 
 
 def test_a_choice_that_answered_nothing_is_worst_by_hindsight_and_in_no_mean() -> None:
@@ -82,7 +81,7 @@ def test_every_set_of_runs_is_calibrated_once_and_from_identification_parts(monk
         given.append(tuple(runs))
         return CalibratedVehicle("always", vehicle, (0.0, 400.0), (40.0, 60.0), cross_spectrum=known)
 
-    monkeypatch.setattr(advice_study, "calibrated_on", stand_in)
+    monkeypatch.setattr(advice, "calibrated_on", stand_in)
     steps: list[tuple[int, int]] = []
     found = advice_of(split, VAN, name="van", on_fit=lambda done, of: steps.append((done, of)))
     identification = {one.identification.number: one.identification for one in split}

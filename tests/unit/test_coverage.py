@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
-from gateway.calibration.coverage_table import ALL_KINDS, JudgedBatch, coverage_table
+from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_table
 from gateway.calibration.judgement.coverage import coverage_of
 
 

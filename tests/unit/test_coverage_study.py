@@ -7,13 +7,8 @@ import pytest
 from support.calibrated import ratio_index_calibration
 from support.half_car_road import batch_over_road
 
-from gateway.calibration.known_run import KnownRun
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.vehicle import Vehicle
-from gateway.core.vehicle import front_share_pct as stated_share_pct
-from gateway.errors import CalibrationImpossibleError
-from gateway.offline import coverage
-from gateway.offline.coverage_drives import (
+from benchmarks.accuracy import coverage
+from benchmarks.accuracy.coverage_drives import (
     AS_CALIBRATED,
     TRIPS,
     Scope,
@@ -24,6 +19,11 @@ from gateway.offline.coverage_drives import (
     stated,
     unseen_load,
 )
+from gateway.calibration.known_run import KnownRun
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import front_share_pct as stated_share_pct
+from gateway.errors import CalibrationImpossibleError
 from gateway.sim.vehicle import Load, front_share_pct, payload_kg
 from gateway.sim.vehicle import Vehicle as Van
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.half_car_road import CAR, VAN, batch_of, batch_over_road
 
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
@@ -19,7 +20,6 @@ from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch, Estimate, Why
-from tests.support.half_car_road import CAR, VAN, batch_of, batch_over_road
 
 KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
 

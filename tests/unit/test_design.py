@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from support.half_car_road import CAR, VAN
 from support.known_runs import known_run
 
+from benchmarks.accuracy.sensor_bounds import cramer_rao
 from gateway.calibration.half_car.fit import calibrate_cross_spectrum, fit_half_car, half_car_calibration
 from gateway.calibration.half_car.known_spectra import known_spectra
 from gateway.calibration.half_car.prior import prior_of
@@ -19,7 +20,7 @@ from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, sh
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.drift import DRIFT_STD
 from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration, locate
-from gateway.core.cross_spectrum.ideal_drive import Drive, cramer_rao, expected_of, steady_spectra
+from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.vehicle import front_share_pct

@@ -10,6 +10,7 @@ from support.calibrated import ratio_index_calibration
 from support.half_car_road import VAN
 from support.known_runs import campaign
 
+from benchmarks.accuracy.pages import learning_curve_page
 from gateway.calibration.judgement import learning_curve
 from gateway.calibration.judgement.learning_curve import (
     LearningCurve,
@@ -22,7 +23,6 @@ from gateway.calibration.judgement.learning_curve import (
     triples_at_different_positions,
 )
 from gateway.calibration.known_run import KnownRun
-from gateway.cli.study_text import learning_curve_table
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError
@@ -127,7 +127,7 @@ def test_a_curve_tries_every_size_and_every_triple_once(fits: Fits) -> None:
     assert curve.rungs[2].left_out.n_trials == 0  # nothing is left out of four
     assert curve.rungs[2].validation.n_trials == 1
     assert curve.triple_rungs[0].n_subsets == 3
-    assert "every triple" in learning_curve_table(curve)
+    assert "every triple" in learning_curve_page(curve.to_json())
     assert len(curve.to_json()["trials"]) == 6
 
 

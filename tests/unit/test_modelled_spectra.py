@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.half_car_road import CAR, VAN, batch_over_road
 
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
@@ -11,7 +12,6 @@ from gateway.core.cross_spectrum.measured import Reading, cross_spectra_of
 from gateway.core.cross_spectrum.parameters import PARAMETERS, is_positive
 from gateway.core.spectrum import spectra_of
 from gateway.records import F64, Spectra
-from tests.support.half_car_road import CAR, VAN, batch_over_road
 
 SPEED_MPS = 14.0
 DELAY_S = VAN.wheelbase_m / SPEED_MPS

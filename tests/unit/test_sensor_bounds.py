@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from support.half_car_road import VAN
 
+from benchmarks.accuracy.__main__ import studies
+from benchmarks.accuracy.bounds import MILD
+from benchmarks.accuracy.sensor_bounds import SPEED, Scene, Seen, bound_of
 from gateway.calibration.half_car.prior import prior_of
-from gateway.cli import springscale
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import Reading
 from gateway.core.cross_spectrum.parameters import Ground
-from gateway.core.sensor_bounds import SPEED, Scene, Seen, bound_of
-from gateway.offline.bounds import MILD
-from tests.support.half_car_road import VAN
 
 METHOD = Path(__file__).parents[2] / "docs" / "method.md"
 SCENE = Scene(
@@ -77,6 +77,6 @@ def test_without_slack_or_noise_nothing_would_limit_the_full_matrix() -> None:
 
 
 def test_the_page_shows_what_the_command_prints() -> None:
-    printed = CliRunner().invoke(springscale, ["bounds"], catch_exceptions=False)
+    printed = CliRunner().invoke(studies, ["bounds"], catch_exceptions=False)
     assert printed.exit_code == 0
     assert printed.stdout in METHOD.read_text(encoding="utf-8")

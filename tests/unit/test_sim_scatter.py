@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gateway.sim.scatter import FROM_DAY_TO_DAY, OF_TYPES, Scatter, scattered
+from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, Scatter, scattered
 from gateway.sim.vans import PAPER_VAN
 
 

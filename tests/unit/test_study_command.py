@@ -1,15 +1,16 @@
-"""springscale study: what is printed and written, with stand-ins for the minutes of work."""
+"""python -m benchmarks.accuracy: what is printed and written, with stand-ins for the minutes of work."""
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
-from gateway.calibration.advice_study import AdviceStudy, Choice, compared
-from gateway.calibration.coverage_table import JudgedBatch, coverage_table
+from benchmarks.accuracy import __main__ as command
+from benchmarks.accuracy.advice import AdviceStudy, Choice, compared
+from benchmarks.accuracy.coverage_table import JudgedBatch, coverage_table
 from gateway.calibration.judgement.learning_curve import LearningCurve, Score, Trial
-from gateway.cli import springscale, study
 
 SCORE = Score(3, 1, 2.5, 1.0, 1.25, 0.5)
 CURVE = LearningCurve(
@@ -36,25 +37,27 @@ payload_kg = 0.0
 
 
 @pytest.fixture
-def campaign(tmp_path: Path) -> str:
+def campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A campaign file whose log is not read."""
+    monkeypatch.setattr(command, "inspect", lambda *_, **__: SimpleNamespace(usable=()))
     (tmp_path / "can.log").touch()
     (tmp_path / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
     return str(tmp_path / "campaign.toml")
 
 
 def run(*arguments: str) -> str:
-    found = CliRunner().invoke(springscale, ["study", *arguments], catch_exceptions=False)
+    found = CliRunner().invoke(command.studies, list(arguments), catch_exceptions=False)
     assert found.exit_code == 0, found.output
     return found.stdout
 
 
 def test_a_learning_curve_is_told_and_written(campaign: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study, "study_learning_curve", lambda *_, **__: CURVE)
+    monkeypatch.setattr(command.on_learning, "curve_of", lambda *_, **__: CURVE)
     told = run("learning-curve", campaign, "--output", str(tmp_path / "out"))
     assert "no calibration" in told
-    assert "2.5 +- 0.0 %" in told
+    assert "2.5 +- 0.0" in told
     written = json.loads((tmp_path / "out/learning_curve.json").read_text(encoding="utf-8"))
-    assert json.loads(run("learning-curve", campaign, "--json")) == written
+    assert json.loads(json.dumps(CURVE.to_json())) == written
     page = (tmp_path / "out/learning_curve.md").read_text(encoding="utf-8")
     assert "| 2 | ratio index | 1 | 1 | no calibration |" in page
     assert (
@@ -63,8 +66,8 @@ def test_a_learning_curve_is_told_and_written(campaign: str, tmp_path: Path, mon
 
 
 def test_the_advice_is_told_and_written(campaign: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study, "advice_study", lambda *_, **__: AdviceStudy("van", COMPARISON, COMPARISON))
-    assert "8.00 %  6.00 %" in run("advice", campaign, "--output", str(tmp_path / "out"))
+    monkeypatch.setattr(command.on_advice, "advice_of", lambda *_, **__: AdviceStudy("van", COMPARISON, COMPARISON))
+    assert "| 8.00 | 6.00 |" in run("advice", campaign, "--output", str(tmp_path / "out"))
     page = (tmp_path / "out/advice.md").read_text(encoding="utf-8")
     assert "| and the fourth that the plan advises | 2.00 | 3.00 | 2.00 | 3.00 |" in page
     assert "From each of 1 triples" in page
@@ -82,10 +85,10 @@ def test_coverage_says_whether_it_falls_short(
     ]
     refused = JudgedBatch("b", "b 1", "mixed", "cross_spectrum", ("gap",), 9.0, 9.0, False, False)
     table = coverage_table([*batches, refused], seed=4, refused=["b: ratio_index: too few"])
-    monkeypatch.setattr(study.coverage_study, "coverage", lambda *_, **__: table)
+    monkeypatch.setattr(command.on_coverage, "coverage", lambda *_, **__: table)
     page = run("coverage", "--output", str(tmp_path / "out"))
     assert f"cross spectrum, all drives, payload: {100 - n_missed // 2} %" in page
     assert verdict in page
     assert "| 201 | 201 | 1: 1 gap |" in page
     assert "- b: ratio_index: too few" in page
-    assert (tmp_path / "out/coverage.md").read_text(encoding="utf-8") + "\n" == page
+    assert (tmp_path / "out/coverage.md").read_text(encoding="utf-8") == page

@@ -1,22 +1,13 @@
-"""How well anyone could weigh: Cramer-Rao bounds of payload and front share for a given vehicle and drive.
+"""What a steady drive would show on average: the spectra that a load not driven yet can be expected to give."""
 
-The expected information of the likelihood, with the road's level unknown at every frequency, is
-inverted for (payload, share) and whatever else is not known. No estimator without bias has a smaller
-standard deviation; a real vehicle is not the half-car, so that errors stay above it.
-
-(C. R. Rao 1945; H. Cramer 1946; for spectra P. Whittle 1953.)
-"""
-
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model
-from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
-from gateway.core.cross_spectrum.parameters import INDEX, Ground
+from gateway.core.cross_spectrum.parameters import Ground
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import F64
 
@@ -29,38 +20,6 @@ class Drive:
 
     duration_s: float
     speed_mps: float
-
-
-@dataclass(frozen=True, slots=True)
-class Bound:
-    """Smallest standard deviations that are possible."""
-
-    payload_std_kg: float
-    front_share_std_pct: float
-
-
-def cramer_rao(
-    calibration: CrossSpectrumCalibration,
-    payload_kg: float,
-    front_share_pct: float,
-    drive: Drive,
-    unknown: Mapping[str, float] | None = None,
-) -> Bound:
-    """The bound at one load, the vehicle being the calibrated one.
-
-    ``unknown`` maps parameter names (parameters.PARAMETERS) to the standard deviation of what is
-    known of them beforehand (of the logarithm, where these are positive quantities); the others are
-    taken as known. Slack counts as part of the vehicle: it is what model error and roll leave.
-    """
-    priors = dict(unknown or {})
-    free = [INDEX[name] for name in priors]
-    point = Point(calibration.parameters, payload_kg, front_share_pct / 100.0)
-    spectra = expected_of(steady_spectra(calibration.reading, drive), point, calibration.ground)
-    whittle = Whittle(spectra, calibration.ground)
-    information = whittle.curvature(point, free, is_load_free=True).information
-    information += np.diag(np.r_[np.array(list(priors.values())) ** -2.0, 0.0, 0.0])
-    payload_var, share_var = np.diag(np.linalg.inv(information))[-2:]
-    return Bound(float(np.sqrt(payload_var)), 100.0 * float(np.sqrt(share_var)))
 
 
 def expected_of(spectra: CrossSpectra, point: Point, ground: Ground) -> CrossSpectra:

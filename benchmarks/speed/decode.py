@@ -1,6 +1,6 @@
 """Bulk decoding of a candump log, beside python-can + cantools and `wc -l` in the same run.
 
-    python benchmarks/bench_decode.py [--minutes 5] [--log FILE] [--json]
+    python -m benchmarks.speed.decode [--minutes 5] [--log FILE] [--json]
 
 Makes a log of a 500 kbit/s bus (2500 frames/s, 60 identifiers, a fifth of them 29-bit, three of them ours)
 and reads it into arrays of time, acceleration, pitch rate and speed. Each path runs in a process of its own;
@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import can
 import cantools
@@ -61,7 +62,7 @@ def make_log(path: Path, minutes: float) -> int:
     return n_total
 
 
-def _ours(rng, begin_ns, can_id, length, n, every_ms):
+def _ours(rng: np.random.Generator, begin_ns: int, can_id: int, length: int, n: int, every_ms: int) -> Frames:
     payload = np.zeros((n, 8), np.uint8)
     payload[:, :length] = rng.integers(0, 100, (n, length), np.uint8)
     payload[:, length - 1] = 3 if can_id == 0x130 else 1  # Fix, or the valid bit
@@ -69,7 +70,7 @@ def _ours(rng, begin_ns, can_id, length, n, every_ms):
     return Frames(t_ns, np.full(n, can_id, np.uint32), np.full(n, length, np.uint8), payload)
 
 
-def run_springscale(path: Path) -> dict:
+def run_springscale(path: Path) -> dict[str, Any]:
     """Read and decode the whole log with ours."""
     signal_map = load_signal_map("springscale:reference")
     seconds = []
@@ -82,9 +83,9 @@ def run_springscale(path: Path) -> dict:
     return {"frames": report.frames, "samples": n_rows, "seconds": min(seconds)}
 
 
-def run_peer(path: Path) -> dict:
+def run_peer(path: Path) -> dict[str, Any]:
     """The first frames with python-can's reader, mapped ones decoded by cantools."""
-    database = cantools.database.load_file(shipped_map("reference").with_name("springscale_reference.dbc"))
+    database: Any = cantools.database.load_file(shipped_map("reference").with_name("springscale_reference.dbc"))
     messages = {message.frame_id: message for message in database.messages}
     columns: list[tuple[float, float]] = []
     n_frames = 0
@@ -98,7 +99,7 @@ def run_peer(path: Path) -> dict:
     return {"frames": n_frames, "samples": len(columns), "seconds": time.perf_counter() - begun}
 
 
-def run_wc(path: Path) -> dict:
+def run_wc(path: Path) -> dict[str, Any]:
     """The physical limit of looking at every line."""
     seconds = []
     for _ in range(REPEATS):
@@ -108,7 +109,7 @@ def run_wc(path: Path) -> dict:
     return {"frames": n_lines, "seconds": min(seconds)}
 
 
-def run_inflate(path: Path) -> dict:
+def run_inflate(path: Path) -> dict[str, Any]:
     """What inflating alone costs, for the gzip row."""
     seconds = []
     for _ in range(REPEATS):
@@ -122,20 +123,19 @@ def run_inflate(path: Path) -> dict:
 RUNS = {"springscale": run_springscale, "python-can + cantools": run_peer, "wc -l": run_wc, "inflate": run_inflate}
 
 
-def in_own_process(name: str, path: Path) -> dict:
+def in_own_process(name: str, path: Path) -> dict[str, Any]:
     """Run one path in a fresh Python; adds its peak memory."""
-    command = [sys.executable, __file__, "--run", name, "--log", str(path)]
+    command = [sys.executable, "-m", "benchmarks.speed.decode", "--run", name, "--log", str(path)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return json.loads(done.stdout)
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
-def measure(path: Path) -> dict:
+def measure(path: Path) -> dict[str, Any]:
     """All rows and the ratios the goals are about."""
     rows = {name: in_own_process(name, path) for name in ("wc -l", "springscale", "python-can + cantools")}
     packed = path.with_suffix(".log.gz")
-    with igzip.open(packed, "wb") as file, path.open("rb") as plain:
-        while block := plain.read(1 << 20):
-            file.write(block)
+    packed.write_bytes(igzip.compress(path.read_bytes()))
     rows["inflate"] = in_own_process("inflate", packed)
     rows["springscale, gzip"] = in_own_process("springscale", packed)
     packed.unlink()
@@ -150,7 +150,7 @@ def measure(path: Path) -> dict:
     }
 
 
-def show(result: dict, n_frames: int, log_mb: float) -> None:
+def show(result: dict[str, Any], n_frames: int, log_mb: float) -> None:
     print(f"{n_frames:,} frames, {log_mb:.0f} MB of text\n")
     print(f"{'path':<24}{'ns/frame':>10}{'Mframes/s':>11}{'peak MB':>9}")
     for name, row in result["rows"].items():

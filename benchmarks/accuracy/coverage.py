@@ -12,11 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.coverage_table import CoverageTable, JudgedBatch, coverage_table, judged_batches
-from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all
-from gateway.config import ESTIMATOR_NAMES
-from gateway.errors import CalibrationImpossibleError
-from gateway.offline.coverage_drives import (
+from benchmarks.accuracy.coverage_drives import (
     AS_CALIBRATED,
     TRIPS,
     Scope,
@@ -26,6 +22,10 @@ from gateway.offline.coverage_drives import (
     stated,
     unseen_load,
 )
+from benchmarks.accuracy.coverage_table import CoverageTable, JudgedBatch, coverage_table, judged_batches
+from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all
+from gateway.config import ESTIMATOR_NAMES
+from gateway.errors import CalibrationImpossibleError
 
 SEED: Final = 20261
 OnVan = Callable[[int, int], None]  # (vans done, vans in all)

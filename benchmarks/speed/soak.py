@@ -14,6 +14,8 @@ import sys
 import threading
 import time
 import urllib.request
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
@@ -78,11 +80,11 @@ class EndlessDrive:
     def close(self) -> None:
         """Nothing to give back."""
 
-    def _all_bursts(self):  # type: ignore[no-untyped-def]  # an endless generator of Frames
+    def _all_bursts(self) -> Iterator[Frames]:
         for day in range(self._n_days):
             for drive in range(self._drives_a_day):
                 later_ns = day * DAY_S * NS_PER_S + drive * self._length_ns
-                for begin, end in zip(self._edges, self._edges[1:], strict=False):
+                for begin, end in pairwise(self._edges):
                     part = take(self._drive, slice(begin, end))
                     yield Frames(part.t_ns + later_ns, part.can_id, part.length, part.payload)
             self.days_done = day + 1
@@ -119,7 +121,7 @@ def soak(hours_a_day: float, n_days: int) -> list[dict[str, float]]:
     with TemporaryDirectory() as folder:
         config = Path(folder) / "springscale.toml"
         config.write_text(SETTINGS)
-        shutil.copy(Path(__file__).parents[1] / "gateway/demo/paper_van.json", Path(folder) / "vehicle.json")
+        shutil.copy(Path(__file__).parents[2] / "gateway/demo/paper_van.json", Path(folder) / "vehicle.json")
         settings = load_settings(config)
 
         def on_started(gateway: Gateway) -> None:

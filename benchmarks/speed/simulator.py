@@ -1,9 +1,10 @@
 """How fast the simulator drives: seconds of driving per second of one core.
 
-Run: python benchmarks/bench_simulator.py
+Run: python -m benchmarks.speed.simulator
 """
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def main() -> None:
     road = iso_road("B").lay(drive.travelled_m[-1] + 50.0, rng)
     recording = simulate_drive(PAPER_VAN, loads, PaperRoad(), drive, REFERENCE, 1).recording
     wiring = Wiring("reference")
-    stages = {
+    stages: dict[str, Callable[[], object]] = {
         "vehicle alone, 1 kHz": lambda: ride(PAPER_VAN, loads, road, drive),
         "road, vehicle, sensors": lambda: simulate_drive(PAPER_VAN, loads, iso_road("B"), drive, REFERENCE, 1),
         "encoding to frames": lambda: wiring.frames_of(recording),

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, scattered
 from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.signal_map import SHIPPED_PREFIX, load_signal_map
 from gateway.calibration.known_run import KnownRun
@@ -16,7 +17,6 @@ from gateway.offline.batches import batches_of_motion
 from gateway.sim.drive import Drive, constant, motorway, rural, urban
 from gateway.sim.obstacles import ObstacleRoad, UnevenRoad
 from gateway.sim.road import RoadRecipe, iso_road
-from gateway.sim.scatter import FROM_DAY_TO_DAY, OF_TYPES, scattered
 from gateway.sim.scenario import simulate_drive
 from gateway.sim.sensors import REFERENCE
 from gateway.sim.vans import VANS

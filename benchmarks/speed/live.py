@@ -1,6 +1,6 @@
 """The live path: CPU of receiving and decoding, beside python-can's own receive loop in the same run.
 
-    python benchmarks/bench_live.py [--seconds 6] [--json]
+    python -m benchmarks.speed.live [--seconds 6] [--json]
 
 Frames come from another process as CAN datagrams over a loopback socket with kernel stamps, so that no CAN
 hardware is needed: everything but the socket's address family is the live path. A kernel-filtered bus is one
@@ -18,6 +18,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 import can
 import cantools
@@ -29,6 +30,7 @@ from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.mapping import SignalMap
 from gateway.bus.signals.signal_map import load_signal_map, shipped_map
 
+PROGRAM = (sys.executable, "-m", "benchmarks.speed.live")
 OURS_SHARE = 0.084  # of the frames on the bus: two IMU messages at 100 Hz, GNSS at 10 Hz
 DRAIN_S = 0.1  # how often the pipeline looks into the inbox
 RATES = {"2500 frames/s": 2500, "8000 frames/s": 8000, "2500, filtered": 210, "8000, filtered": 672}
@@ -67,7 +69,7 @@ def listening_socket() -> socket.socket:
     return wire
 
 
-def receive_ours(wire: socket.socket, signal_map: SignalMap, is_over: threading.Event) -> dict:
+def receive_ours(wire: socket.socket, signal_map: SignalMap, is_over: threading.Event) -> dict[str, Any]:
     """LiveSource and the decoder, as the service runs them."""
     source = LiveSource("socketcan", "bench", signal_map, open_receiver=lambda: SocketCanReceiver(wire, 8))
     decoder = Decoder(signal_map)
@@ -82,15 +84,16 @@ def receive_ours(wire: socket.socket, signal_map: SignalMap, is_over: threading.
     return {"frames": counts.frames, "samples": n_rows, "dropped": counts.dropped_inbox + counts.dropped_kernel}
 
 
-def receive_python_can(wire: socket.socket, signal_map: SignalMap, is_over: threading.Event) -> dict:
+def receive_python_can(wire: socket.socket, signal_map: SignalMap, is_over: threading.Event) -> dict[str, Any]:
     """python-can's SocketcanBus over the same kind of socket, cantools for the mapped frames."""
-    database = cantools.database.load_file(shipped_map("reference").with_name("springscale_reference.dbc"))
+    database: Any = cantools.database.load_file(shipped_map("reference").with_name("springscale_reference.dbc"))
     messages = {message.frame_id: message for message in database.messages}
-    python_can_socketcan.create_socket = lambda: wire
-    python_can_socketcan.bind_socket = lambda sock, channel: None
-    python_can_socketcan.SocketcanBus._apply_filters = lambda self, filters: None
+    peer: Any = python_can_socketcan  # its way to a real CAN socket is put out of the way
+    peer.create_socket = lambda: wire
+    peer.bind_socket = lambda sock, channel: None
+    peer.SocketcanBus._apply_filters = lambda self, filters: None
     n_frames = n_rows = 0
-    with python_can_socketcan.SocketcanBus("bench", local_loopback=True) as bus:
+    with peer.SocketcanBus("bench", local_loopback=True) as bus:
         while not is_over.is_set():
             frame = bus.recv(0.1)
             if frame is None:
@@ -102,17 +105,17 @@ def receive_python_can(wire: socket.socket, signal_map: SignalMap, is_over: thre
     return {"frames": n_frames, "samples": n_rows, "dropped": None}
 
 
-PATHS: dict[str, Callable[[socket.socket, SignalMap, threading.Event], dict]] = {
+PATHS: dict[str, Callable[[socket.socket, SignalMap, threading.Event], dict[str, Any]]] = {
     "springscale": receive_ours,
     "python-can + cantools": receive_python_can,
 }
 
 
-def run(path: str, frames_per_s: int, seconds: float) -> dict:
+def run(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
     """One path at one rate; CPU is this process's from the first frame sent to the last."""
     signal_map = load_signal_map("springscale:reference")
     wire = listening_socket()
-    command = [sys.executable, __file__, "--send", str(wire.getsockname()[1]), "--rate", str(frames_per_s)]
+    command = [*PROGRAM, "--send", str(wire.getsockname()[1]), "--rate", str(frames_per_s)]
     sender = subprocess.Popen([*command, "--seconds", str(seconds)], stdout=subprocess.PIPE, text=True)
     is_over = threading.Event()
 
@@ -132,12 +135,14 @@ def run(path: str, frames_per_s: int, seconds: float) -> dict:
     return result
 
 
-def in_own_process(path: str, frames_per_s: int, seconds: float) -> dict:
-    command = [sys.executable, __file__, "--run", path, "--rate", str(frames_per_s), "--seconds", str(seconds)]
-    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+def in_own_process(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
+    command = [*PROGRAM, "--run", path, "--rate", str(frames_per_s), "--seconds", str(seconds)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
-def show(results: dict) -> None:
+def show(results: dict[str, Any]) -> None:
     print(f"{'bus':<18}{'path':<24}{'CPU of a core':>14}{'received':>18}{'dropped':>9}{'peak MB':>9}")
     for bus, paths in results.items():
         for path, row in paths.items():

@@ -1,9 +1,9 @@
 """The web side: the latest estimate over HTTP, as fast as one core of server gives it.
 
-    python benchmarks/bench_http.py [--seconds 5] [--connections 16] [--json]
+    python -m benchmarks.speed.web [--seconds 5] [--connections 16] [--json]
 
 Server, client and a bus of 2500 frames/s are three processes on the loopback interface. The server is the service:
-it receives and decodes the bus (CAN datagrams over a loopback socket, as in bench_live.py; kernel-filtered, so that
+it receives and decodes the bus (CAN datagrams over a loopback socket, as in live.py; kernel-filtered, so that
 210 frames/s of ours arrive), holds an estimate with spectra of the usual length and publishes a new one every 100 ms
 into eight open streams. Goal: 5000 requests/s with p99 under 20 ms, and no frame lost.
 """
@@ -18,14 +18,15 @@ import tempfile
 import threading
 import time
 import urllib.request
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
-import bench_live
 import numpy as np
 import uvicorn
 import uvloop
 
+from benchmarks.speed import live
 from gateway.bus.live.socketcan import SocketCanReceiver
 from gateway.bus.live.source import LiveSource
 from gateway.bus.signals.decode import Decoder
@@ -64,7 +65,7 @@ def serve(directory: str, port: int) -> None:
     """The server's process: bus, pipeline, store, board and application, and a thread that publishes."""
     store, board = Store.open(Path(directory)), Board()
     signal_map = load_signal_map("springscale:reference")
-    wire = bench_live.listening_socket()
+    wire = live.listening_socket()
     source = LiveSource("socketcan", "bench", signal_map, open_receiver=lambda: SocketCanReceiver(wire, 8))
     flow = Flow(BatchSettings(), signal_map.traits, None, "cross_spectrum", Identity())
     pipeline = Pipeline(source.inbox, Decoder(signal_map), flow, store, board)
@@ -143,7 +144,7 @@ async def ask(port: int, n_connections: int, seconds: float) -> list[float]:
     end_s = time.perf_counter() + seconds
     done = [loop.create_future() for _ in range(n_connections)]
     for each in done:
-        await loop.create_connection(lambda each=each: Asker(took_s, end_s, each), "127.0.0.1", port)
+        await loop.create_connection(partial(Asker, took_s, end_s, each), "127.0.0.1", port)
     await asyncio.wait_for(asyncio.gather(*done), seconds + 30.0)
     for listener in listeners:
         listener.cancel()
@@ -178,10 +179,10 @@ def main() -> None:
         return
     port = free_port()
     with tempfile.TemporaryDirectory() as directory:
-        server = subprocess.Popen([sys.executable, __file__, "--serve", directory, str(port)])
+        server = subprocess.Popen([sys.executable, "-m", "benchmarks.speed.web", "--serve", directory, str(port)])
         try:
             wait_until_up(port)
-            bus = [sys.executable, bench_live.__file__, "--send", bus_of(port)["channel"]]
+            bus = [*live.PROGRAM, "--send", bus_of(port)["channel"]]
             bus += ["--rate", str(BUS_FRAMES_PER_S), "--seconds", str(arguments.seconds)]
             sender = subprocess.Popen(bus, stdout=subprocess.PIPE, text=True)
             took_s = uvloop.run(ask(port, arguments.connections, arguments.seconds))

@@ -18,9 +18,10 @@ from typing import Final
 
 import numpy as np
 
+from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.half_car import frequency_response
-from gateway.core.cross_spectrum.ideal_drive import RATE_HZ, Bound, Drive
-from gateway.core.cross_spectrum.likelihood import EFFECTIVE_SHARE, Point
+from gateway.core.cross_spectrum.ideal_drive import RATE_HZ, Drive, expected_of, steady_spectra
+from gateway.core.cross_spectrum.likelihood import EFFECTIVE_SHARE, Point, Whittle
 from gateway.core.cross_spectrum.measured import Reading
 from gateway.core.cross_spectrum.parameters import INDEX, Ground, half_car
 from gateway.core.spectrum import frequencies_hz
@@ -40,6 +41,14 @@ class Seen(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Bound:
+    """Smallest standard deviations that are possible."""
+
+    payload_std_kg: float
+    front_share_std_pct: float
+
+
+@dataclass(frozen=True, slots=True)
 class Scene:
     """A vehicle at a point (parameters and load) on a road of displacement density road_m3 (f/v)^-2 / v.
 
@@ -54,6 +63,30 @@ class Scene:
     slack: float
     noise_acceleration_m2ps3: float = 0.0
     noise_pitch_rate_rad2ps: float = 0.0
+
+
+def cramer_rao(
+    calibration: CrossSpectrumCalibration,
+    payload_kg: float,
+    front_share_pct: float,
+    drive: Drive,
+    unknown: Mapping[str, float] | None = None,
+) -> Bound:
+    """The bound at one load, the vehicle being the calibrated one.
+
+    ``unknown`` maps parameter names (parameters.PARAMETERS) to the standard deviation of what is
+    known of them beforehand (of the logarithm, where these are positive quantities); the others are
+    taken as known. Slack counts as part of the vehicle: it is what model error and roll leave.
+    """
+    priors = dict(unknown or {})
+    free = [INDEX[name] for name in priors]
+    point = Point(calibration.parameters, payload_kg, front_share_pct / 100.0)
+    spectra = expected_of(steady_spectra(calibration.reading, drive), point, calibration.ground)
+    whittle = Whittle(spectra, calibration.ground)
+    information = whittle.curvature(point, free, is_load_free=True).information
+    information += np.diag(np.r_[np.array(list(priors.values())) ** -2.0, 0.0, 0.0])
+    payload_var, share_var = np.diag(np.linalg.inv(information))[-2:]
+    return Bound(float(np.sqrt(payload_var)), 100.0 * float(np.sqrt(share_var)))
 
 
 def bound_of(seen: Seen, unknown: Mapping[str, float], scene: Scene) -> Bound:

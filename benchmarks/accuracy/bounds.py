@@ -6,13 +6,13 @@ from math import radians
 from types import MappingProxyType
 from typing import Final
 
+from benchmarks.accuracy.sensor_bounds import SPEED, Bound, Scene, Seen, bound_of
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.calibration.half_car.prior import prior_of
-from gateway.core.cross_spectrum.ideal_drive import Bound, Drive
+from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import Reading
 from gateway.core.cross_spectrum.parameters import Ground
-from gateway.core.sensor_bounds import SPEED, Scene, Seen, bound_of
 from gateway.core.vehicle import Vehicle
 from gateway.units import STANDARD_GRAVITY_MPS2
 from gateway.workbench.campaigns import PAPER_PAYLOAD_KG, PAPER_ROUGHNESS_M3, PAPER_SPEED_MPS, PAPER_WHEELBASE_M

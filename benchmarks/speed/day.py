@@ -1,6 +1,6 @@
 """A working day on the bus through `springscale estimate`: how long it takes, and whether memory grows with the log.
 
-    python benchmarks/bench_day.py [--hours 8] [--json]
+    python -m benchmarks.speed.day [--hours 8] [--json]
 
 The drive of the demo (25 minutes) repeats until the hours are full, on a bus of about 2500 frames/s; the log is plain
 candump text of roughly 400 MB an hour, in a temporary folder. Each estimator reads the whole log in a process of its
@@ -29,7 +29,7 @@ from gateway.workbench.demo_drive import demo_drive, frames_of
 from gateway.workbench.wiring import unrelated_traffic
 
 FRAMES_PER_S = 2500
-CALIBRATION = Path(__file__).parents[1] / "gateway" / "demo" / "paper_van.json"
+CALIBRATION = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 
 
 def busy_drive() -> Frames:
@@ -58,7 +58,7 @@ def write_log(path: Path, hours: float) -> int:
 
 def written_in_own_process(path: Path, hours: float) -> int:
     """Of its own, because a process that is started inherits its parent's peak of memory."""
-    command = [sys.executable, __file__, "--write", str(path), "--hours", str(hours)]
+    command = [sys.executable, "-m", "benchmarks.speed.day", "--write", str(path), "--hours", str(hours)]
     return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 

@@ -1,0 +1,131 @@
+"""python -m benchmarks.accuracy: what a calibration is worth, found out by experiment. Each study takes minutes.
+
+    python -m benchmarks.accuracy coverage --vans 12 --seed 20265 --workers 2 --output docs
+
+prints its page; ``--output`` also writes the numbers (NAME.json) and the page made of them (NAME.md).
+"""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from benchmarks.accuracy import advice as on_advice
+from benchmarks.accuracy import coverage as on_coverage
+from benchmarks.accuracy.bounds import limits, limits_table
+from benchmarks.accuracy.coverage_drives import Scope
+from benchmarks.accuracy.coverage_page import coverage_page
+from benchmarks.accuracy.pages import advice_page, learning_curve_page
+from gateway.calibration.campaign import load_campaign
+from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.judgement import learning_curve as on_learning
+from gateway.cli.options import FILE, batch_settings, window
+from gateway.cli.progress import counted
+from gateway.config import ESTIMATOR_NAMES
+from gateway.core.cross_spectrum.ideal_drive import Drive
+from gateway.core.vehicle import Vehicle
+from gateway.errors import SpringscaleError
+from gateway.offline.campaigns import inspect
+
+_output = click.option("--output", type=FILE, default=None, help="directory to write the numbers and their page to")
+
+
+@click.group()
+def studies() -> None:
+    """Experiments on calibration: fewer runs, advised runs, coverage of intervals, the limit. Each takes minutes."""
+
+
+@studies.command("learning-curve")
+@click.argument("campaign", type=FILE)
+@click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, default=ESTIMATOR_NAMES)
+@click.option(
+    "--subsets",
+    "most_subsets",
+    type=click.IntRange(min=1),
+    default=on_learning.MOST_SUBSETS,
+    show_default=True,
+    help="choices of runs to try for each number of runs",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=on_learning.SEED, show_default=True)
+@_output
+@window
+def learning_curve(
+    campaign: Path,
+    estimators: tuple[str, ...],
+    most_subsets: int,
+    seed: int,
+    output: Path | None,
+    window_s: float | None,
+) -> None:
+    """How accurate would CAMPAIGN be with 2, 3, 4, 6, 10 of its runs? Found by leaving runs out."""
+    runs, vehicle = _read(campaign, window_s)
+    with counted("calibrating and judging") as on_trial:
+        found = on_learning.curve_of(
+            runs,
+            vehicle,
+            name=vehicle.name,
+            estimators=estimators,
+            most_subsets=most_subsets,
+            seed=seed,
+            on_trial=on_trial,
+        ).to_json()
+    _hand_out("learning_curve", found, learning_curve_page(found), output)
+
+
+@studies.command("advice")
+@click.argument("campaign", type=FILE)
+@_output
+@window
+def advice(campaign: Path, output: Path | None, window_s: float | None) -> None:
+    """Does it help to drive what --plan advises? Tried with CAMPAIGN's own runs as the next ones."""
+    runs, vehicle = _read(campaign, window_s)
+    with counted("calibrating and judging") as on_fit:
+        found = on_advice.advice_of(runs, vehicle, name=vehicle.name, on_fit=on_fit).to_json()
+    _hand_out("advice", found, advice_page(found), output)
+
+
+@studies.command("coverage")
+@click.option("--vans", "n_vans", type=click.IntRange(min=2), default=Scope().n_vans, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=on_coverage.SEED, show_default=True)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that drive")
+@_output
+def coverage(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
+    """Do 95 % intervals hold the truth? Simulated vans, each calibrated and then driven elsewhere; ~20 s a van."""
+    with counted("calibrating and driving vans") as on_van:
+        found = on_coverage.coverage(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
+    _hand_out("coverage", found, coverage_page(found), output)
+
+
+@studies.command("bounds")
+@click.option("--duration-s", type=click.FloatRange(min=20.0), default=300.0, show_default=True, help="driving seen")
+@click.option("--speed-kmh", type=click.FloatRange(10.0, 200.0), default=50.0, show_default=True, help="steady speed")
+def bounds(duration_s: float, speed_kmh: float) -> None:
+    """Cramer-Rao bounds of payload and front share for the paper's van on its road, by what is seen and known."""
+    click.echo(limits_table(limits(Drive(duration_s, speed_kmh / 3.6))), nl=False)
+
+
+def _read(path: Path, window_s: float | None) -> tuple[Sequence[SplitRun], Vehicle]:
+    """The runs of a campaign without those that have a fault."""
+    campaign = load_campaign(path)
+    with counted("reading drives") as on_run:
+        return inspect(campaign, batch_settings(window_s), on_run=on_run).usable, campaign.vehicle
+
+
+def _hand_out(name: str, found: Mapping[str, Any], page: str, output: Path | None) -> None:
+    """The page, printed; with the numbers as files where a directory was named."""
+    if output is not None:
+        output.mkdir(parents=True, exist_ok=True)
+        (output / f"{name}.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        (output / f"{name}.md").write_text(page, encoding="utf-8")
+    click.echo(page, nl=False)
+
+
+if __name__ == "__main__":
+    try:
+        studies(prog_name="python -m benchmarks.accuracy")
+    except SpringscaleError as fault:
+        click.echo(str(fault), err=True)
+        sys.exit(fault.exit_code)
