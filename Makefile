@@ -32,6 +32,8 @@ check: .venv/.development
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python docs/make_settings.py --check
+	$(BIN)/python docs/make_signal_map.py --check
+	$(BIN)/python docs/make_campaign.py --check
 	$(BIN)/python docs/make_faults.py --check
 	$(BIN)/python docs/make_reasons.py --check
 	$(BIN)/python docs/make_findings.py --check
@@ -81,6 +83,8 @@ screenshots: .venv/.development
 
 docs: .venv/.development
 	$(BIN)/python docs/make_settings.py
+	$(BIN)/python docs/make_signal_map.py
+	$(BIN)/python docs/make_campaign.py
 	$(BIN)/python docs/make_faults.py
 	$(BIN)/python docs/make_reasons.py
 	$(BIN)/python docs/make_findings.py

@@ -3,10 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from generated import keep_up_to_date
+from generated import default_of, keep_up_to_date
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 
 from gateway.config import Settings
 
@@ -45,24 +44,10 @@ def _first_line(section: type[BaseModel]) -> str:
 
 
 def _table(title: str, fields: dict[str, FieldInfo], *, prefix: str) -> str:
-    rows = [f"| `{name}` | {_default(field)} | {field.description} | `{prefix}{name.upper()}` |"
+    rows = [f"| `{name}` | {default_of(field)} | {field.description} | `{prefix}{name.upper()}` |"
             for name, field in fields.items()]  # fmt: skip
     head = "| key | default | meaning | variable |\n|---|---|---|---|"
     return f"## {title}\n\n{head}\n" + "\n".join(rows) + "\n"
-
-
-def _default(field: FieldInfo) -> str:
-    """What holds when the key is absent, as TOML would write it."""
-    default = field.get_default(call_default_factory=True)
-    if default is PydanticUndefined:
-        return "required"
-    if default is None:
-        return "absent"
-    if isinstance(default, bool):
-        return f"`{str(default).lower()}`"
-    if isinstance(default, int | float):
-        return f"`{default}`"
-    return f"`{default}`" if default == {} else f'`"{default}"`'
 
 
 def main() -> None:

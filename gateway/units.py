@@ -9,7 +9,7 @@ STANDARD_GRAVITY_MPS2: Final = 9.80665  # CGPM 1901
 
 NS_PER_S: Final = 1_000_000_000
 
-_TO_SI: Final[dict[str, dict[str, float]]] = {
+TO_SI: Final[dict[str, dict[str, float]]] = {
     "acceleration": {
         "m/s^2": 1.0,
         "m/s2": 1.0,
@@ -46,7 +46,7 @@ def si_factor(quantity: str, unit: str | None) -> float:
     ``quantity`` is one of acceleration (m/s2), angular_rate (rad/s), speed (m/s), mass (kg),
     temperature (degC) or state (1). Raises SignalMapError for a unit that is missing or unknown.
     """
-    known = _TO_SI[quantity]
+    known = TO_SI[quantity]
     key = (unit or "").strip().lower()
     if key in known:
         return known[key]

@@ -26,24 +26,41 @@ class _Table(BaseModel):
 class VehicleTable(_Table):
     """[vehicle]: masses and share are of the sprung mass."""
 
-    name: str = Field(min_length=1)
-    empty_mass_kg: float = Field(ge=100.0, le=100_000.0)
-    wheelbase_m: float = Field(ge=0.8, le=20.0)
-    empty_front_share_pct: Percent = 50.0
-    sensor_position_m: Metres
-    payload_range_kg: tuple[Kilograms, Kilograms] = (0.0, 450.0)
-    front_share_range_pct: tuple[Percent, Percent] = (40.0, 60.0)
-    sensor_position_std_m: float = Field(0.1, gt=0.0, le=10.0)
-    empty_front_share_std_pct: float = Field(0.5, gt=0.0, le=50.0)
-    sensor_offset_left_m: Metres = 0.0
-    unsprung_front_kg: float | None = Field(None, gt=0.0)
-    unsprung_rear_kg: float | None = Field(None, gt=0.0)
-    kerb_front_axle_kg: float | None = Field(None, gt=0.0)
-    kerb_rear_axle_kg: float | None = Field(None, gt=0.0)
-    wheel_radius_m: float | None = Field(None, gt=0.0)
-    front_axle_limit_kg: float | None = Field(None, gt=0.0)
-    rear_axle_limit_kg: float | None = Field(None, gt=0.0)
-    gross_limit_kg: float | None = Field(None, gt=0.0)
+    name: str = Field(min_length=1, description="what you call it; it stands in the calibration file and its report")
+    empty_mass_kg: float = Field(
+        ge=100.0, le=100_000.0, description="sprung mass of the empty vehicle, driver and tank as in service: M"
+    )
+    wheelbase_m: float = Field(ge=0.8, le=20.0, description="from axle to axle: l")
+    empty_front_share_pct: Percent = Field(50.0, description="share of `empty_mass_kg` that rests on the front axle")
+    sensor_position_m: Metres = Field(description="the sensor's, behind the front axle; negative: ahead of it")
+    payload_range_kg: tuple[Kilograms, Kilograms] = Field(
+        (0.0, 450.0), description="payloads the vehicle may carry, rising; scales percentages and plans, never clips"
+    )
+    front_share_range_pct: tuple[Percent, Percent] = Field(
+        (40.0, 60.0), description="front shares it may have, rising; scales percentages and plans, never clips"
+    )
+    sensor_position_std_m: float = Field(
+        0.1, gt=0.0, le=10.0, description="how sure the sensor's position is; the fit moves it that far"
+    )
+    empty_front_share_std_pct: float = Field(
+        0.5,
+        gt=0.0,
+        le=50.0,
+        description="how sure the front share is, in percentage points; kept, not used",
+    )
+    sensor_offset_left_m: Metres = Field(0.0, description="of the sensor, left of the centre line; kept, not used")
+    unsprung_front_kg: float | None = Field(
+        None, gt=0.0, description="front axle, wheels and brakes; taken as known to 10 %"
+    )
+    unsprung_rear_kg: float | None = Field(None, gt=0.0, description="the same at the rear")
+    kerb_front_axle_kg: float | None = Field(
+        None, gt=0.0, description="what scales show under the empty vehicle's front axle, for weights on the road"
+    )
+    kerb_rear_axle_kg: float | None = Field(None, gt=0.0, description="the same at the rear")
+    wheel_radius_m: float | None = Field(None, gt=0.0, description="kept in the calibration file, not used")
+    front_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the front axle")
+    rear_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the rear axle")
+    gross_limit_kg: float | None = Field(None, gt=0.0, description="permitted gross weight")
 
     @model_validator(mode="after")
     def _ranges_rise(self) -> "VehicleTable":
@@ -57,13 +74,19 @@ class VehicleTable(_Table):
 class RunTable(_Table):
     """[[runs]]: one drive with a known load."""
 
-    log: Path
-    payload_kg: Kilograms
-    payload_position_m: Metres | None = None
-    front_share_pct: Percent | None = None
-    split: Literal["identification", "validation"] | None = None
-    start_s: float = Field(0.0, ge=0.0)
-    end_s: float | None = Field(None, gt=0.0)
+    log: Path = Field(description="its log: candump text, .asc, .blf, .trc or .csv, each also as .gz")
+    payload_kg: Kilograms = Field(description="what is aboard besides the empty vehicle: L; 0 for an empty run")
+    payload_position_m: Metres | None = Field(
+        None, description="its centre of gravity behind the front axle: d; a loaded run needs it or `front_share_pct`"
+    )
+    front_share_pct: Percent | None = Field(
+        None, description="share of the whole sprung mass on the front axle, in place of the position"
+    )
+    split: Literal["identification", "validation"] | None = Field(
+        None, description="use the whole run for this alone; absent: cut at `identification_fraction`"
+    )
+    start_s: float = Field(0.0, ge=0.0, description="begin so long after the log's first frame")
+    end_s: float | None = Field(None, gt=0.0, description="end so long after the log's first frame; after `start_s`")
 
     @model_validator(mode="after")
     def _is_complete(self) -> "RunTable":
@@ -79,10 +102,12 @@ class RunTable(_Table):
 class CampaignTable(_Table):
     """The whole file."""
 
-    signals: str = Field(min_length=1)
-    identification_fraction: float = Field(0.667, ge=0.0, le=1.0)
-    vehicle: VehicleTable
-    runs: tuple[RunTable, ...] = Field(min_length=1)
+    signals: str = Field(min_length=1, description="the signal map: a path, or `springscale:NAME` for a shipped one")
+    identification_fraction: float = Field(
+        0.667, ge=0.0, le=1.0, description="first part of each run that identifies; the rest validates"
+    )
+    vehicle: VehicleTable = Field(description="the vehicle, empty")
+    runs: tuple[RunTable, ...] = Field(min_length=1, description="the drives, numbered from 1 in this order")
 
 
 class Campaign:

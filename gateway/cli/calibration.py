@@ -7,12 +7,14 @@ from typing import Any
 
 import click
 
+from gateway.calibration.axle_weights import DIVISION_KG, AxleWeights, sprung_of
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.file.check import Check, Verdict, check_against_campaign
 from gateway.calibration.file.comparison import Difference, differences
 from gateway.cli.calibration_tare import tare_commands
 from gateway.cli.options import FILE, as_json
+from gateway.cli.text.axle_weights import vehicle_block
 from gateway.cli.text.calibration import calibration_text
 from gateway.records import json_line
 
@@ -69,6 +71,38 @@ def verify(file: Path, campaign: Path | None, as_json: bool) -> None:
     else:
         click.echo("\n".join(f"{check.verdict:5}  {check.what}: {check.text}" for check in checks))
     sys.exit(0 if is_good else 1)
+
+
+KILOGRAMS = click.FloatRange(0.0, 100_000.0, min_open=True)
+
+
+@calibration_commands.command("sprung")
+@click.option("--front-axle-kg", type=KILOGRAMS, required=True, help="weight on the front axle, vehicle empty")
+@click.option("--rear-axle-kg", type=KILOGRAMS, required=True, help="weight on the rear axle, vehicle empty")
+@click.option("--unsprung-front-kg", type=KILOGRAMS, default=None, help="axle, wheels, brakes [default: estimated]")
+@click.option("--unsprung-rear-kg", type=KILOGRAMS, default=None, help="the same at the rear [default: estimated]")
+@click.option("--division-kg", type=KILOGRAMS, default=DIVISION_KG, show_default=True, help="step of the scales")
+@as_json
+def sprung(
+    front_axle_kg: float,
+    rear_axle_kg: float,
+    unsprung_front_kg: float | None,
+    unsprung_rear_kg: float | None,
+    division_kg: float,
+    as_json: bool,
+) -> None:
+    """Sprung mass and front share from axle weights: a [vehicle] block for the campaign file.
+
+    Weigh each axle of the empty vehicle, on level ground, with driver and tank as in service. docs/campaign.md has
+    the formula.
+    """
+    body = sprung_of(AxleWeights(front_axle_kg, rear_axle_kg, unsprung_front_kg, unsprung_rear_kg), division_kg)
+    if as_json:
+        found = asdict(body)
+        del found["weights"]
+        click.echo(json_line({"vehicle": body.vehicle_keys(), **found}))
+    else:
+        click.echo(vehicle_block(body))
 
 
 def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:

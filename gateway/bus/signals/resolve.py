@@ -11,7 +11,7 @@ from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID, Signal
 from gateway.units import si_factor
 
-_QUANTITIES: Final[Mapping[Signal, str]] = {
+QUANTITIES: Final[Mapping[Signal, str]] = {
     Signal.VERTICAL_ACCELERATION: "acceleration",
     Signal.PITCH_RATE: "angular_rate",
     Signal.SPEED: "speed",
@@ -95,7 +95,7 @@ def _loses_integers(field: BitField) -> bool:
 
 def _unit_factor(where: str, signal: Signal, entry: Entry, found: DatabaseSignal) -> float:
     try:
-        return si_factor(_QUANTITIES[signal], found.unit if entry.unit is None else entry.unit)
+        return si_factor(QUANTITIES[signal], found.unit if entry.unit is None else entry.unit)
     except SignalMapError as fault:
         raise SignalMapError(f"{where}: {fault}") from None
 

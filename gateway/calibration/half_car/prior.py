@@ -2,7 +2,8 @@
 
 Body bounce near 1.3 Hz, damping near 0.3 of critical, tyres about ten times stiffer than springs,
 unsprung mass about 6 % of the sprung per axle, radius of gyration in pitch about 0.46 wheelbase
-(T. D. Gillespie, Fundamentals of Vehicle Dynamics, ch. 5).
+(T. D. Gillespie, Fundamentals of Vehicle Dynamics, ch. 5). docs/campaign.md holds the unsprung share
+against measured cars.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ BOUNCE_HZ: Final = 1.35
 DAMPING_RATIO: Final = 0.3
 TYRE_NPM: Final = 400e3  # both tyres of an axle of a 1250 kg vehicle; scales with mass
 MOUNT_NPM: Final = 500e3
-UNSPRUNG_SHARE: Final = 0.065
+UNSPRUNG_SHARE: Final = 0.065  # of the empty sprung mass, an axle
 GYRATION_PER_WHEELBASE: Final = 0.46
 SLACK: Final = 0.03
 SLOPE_STD_PER_KN: Final = 0.05
@@ -29,13 +30,15 @@ SPRING_FRICTION, SPRING_FRICTION_STD = 0.03, 0.05
 TRACK_OFFSET_M: Final = 0.03
 NOISE_ACCELERATION_M2PS3: Final = 1e-5  # 300 ug per root hertz
 NOISE_PITCH_RATE_RAD2PS: Final = 1e-8  # 0.006 deg/s per root hertz; steps of 0.25 deg/s at 100 Hz make 3e-8
+ESTIMATED_UNSPRUNG_STD: Final = 0.3  # of an unsprung mass that nobody gives
+WEIGHED_STD: Final = 0.1  # of one that the campaign gives
 
 _LOG_STD: Final = {
     "spring": 0.35,
     "damper": 0.5,
     "damper_mount": 1.0,
     "tyre": 0.3,
-    "unsprung": 0.3,
+    "unsprung": ESTIMATED_UNSPRUNG_STD,
     "pitch_inertia": 0.25,
     "payload_gyration": 0.7,
     "payload_mode": 0.6,
@@ -44,7 +47,6 @@ _LOG_STD: Final = {
     "noise": 2.0,
     "track_offset": 1.0,
 }
-WEIGHED_STD: Final = 0.1  # of an unsprung mass that the campaign gives
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,61 @@
+"""docs/signal-map.md and docs/campaign.md say what the code does, and every example on them is one that it takes."""
+
+import re
+import shutil
+import tomllib
+from pathlib import Path
+
+import make_campaign
+import make_signal_map
+import pytest
+from pydantic import BaseModel
+
+from gateway.bus.signals.signal_map import SignalEntry, SignalMapFile, load_signal_map
+from gateway.calibration.campaign import CampaignTable, RunTable, VehicleTable, load_campaign
+from gateway.records import Signal
+from gateway.units import TO_SI
+
+ROOT = Path(__file__).parents[2]
+SIGNAL_MAP, CAMPAIGN = ((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("signal-map.md", "campaign.md"))
+
+
+def examples_of(page: str) -> list[str]:
+    found: list[str] = re.findall(r"^```toml\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
+    return found
+
+
+def test_the_pages_are_made_from_the_code() -> None:
+    assert make_signal_map.signal_map_page() == SIGNAL_MAP, "run `make docs`"
+    assert make_campaign.campaign_page() == CAMPAIGN, "run `make docs`"
+
+
+@pytest.mark.parametrize("table", [SignalMapFile, SignalEntry, CampaignTable, VehicleTable, RunTable])
+def test_every_key_is_described(table: type[BaseModel]) -> None:
+    assert [name for name, field in table.model_fields.items() if not field.description] == []
+
+
+def test_every_signal_and_every_unit_is_there() -> None:
+    assert set(make_signal_map.MEANINGS) == set(Signal)
+    assert set(make_signal_map.SI_UNITS) == set(TO_SI)
+
+
+@pytest.mark.parametrize("example", examples_of(SIGNAL_MAP))
+def test_an_example_of_a_signal_map_can_be_loaded(example: str, tmp_path: Path) -> None:
+    for database in (ROOT / "dbc").glob("*.dbc"):
+        shutil.copy(database, tmp_path)
+    path = tmp_path / "signals.toml"
+    path.write_text(example, encoding="utf-8")
+    assert set(load_signal_map(path).traits) == {Signal(name) for name in tomllib.loads(example)["signals"]}
+
+
+@pytest.mark.parametrize("example", examples_of(CAMPAIGN))
+def test_an_example_of_a_campaign_can_be_loaded(example: str, tmp_path: Path) -> None:
+    for run in tomllib.loads(example)["runs"]:
+        (tmp_path / run["log"]).touch()
+    path = tmp_path / "campaign.toml"
+    path.write_text(example, encoding="utf-8")
+    assert load_campaign(path).vehicle.name == "van"
+
+
+def test_the_pages_have_examples() -> None:
+    assert (len(examples_of(SIGNAL_MAP)), len(examples_of(CAMPAIGN))) == (3, 1)
