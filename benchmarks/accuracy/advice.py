@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.calibration.inspection.split_run import SplitRun
-from gateway.calibration.judgement.evaluation import error_table
+from gateway.calibration.judgement.evaluation import errors_of
 from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all, triples_at_different_positions
 from gateway.calibration.plan.design import Design, Spread
 from gateway.calibration.plan.loads import PlacedLoad, weighed_loads
@@ -163,11 +163,11 @@ class _Tried:
 
     def _scored(self, calibrated: CalibratedVehicle) -> Scored:
         judged = judged_all((one.validation for one in self._split.values()), calibrated, ESTIMATOR)
-        table = error_table(judged, self._vehicle, ESTIMATOR)
-        payload, share = table["payload"], table["front_share"]
+        errors = errors_of(judged, self._vehicle)
+        payload, share = errors.payload, errors.front_share
         return (
-            (payload["mean_abs_pct_with_misses"], share["mean_abs_pct_with_misses"]),
-            (_or_nan(payload["mean_abs_pct"]), _or_nan(share["mean_abs_pct"])),
+            (_or_nan(payload.mean_abs_pct_with_misses), _or_nan(share.mean_abs_pct_with_misses)),
+            (_or_nan(payload.mean_abs_pct), _or_nan(share.mean_abs_pct)),
         )
 
 

@@ -1,7 +1,7 @@
 """A campaign's drives: read, cut into identification and validation, inspected, calibrated from and judged by."""
 
 from collections.abc import Sequence
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from gateway.calibration.inspection.log import LogFacts
 from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.inspection.run import Inspected
 from gateway.calibration.inspection.split_run import SplitRun
-from gateway.calibration.judgement.evaluation import Judged, error_table, judge
+from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.choice import BandChoice
 from gateway.calibration.ratio_index.structures import StructureChoice
@@ -140,23 +140,6 @@ def calibrate(
     return calibrate_inspected(
         campaign, inspection, estimators=estimators, bands=bands, structure=structure, command=command
     )
-
-
-def evaluate(
-    campaign: Campaign,
-    calibrated: CalibratedVehicle,
-    settings: BatchSettings,
-    *,
-    estimator: str,
-    split: Split = "validation",
-    on_run: OnRun = lambda done, of: None,
-) -> dict[str, Any]:
-    """The error table of (12) over one part of every run, normalised by the campaign's ranges.
-
-    Raises as :func:`judge_campaign` does.
-    """
-    judged = judge_campaign(campaign, calibrated, settings, estimator=estimator, split=split, on_run=on_run)
-    return error_table(judged, campaign.vehicle, estimator)
 
 
 def judge_campaign(

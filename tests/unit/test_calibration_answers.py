@@ -16,7 +16,7 @@ DOF = st.one_of(st.none(), st.floats(2.0, 50.0))
 def answers(error: np.ndarray, half95: float | np.ndarray = 10.0, run: np.ndarray | None = None) -> Answers:
     n = len(error)
     run = np.arange(n) if run is None else run
-    return Answers("payload", run, np.zeros(n), error, np.broadcast_to(half95, n), np.full(n, 14.0))
+    return Answers(run, np.zeros(n), error, np.broadcast_to(half95, n), np.full(n, 14.0))
 
 
 @given(half95=st.floats(0.1, 1e3), dof=DOF)

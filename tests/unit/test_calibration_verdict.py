@@ -10,8 +10,8 @@ from support.calibrated import calibration_file
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
 from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.judgement.assessment import Assessment, Judgement, Part
 from gateway.calibration.judgement.evaluation import Judged, error_table
-from gateway.calibration.judgement.evidence import Evidence, Judgement, Part
 from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
 from gateway.calibration.plan.plan import Expected
 from gateway.core.vehicle import Vehicle
@@ -35,8 +35,7 @@ def refused(run: int) -> Judged:
 
 
 def judgement(parts: dict[Part, list[Judged]], estimator: str = "cross_spectrum") -> Judgement:
-    tables = {part: error_table(rows, VAN, estimator) for part, rows in parts.items()}
-    return Judgement(estimator, {part: tuple(rows) for part, rows in parts.items()}, tables)
+    return Judgement(estimator, {part: error_table(rows, VAN, estimator) for part, rows in parts.items()})
 
 
 def verdict(
@@ -50,7 +49,7 @@ def verdict(
     parts = {Part.LEFT_OUT: left_out} if left_out else {}
     parts |= {Part.VALIDATION: validation} if validation else {}
     outcome = None if runs is None else Outcome(file, runs, (), None, None)
-    (found,) = verdicts_of(Evidence("", file, VAN, (judgement(parts),), outcome), expected)
+    (found,) = verdicts_of(Assessment("", file, VAN, (judgement(parts),), outcome), expected)
     return found
 
 
@@ -145,7 +144,7 @@ def test_the_better_estimator_comes_first() -> None:
     file = calibration_file()
     bad = judgement({Part.LEFT_OUT: [judged(run, 100.0, 200.0) for run in range(1, 5)]}, "cross_spectrum")
     good = judgement({Part.LEFT_OUT: [judged(run, 10.0) for run in range(1, 5)]}, "ratio_index")
-    found = verdicts_of(Evidence("", file, VAN, (bad, good)))
+    found = verdicts_of(Assessment("", file, VAN, (bad, good)))
     assert [one.estimator for one in found] == ["ratio_index", "cross_spectrum"]
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.drives import T0_NS, drive, joined, later
 
-from gateway.calibration.judgement.evaluation import Judged, error_table
+from gateway.calibration.judgement.evaluation import Judged, error_table, errors_of
 from gateway.core.batch import Window, build_batch
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
@@ -38,37 +38,37 @@ def judged(true_kg: float, found_kg: float | None, true_pct: float = 50.0, found
 
 def test_error_table_by_hand() -> None:
     rows = [judged(100.0, 108.0, 48.0, 48.5), judged(300.0, 280.0, 50.0, 48.0), judged(0.0, None, 50.0)]
-    table = error_table(rows, VAN, "ratio_index")
-    assert (table["n_batches"], table["n_rejected"]) == (3, 1)
-    assert table["rejected_by_reason"] == {"too_slow": 1}
-    payload, share = table["payload"], table["front_share"]
+    errors = error_table(rows, VAN, "ratio_index").errors
+    assert (errors.n_batches, errors.n_rejected) == (3, 1)
+    assert errors.rejected_by_reason == {"too_slow": 1}
+    payload, share = errors.payload, errors.front_share
     # errors +8 and -20 kg of a range of 400 kg: +2 and -5 %
-    assert payload["mean_abs_pct"] == pytest.approx(3.5)
-    assert payload["bias_pct"] == pytest.approx(-1.5)
-    assert payload["std_pct"] == pytest.approx(3.5)
-    assert payload["max_abs_pct"] == pytest.approx(5.0)
-    assert payload["mean_abs_kg"] == pytest.approx(14.0)
-    assert payload["coverage95"] == pytest.approx(0.5)
-    assert payload["mean_abs_pct_with_misses"] == pytest.approx((2.0 + 5.0 + 50.0) / 3.0)  # the miss says 200 kg
-    assert payload["mean_abs_pct_of_gross"] == pytest.approx(50.0 * (8.0 / 1500.0 + 20.0 / 1700.0))
+    assert payload.mean_abs_pct == pytest.approx(3.5)
+    assert payload.bias_pct == pytest.approx(-1.5)
+    assert payload.std_pct == pytest.approx(3.5)
+    assert payload.max_abs_pct == pytest.approx(5.0)
+    assert payload.mean_abs == pytest.approx(14.0)
+    assert payload.coverage95 == pytest.approx(0.5)
+    assert payload.mean_abs_pct_with_misses == pytest.approx((2.0 + 5.0 + 50.0) / 3.0)  # the miss says 200 kg
+    assert payload.mean_abs_pct_of_gross == pytest.approx(50.0 * (8.0 / 1500.0 + 20.0 / 1700.0))
     # errors +0.5 and -2 points of a range of 20; the miss says 50 where 50 is true
-    assert share["mean_abs_pct"] == pytest.approx(6.25)
-    assert share["mean_abs_pp"] == pytest.approx(1.25)
-    assert share["mean_abs_pct_with_misses"] == pytest.approx(12.5 / 3.0)
-    assert share["coverage95"] == pytest.approx(0.5)
+    assert share.mean_abs_pct == pytest.approx(6.25)
+    assert share.mean_abs == pytest.approx(1.25)
+    assert share.mean_abs_pct_with_misses == pytest.approx(12.5 / 3.0)
+    assert share.coverage95 == pytest.approx(0.5)
 
 
 def test_pieces_at_the_end_of_a_run_are_no_batches() -> None:
     piece = replace(judged(0.0, None), estimate=Estimate(0, 1, "x", rejected=(Why.TOO_SHORT, Why.TOO_SLOW)))
     table = error_table([judged(100.0, 100.0), piece], VAN, "ratio_index")
-    assert (table["n_batches"], table["n_rejected"], len(table["batches"])) == (1, 0, 2)
-    assert table["payload"]["mean_abs_pct_with_misses"] == 0.0
+    assert (table.errors.n_batches, table.errors.n_rejected, len(table.judged)) == (1, 0, 2)
+    assert table.errors.payload.mean_abs_pct_with_misses == 0.0
 
 
 def test_every_run_has_figures_of_its_own() -> None:
     first = [judged(100.0, 108.0), judged(100.0, 96.0)]
     second = [replace(one, run=2, name="b.log") for one in (judged(300.0, 280.0), judged(300.0, None))]
-    runs = error_table([*first, *second], VAN, "ratio_index")["runs"]
+    runs = error_table([*first, *second], VAN, "ratio_index").to_json()["runs"]
     assert [(run["run"], run["log"], run["true_payload_kg"]) for run in runs] == [(1, "a.log", 100), (2, "b.log", 300)]
     assert [(run["n_batches"], run["n_rejected"]) for run in runs] == [(2, 0), (2, 1)]
     assert [run["payload"]["bias_kg"] for run in runs] == pytest.approx([2.0, -20.0])
@@ -79,7 +79,7 @@ def test_every_run_has_figures_of_its_own() -> None:
 @given(errors_kg=st.lists(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=4), min_size=1, max_size=4))
 def test_the_table_is_its_runs_weighed_by_their_batches(errors_kg: list[list[float]]) -> None:
     rows = [replace(judged(200.0, 200.0 + e), run=n) for n, run in enumerate(errors_kg, 1) for e in run]
-    table = error_table(rows, VAN, "ratio_index")
+    table = error_table(rows, VAN, "ratio_index").to_json()
     weights = [run["n_batches"] for run in table["runs"]]
     for name in ("bias_kg", "mean_abs_kg", "coverage95"):
         of_runs = np.average([run["payload"][name] for run in table["runs"]], weights=weights)
@@ -88,10 +88,10 @@ def test_the_table_is_its_runs_weighed_by_their_batches(errors_kg: list[list[flo
 
 
 def test_nothing_answered_is_null_not_zero() -> None:
-    table = error_table([judged(100.0, None)], VAN, "ratio_index")["payload"]
+    table = errors_of([judged(100.0, None)], VAN).payload.to_json()
     assert table.pop("mean_abs_pct_with_misses") == pytest.approx(25.0)
     assert set(table.values()) == {None}
-    assert error_table([], VAN, "ratio_index")["payload"]["mean_abs_pct_with_misses"] is None
+    assert errors_of([], VAN).payload.mean_abs_pct_with_misses is None
 
 
 def answer(payload_kg: float = 200.0, front_share_pct: float = 48.0, batch: Batch = BATCH) -> Estimate:

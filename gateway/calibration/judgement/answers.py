@@ -1,5 +1,6 @@
 """Answered batches as columns, and how their errors compare with the intervals they came with."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -8,7 +9,7 @@ import numpy as np
 from scipy.special import ndtri, stdtr, stdtrit
 
 from gateway.calibration.judgement.coverage import coverage_of
-from gateway.calibration.judgement.evaluation import Judged
+from gateway.calibration.judgement.evaluation import Judged, Target
 from gateway.records import F64, I64
 
 LEVELS: Final = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99])
@@ -18,7 +19,6 @@ LEVELS: Final = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.9
 class Answers:
     """Answered batches of one set, for one quantity: everything (n,) in its unit; ``half95`` halves the interval."""
 
-    quantity: str
     run: I64
     true: F64
     estimated: F64
@@ -36,26 +36,17 @@ class Answers:
         return tuple(f"run {number}" for number in self.run)
 
 
-def answers_of(judged: Sequence[Judged], quantity: str) -> Answers:
-    """Of "payload" in kg or "front_share" in percent; batches without an answer are left out."""
-    is_payload = quantity == "payload"
-    rows = [
-        (one.payload_kg, e.payload_kg, *e.payload_interval95_kg)
-        if is_payload
-        else (one.front_share_pct, e.front_share_pct, *e.front_share_interval95_pct)
-        for one in judged
-        for e in [one.estimate]
-    ]
-    found = np.array(rows, dtype=float).reshape(-1, 4)
-    kept = np.isfinite(found[:, 1])
-    found = found[kept]
+def answers_of(judged: Sequence[Judged], target: Target) -> Answers:
+    """Payload in kg or front share in percent; batches without an answer are left out."""
+    compared = [(one, one.compared(target)) for one in judged]
+    answered = [(one, row) for one, row in compared if math.isfinite(row.estimated)]
+    rows = np.array([row for _, row in answered], dtype=float).reshape(-1, 4)
     return Answers(
-        quantity,
-        np.array([one.run for one in judged], dtype=np.int64)[kept],
-        found[:, 0],
-        found[:, 1],
-        0.5 * (found[:, 3] - found[:, 2]),
-        np.array([one.estimate.mean_speed_mps for one in judged], dtype=float)[kept],
+        run=np.array([one.run for one, _ in answered], dtype=np.int64),
+        true=rows[:, 0],
+        estimated=rows[:, 1],
+        half95=0.5 * (rows[:, 3] - rows[:, 2]),
+        speed_mps=np.array([one.estimate.mean_speed_mps for one, _ in answered], dtype=float),
     )
 
 
@@ -72,6 +63,6 @@ def observed_coverage(answers: Answers, dof: float | None, levels: F64 = LEVELS)
     reach = np.abs(standardised(answers, dof))
     rows = []
     for level in levels:
-        found = coverage_of((reach <= ndtri(0.5 + 0.5 * level)).tolist(), answers.run.tolist())
-        rows.append((found.share, found.low, found.high))
+        coverage = coverage_of((reach <= ndtri(0.5 + 0.5 * level)).tolist(), answers.run.tolist())
+        rows.append((coverage.share, coverage.low, coverage.high))
     return np.array(rows)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -11,6 +11,23 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64, Estimate, Why, estimate_to_json
+
+Target = Literal["payload", "front_share"]
+TARGETS: Final[tuple[Target, ...]] = get_args(Target)
+
+
+class Comparison(NamedTuple):
+    """A quantity's truth beside its estimate and the 95 % interval [low, high]: kg or percent, NaN where unknown."""
+
+    true: float
+    estimated: float
+    low: float
+    high: float
+
+    @property
+    def is_covered(self) -> bool | None:
+        """Whether the interval holds the truth; None where there is no interval."""
+        return self.low <= self.true <= self.high if self.low <= self.high else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,30 +40,160 @@ class Judged:
     front_share_pct: float
     estimate: Estimate
 
+    def compared(self, target: Target) -> Comparison:
+        """One of the two quantities, truth and estimate."""
+        told = self.estimate
+        if target == "payload":
+            return Comparison(self.payload_kg, told.payload_kg, *told.payload_interval95_kg)
+        return Comparison(self.front_share_pct, told.front_share_pct, *told.front_share_interval95_pct)
 
-def error_table(judged: Sequence[Judged], vehicle: Vehicle, estimator: str) -> dict[str, Any]:
-    """(12) over all complete batches: mean |e|, bias, std, max and 95 % coverage, in percent of the ranges.
 
-    Pieces shorter than a window at the end of a run are no batches and are left out. In
-    ``mean_abs_pct_with_misses`` a rejected batch scores as if it had answered mid-range. ``runs`` holds
-    the same figures of each run by itself, ``batches`` every estimate beside the truth.
+@dataclass(frozen=True, slots=True)
+class TargetErrors:
+    """(12) for one quantity: in percent of its range, and in ``unit``. None where nothing was answered.
+
+    In ``mean_abs_pct_with_misses`` a rejected batch scores as if it had answered mid-range;
+    ``mean_abs_pct_of_gross`` is of payload alone, in percent of the loaded vehicle's mass.
     """
+
+    unit: Literal["kg", "pp"]
+    mean_abs_pct: float | None
+    mean_abs_pct_with_misses: float | None
+    bias_pct: float | None
+    std_pct: float | None
+    max_abs_pct: float | None
+    mean_abs: float | None
+    bias: float | None
+    std: float | None
+    max_abs: float | None
+    coverage95: float | None
+    mean_abs_pct_of_gross: float | None = None
+
+    def to_json(self) -> dict[str, float | None]:
+        """The object that ``evaluate --json`` prints for one quantity."""
+        record = {
+            "mean_abs_pct": self.mean_abs_pct,
+            "mean_abs_pct_with_misses": self.mean_abs_pct_with_misses,
+            "bias_pct": self.bias_pct,
+            "std_pct": self.std_pct,
+            "max_abs_pct": self.max_abs_pct,
+            f"mean_abs_{self.unit}": self.mean_abs,
+            f"bias_{self.unit}": self.bias,
+            f"std_{self.unit}": self.std,
+            f"max_abs_{self.unit}": self.max_abs,
+            "coverage95": self.coverage95,
+        }
+        return record | ({"mean_abs_pct_of_gross": self.mean_abs_pct_of_gross} if self.unit == "kg" else {})
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """(12) over complete batches: pieces shorter than a window at the end of a run are no batches and not counted."""
+
+    n_batches: int
+    n_rejected: int
+    rejected_by_reason: dict[str, int]
+    payload: TargetErrors
+    front_share: TargetErrors
+
+    @property
+    def answered(self) -> str:
+        """As people read it: "7 of 9"."""
+        return f"{self.n_batches - self.n_rejected} of {self.n_batches}"
+
+    def of(self, target: Target) -> TargetErrors:
+        """Those of one quantity."""
+        return self.payload if target == "payload" else self.front_share
+
+    def to_json(self) -> dict[str, Any]:
+        """Figures that ``evaluate --json`` prints of all batches, and of each run."""
+        return {
+            "n_batches": self.n_batches,
+            "n_rejected": self.n_rejected,
+            "rejected_by_reason": self.rejected_by_reason,
+            "payload": self.payload.to_json(),
+            "front_share": self.front_share.to_json(),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorTable:
+    """Errors of one estimator over all batches and, in ``runs``, of each run beside one batch that tells its truth."""
+
+    estimator: str
+    judged: tuple[Judged, ...]
+    errors: Errors
+    runs: tuple[tuple[Judged, Errors], ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that ``evaluate --json`` prints."""
+        return {
+            "estimator": self.estimator,
+            **self.errors.to_json(),
+            "runs": [{**_truth(first), **errors.to_json()} for first, errors in self.runs],
+            "batches": [_batch_record(one) for one in self.judged],
+        }
+
+
+def error_table(judged: Sequence[Judged], vehicle: Vehicle, estimator: str) -> ErrorTable:
+    """(12) over everything judged and run by run."""
     by_run: dict[int, list[Judged]] = {}
     for one in judged:
         by_run.setdefault(one.run, []).append(one)
-    return {
-        "estimator": estimator,
-        **_figures(judged, vehicle),
-        "runs": [_run_row(of_run, vehicle) for of_run in by_run.values()],
-        "batches": [_batch_row(one) for one in judged],
-    }
+    runs = tuple((of_run[0], errors_of(of_run, vehicle)) for of_run in by_run.values())
+    return ErrorTable(estimator, tuple(judged), errors_of(judged, vehicle), runs)
 
 
-def _run_row(of_run: Sequence[Judged], vehicle: Vehicle) -> dict[str, Any]:
-    return {**_truth(of_run[0]), **_figures(of_run, vehicle)}
+def errors_of(judged: Sequence[Judged], vehicle: Vehicle) -> Errors:
+    """(12) in percent of the vehicle's ranges: mean |e|, bias, std, max and 95 % coverage."""
+    whole = [one for one in judged if Why.TOO_SHORT not in one.estimate.rejected]
+    reasons = [str(why) for one in whole for why in one.estimate.rejected]
+    payload = np.array([one.compared("payload") for one in whole], dtype=float).reshape(-1, 4)
+    share = np.array([one.compared("front_share") for one in whole], dtype=float).reshape(-1, 4)
+    return Errors(
+        n_batches=len(whole),
+        n_rejected=sum(not one.estimate.counted for one in whole),
+        rejected_by_reason={why: reasons.count(why) for why in sorted(set(reasons))},
+        payload=_target_errors(payload, vehicle.payload_range_kg, "kg", unloaded_kg=_unloaded_kg(vehicle)),
+        front_share=_target_errors(share, vehicle.front_share_range_pct, "pp"),
+    )
 
 
-def _truth(one: Judged) -> dict[str, Any]:
+def _unloaded_kg(vehicle: Vehicle) -> float:
+    return vehicle.empty_mass_kg + (vehicle.unsprung_front_kg or 0.0) + (vehicle.unsprung_rear_kg or 0.0)
+
+
+def _target_errors(
+    compared: F64, full_range: tuple[float, float], unit: Literal["kg", "pp"], unloaded_kg: float | None = None
+) -> TargetErrors:
+    """Of the rows (n, 4) of Comparison."""
+    low, high = full_range
+    answered = np.isfinite(compared[:, 1])
+    true, estimated, lower, upper = compared[answered].T
+    error = estimated - true
+    missed = 0.5 * (low + high) - compared[~answered, 0]
+    percent = 100.0 / (high - low)
+    return TargetErrors(
+        unit,
+        mean_abs_pct=_mean(np.abs(error) * percent),
+        mean_abs_pct_with_misses=_mean(np.abs(np.r_[error, missed]) * percent),
+        bias_pct=_mean(error * percent),
+        std_pct=float(np.std(error * percent)) if error.size else None,
+        max_abs_pct=float(np.max(np.abs(error) * percent)) if error.size else None,
+        mean_abs=_mean(np.abs(error)),
+        bias=_mean(error),
+        std=float(np.std(error)) if error.size else None,
+        max_abs=float(np.max(np.abs(error))) if error.size else None,
+        coverage95=_mean(((lower <= true) & (true <= upper)).astype(float)),
+        mean_abs_pct_of_gross=None if unloaded_kg is None else _mean(100.0 * np.abs(error) / (unloaded_kg + true)),
+    )
+
+
+def _mean(x: F64) -> float | None:
+    return float(np.mean(x)) if x.size else None
+
+
+def _truth(one: Judged) -> dict[str, int | float | str]:
     return {
         "run": one.run,
         "log": one.name,
@@ -55,77 +202,10 @@ def _truth(one: Judged) -> dict[str, Any]:
     }
 
 
-def _figures(judged: Sequence[Judged], vehicle: Vehicle) -> dict[str, Any]:
-    whole = [one for one in judged if Why.TOO_SHORT not in one.estimate.rejected]
-    counted = [one for one in whole if one.estimate.counted]
-    return {
-        "n_batches": len(whole),
-        "n_rejected": len(whole) - len(counted),
-        "rejected_by_reason": _reasons(whole),
-        "payload": _errors(
-            whole,
-            vehicle.payload_range_kg,
-            [(j.estimate.payload_kg, j.payload_kg, *j.estimate.payload_interval95_kg) for j in whole],
-            "kg",
-            vehicle,
-        ),
-        "front_share": _errors(
-            whole,
-            vehicle.front_share_range_pct,
-            [(j.estimate.front_share_pct, j.front_share_pct, *j.estimate.front_share_interval95_pct) for j in whole],
-            "pp",
-            vehicle,
-        ),
-    }
-
-
-def _reasons(whole: Sequence[Judged]) -> dict[str, int]:
-    reasons = [str(why) for one in whole for why in one.estimate.rejected]
-    return {why: reasons.count(why) for why in sorted(set(reasons))}
-
-
-def _errors(
-    whole: Sequence[Judged],
-    full_range: tuple[float, float],
-    rows: list[tuple[float, float, float, float]],
-    unit: str,
-    vehicle: Vehicle,
-) -> dict[str, Any]:
-    """One half of the table; null where nothing counted."""
-    low, high = full_range
-    found = np.array(rows, dtype=float).reshape(-1, 4)
-    answered = np.isfinite(found[:, 0])
-    error = found[answered, 0] - found[answered, 1]
-    missed = 0.5 * (low + high) - found[~answered, 1]
-    percent = 100.0 / (high - low)
-    covered = (found[answered, 2] <= found[answered, 1]) & (found[answered, 1] <= found[answered, 3])
-    table: dict[str, Any] = {
-        "mean_abs_pct": _mean(np.abs(error) * percent),
-        "mean_abs_pct_with_misses": _mean(np.abs(np.r_[error, missed]) * percent),
-        "bias_pct": _mean(error * percent),
-        "std_pct": float(np.std(error * percent)) if error.size else None,
-        "max_abs_pct": float(np.max(np.abs(error) * percent)) if error.size else None,
-        f"mean_abs_{unit}": _mean(np.abs(error)),
-        f"bias_{unit}": _mean(error),
-        f"std_{unit}": float(np.std(error)) if error.size else None,
-        f"max_abs_{unit}": float(np.max(np.abs(error))) if error.size else None,
-        "coverage95": _mean(covered.astype(float)),
-    }
-    if unit == "kg":
-        unloaded_kg = vehicle.empty_mass_kg + (vehicle.unsprung_front_kg or 0.0) + (vehicle.unsprung_rear_kg or 0.0)
-        gross = np.array([unloaded_kg + one.payload_kg for one in whole])[answered]
-        table["mean_abs_pct_of_gross"] = _mean(100.0 * np.abs(error) / gross)
-    return table
-
-
-def _mean(x: F64) -> float | None:
-    return float(np.mean(x)) if x.size else None
-
-
-def _batch_row(one: Judged) -> dict[str, Any]:
-    shown = estimate_to_json(one.estimate)
-    shown.pop("spectra", None)
-    return {**_truth(one), **shown}
+def _batch_record(one: Judged) -> dict[str, Any]:
+    record = {**_truth(one), **estimate_to_json(one.estimate)}
+    record.pop("spectra", None)
+    return record
 
 
 def judge(run: KnownRun, calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:

@@ -4,7 +4,7 @@ Runs that were driven are left out, and what is calibrated on the rest is held a
 calibrates from nothing but its own runs, as ``springscale calibrate --runs`` would.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations
 from math import comb
@@ -14,7 +14,7 @@ import numpy as np
 
 from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.inspection.split_run import SplitRun
-from gateway.calibration.judgement.evaluation import Judged, error_table, judge
+from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.fit import fit_ratio_index
 from gateway.config import ESTIMATOR_NAMES
@@ -44,15 +44,15 @@ class Score:
     front_share_coverage95: float | None
 
     @classmethod
-    def of(cls, table: Mapping[str, Any]) -> "Score":
-        """From what evaluation.error_table gives."""
+    def of(cls, errors: Errors) -> "Score":
+        """The few figures a curve needs."""
         return cls(
-            n_batches=table["n_batches"],
-            n_rejected=table["n_rejected"],
-            payload_mean_abs_pct=table["payload"]["mean_abs_pct"],
-            payload_coverage95=table["payload"]["coverage95"],
-            front_share_mean_abs_pct=table["front_share"]["mean_abs_pct"],
-            front_share_coverage95=table["front_share"]["coverage95"],
+            n_batches=errors.n_batches,
+            n_rejected=errors.n_rejected,
+            payload_mean_abs_pct=errors.payload.mean_abs_pct,
+            payload_coverage95=errors.payload.coverage95,
+            front_share_mean_abs_pct=errors.front_share.mean_abs_pct,
+            front_share_coverage95=errors.front_share.coverage95,
         )
 
 
@@ -259,13 +259,13 @@ def trial_of(split: Sequence[SplitRun], vehicle: Vehicle, numbers: tuple[int, ..
     return Trial(
         numbers,
         estimator,
-        left_out=_score([*unseen, *later], vehicle, estimator),
-        validation=_score([*later, *own_later], vehicle, estimator),
+        left_out=_score([*unseen, *later], vehicle),
+        validation=_score([*later, *own_later], vehicle),
     )
 
 
-def _score(judged: Sequence[Judged], vehicle: Vehicle, estimator: str) -> Score | None:
-    return Score.of(error_table(judged, vehicle, estimator)) if judged else None
+def _score(judged: Sequence[Judged], vehicle: Vehicle) -> Score | None:
+    return Score.of(errors_of(judged, vehicle)) if judged else None
 
 
 def calibrated_on(runs: Sequence[KnownRun], vehicle: Vehicle, estimator: str) -> CalibratedVehicle:

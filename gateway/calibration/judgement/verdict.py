@@ -1,19 +1,19 @@
-"""Fit for use or not: rules over the errors found, none of them looking at a load's name.
+"""Fit for use or not: rules over the errors, none of them looking at a load's name.
 
 docs/calibration.md lists them. A calibration is as good as the worst rule says of it.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Final
+from typing import Final
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection.finding import RunVerdict, Severity
+from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement, Part
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
-from gateway.calibration.judgement.evaluation import Judged
-from gateway.calibration.judgement.evidence import PART_NAMES, Evidence, Judgement, Part
+from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Target, TargetErrors
 from gateway.calibration.plan.plan import Expected
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.vehicle import Vehicle
@@ -63,93 +63,77 @@ class Verdict:
         return max((reason.grade for reason in self.reasons), key=lambda grade: grade.rank, default=Grade.RESERVED)
 
 
-def verdicts_of(evidence: Evidence, expected: Expected | None = None) -> tuple[Verdict, ...]:
+def verdicts_of(assessment: Assessment, expected: Expected | None = None) -> tuple[Verdict, ...]:
     """A verdict for every estimator judged, the best first: by grade, then by payload error.
 
     ``expected`` is what the half-car states of itself over all the loads that the vehicle carries.
     """
-    found = [
-        (_verdict(evidence, judgement, expected), _unseen_error_pct(judgement)) for judgement in evidence.judgements
-    ]
-    return tuple(verdict for verdict, _ in sorted(found, key=lambda each: (each[0].grade.rank, each[1])))
+    judged = [(_verdict(assessment, one, expected), _unseen_error_pct(one)) for one in assessment.judgements]
+    return tuple(verdict for verdict, _ in sorted(judged, key=lambda each: (each[0].grade.rank, each[1])))
 
 
 def _unseen_error_pct(judgement: Judgement) -> float:
-    error = judgement.tables[judgement.unseen]["payload"]["mean_abs_pct_with_misses"] if judgement.unseen else None
-    return float("inf") if error is None else float(error)
+    part = judgement.unseen
+    error_pct = judgement.tables[part].errors.payload.mean_abs_pct_with_misses if part else None
+    return math.inf if error_pct is None else error_pct
 
 
-def _verdict(evidence: Evidence, judgement: Judgement, expected: Expected | None) -> Verdict:
-    driven = [_runs(evidence.outcome.verdicts), *_campaign(evidence.outcome)] if evidence.outcome else []
-    stated = _stated(expected, evidence.vehicle) if expected and judgement.estimator == "cross_spectrum" else None
-    reasons = [*_errors_and_intervals(judgement), stated, *driven, *_warnings(evidence, judgement.estimator)]
-    return Verdict(judgement.estimator, tuple(reason for reason in reasons if reason is not None))
+def _verdict(assessment: Assessment, judgement: Judgement, expected: Expected | None) -> Verdict:
+    reasons = list(_errors_and_intervals(judgement))
+    if expected and judgement.estimator == "cross_spectrum":
+        reasons.append(_stated(expected, assessment.vehicle))
+    if assessment.outcome:
+        reasons += [*_runs(assessment.outcome.verdicts), *_campaign(assessment.outcome)]
+    return Verdict(judgement.estimator, (*reasons, *_warnings(assessment, judgement.estimator)))
 
 
-def _errors_and_intervals(judgement: Judgement) -> list[Reason | None]:
+def _errors_and_intervals(judgement: Judgement) -> Iterator[Reason]:
     part = judgement.unseen
     if part is None:
-        return [_nothing_unseen()]
-    table, judged = judgement.tables[part], judgement.judged[part]
-    return [
-        *(_error(table, part, quantity) for quantity in _NAMES),
-        *(_coverage(judged, part, quantity) for quantity in _NAMES),
-        _answered(table, part),
-        _agreement(table, judgement.tables[Part.VALIDATION])
-        if part is Part.LEFT_OUT and Part.VALIDATION in judgement.tables
-        else None,
-    ]
-
-
-def _nothing_unseen() -> Reason:
-    return Reason(
-        "unseen", Grade.RESERVED, "Nothing was held back to judge by: fewer than three runs and no validation part."
-    )
+        text = "Nothing was held back to judge by: fewer than three runs and no validation part."
+        yield Reason("unseen", Grade.RESERVED, text)
+        return
+    table = judgement.tables[part]
+    yield from (_error(table.errors, part, target) for target in TARGETS)
+    for target in TARGETS:
+        yield from _coverage(table.judged, part, target)
+    yield _answered(table.errors, part)
+    if part is Part.LEFT_OUT and Part.VALIDATION in judgement.tables:
+        yield from _agreement(table.errors.payload, judgement.tables[Part.VALIDATION].errors.payload)
 
 
 def _graded(figure: float, fit: float, most: float) -> Grade:
     return Grade.FIT if figure <= fit else Grade.RESERVED if figure <= most else Grade.UNFIT
 
 
-def _error(table: Mapping[str, Any], part: Part, quantity: str) -> Reason:
-    errors, name, unit = table[quantity], *_NAMES[quantity]
-    if errors["mean_abs_pct"] is None:
-        grade = Grade.UNFIT if quantity == "payload" else Grade.RESERVED
-        return Reason(f"{quantity}_error", grade, f"No {name} was answered over the {PART_NAMES[part]}.")
-    percent = float(errors["mean_abs_pct_with_misses"])
-    missed = ", batches without an answer counted as guesses at mid-range" if table["n_rejected"] else ""
+def _error(errors: Errors, part: Part, target: Target) -> Reason:
+    rule, name, of_target = f"{target}_error", target.replace("_", " "), errors.of(target)
+    percent = of_target.mean_abs_pct_with_misses
+    if of_target.mean_abs is None or percent is None:
+        grade = Grade.UNFIT if target == "payload" else Grade.RESERVED
+        return Reason(rule, grade, f"No {name} was answered over the {PART_NAMES[part]}.")
+    missed = ", batches without an answer counted as guesses at mid-range" if errors.n_rejected else ""
     return Reason(
-        f"{quantity}_error",
+        rule,
         _graded(percent, FIT_ERROR_PCT, MOST_ERROR_PCT),
-        f"Mean error of {name} over the {PART_NAMES[part]}: {errors[f'mean_abs_{unit}']:.3g} {unit}, {percent:.1f} % "
-        f"of the range{missed} (fit to {FIT_ERROR_PCT:g} %, no use beyond {MOST_ERROR_PCT:g} %).",
+        f"Mean error of {name} over the {PART_NAMES[part]}: {of_target.mean_abs:.3g} {of_target.unit}, "
+        f"{percent:.1f} % of the range{missed} (fit to {FIT_ERROR_PCT:g} %, no use beyond {MOST_ERROR_PCT:g} %).",
     )
 
 
-_NAMES: Final = {"payload": ("payload", "kg"), "front_share": ("front share", "pp")}
-
-
-def _coverage(judged: Sequence[Judged], part: Part, quantity: str) -> Reason | None:
-    """By the limits of the coverage, for a few runs tell little; None where there are fewer than two."""
-    covered = [(hit, one.run) for one in judged if (hit := is_covered(one, quantity)) is not None]
+def _coverage(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[Reason]:
+    """By the limits of the coverage, for a few runs tell little; nothing where there are fewer than two."""
+    covered = [(hit, one.run) for one in judged if (hit := one.compared(target).is_covered) is not None]
     if len({run for _, run in covered}) < 2:
-        return None
-    found = coverage_of([hit for hit, _ in covered], [run for _, run in covered])
-    return Reason(
-        f"{quantity}_coverage",
-        _graded(-found.high, -PROMISED[0], -LEAST_COVERAGE),
-        f"95 % intervals of {_NAMES[quantity][0]} hold the truth in {100.0 * found.share:.0f} % of the batches of "
-        f"{PART_NAMES[part]}; what {found.n_clusters} runs can tell of it is {100.0 * found.low:.0f} to "
-        f"{100.0 * found.high:.0f} %.",
+        return
+    coverage = coverage_of([hit for hit, _ in covered], [run for _, run in covered])
+    yield Reason(
+        f"{target}_coverage",
+        _graded(-coverage.high, -PROMISED[0], -LEAST_COVERAGE),
+        f"95 % intervals of {target.replace('_', ' ')} hold the truth in {100.0 * coverage.share:.0f} % of the batches "
+        f"of {PART_NAMES[part]}; what {coverage.n_clusters} runs can tell of it is {100.0 * coverage.low:.0f} to "
+        f"{100.0 * coverage.high:.0f} %.",
     )
-
-
-def is_covered(one: Judged, quantity: str) -> bool | None:
-    """Whether the 95 % interval of "payload" or "front_share" holds the truth; None where there is none."""
-    is_payload = quantity == "payload"
-    truth = one.payload_kg if is_payload else one.front_share_pct
-    low, high = one.estimate.payload_interval95_kg if is_payload else one.estimate.front_share_interval95_pct
-    return low <= truth <= high if low <= high else None  # NaN is no interval
 
 
 def _stated(expected: Expected, vehicle: Vehicle) -> Reason:
@@ -164,26 +148,26 @@ def _stated(expected: Expected, vehicle: Vehicle) -> Reason:
     )
 
 
-def _answered(table: Mapping[str, Any], part: Part) -> Reason:
-    share = table["n_rejected"] / table["n_batches"] if table["n_batches"] else 1.0
+def _answered(errors: Errors, part: Part) -> Reason:
+    share = errors.n_rejected / errors.n_batches if errors.n_batches else 1.0
+    reasons = "".join(f", {why} {n}" for why, n in errors.rejected_by_reason.items())
     return Reason(
         "answered",
         _graded(share, FEW_REJECTED, MOST_REJECTED),
-        f"{table['n_rejected']} of {table['n_batches']} batches of the {PART_NAMES[part]} gave no answer"
-        + "".join(f", {why} {n}" for why, n in table["rejected_by_reason"].items()) + ".",
-    )  # fmt: skip
+        f"{errors.n_rejected} of {errors.n_batches} batches of the {PART_NAMES[part]} gave no answer{reasons}.",
+    )
 
 
-def _agreement(left_out: Mapping[str, Any], validation: Mapping[str, Any]) -> Reason | None:
+def _agreement(left_out: TargetErrors, validation: TargetErrors) -> Iterator[Reason]:
     """Validation knows its loads; if it errs more than runs left out do, something other than the load changed."""
-    expected, found = (table["payload"]["mean_abs_pct_with_misses"] for table in (left_out, validation))
-    if expected is None or found is None:
-        return None
-    is_worse = found > VALIDATION_LEAST_PCT and found > VALIDATION_FACTOR * expected
-    text = f"Payload errors of the validation part, {found:.1f} %, against {expected:.1f} % of runs left out"
-    if not is_worse:
-        return Reason("agreement", Grade.FIT, f"{text}: as expected.")
-    return Reason("agreement", Grade.RESERVED, f"{text}: something other than the load changed between the two.")
+    expected, seen = left_out.mean_abs_pct_with_misses, validation.mean_abs_pct_with_misses
+    if expected is None or seen is None:
+        return
+    text = f"Payload errors of the validation part, {seen:.1f} %, against {expected:.1f} % of runs left out"
+    if seen > VALIDATION_LEAST_PCT and seen > VALIDATION_FACTOR * expected:
+        yield Reason("agreement", Grade.RESERVED, f"{text}: something other than the load changed between the two.")
+    else:
+        yield Reason("agreement", Grade.FIT, f"{text}: as expected.")
 
 
 _WARNING_TEXT: Final[Mapping[str, str]] = {
@@ -193,38 +177,34 @@ _WARNING_TEXT: Final[Mapping[str, str]] = {
 }
 
 
-def _warnings(evidence: Evidence, estimator: str) -> list[Reason]:
+def _warnings(assessment: Assessment, estimator: str) -> Iterator[Reason]:
     """Those of the file, but for what was said of another estimator or is told from the drives themselves."""
-    others = tuple(f"{name}: " for name in ESTIMATOR_NAMES if name != estimator)
-    findings = evidence.outcome.campaign_findings if evidence.outcome else ()
-    told = tuple(f"{finding.kind}: " for finding in findings) + (("run ",) if evidence.outcome else ())
-    left_over = [one for one in evidence.file.warnings if not one.startswith((*others, *told))]
-    return [Reason("warning", Grade.RESERVED, _WARNING_TEXT.get(one, one)) for one in left_over]
+    skipped = [f"{name}: " for name in ESTIMATOR_NAMES if name != estimator]
+    if assessment.outcome:
+        skipped += ["run ", *(f"{finding.kind}: " for finding in assessment.outcome.campaign_findings)]
+    for warning in assessment.file.warnings:
+        if not warning.startswith(tuple(skipped)):
+            yield Reason("warning", Grade.RESERVED, _WARNING_TEXT.get(warning, warning))
 
 
-def _campaign(outcome: Outcome) -> list[Reason]:
-    return [
-        Reason(str(finding.kind), Grade.RESERVED, f"{finding.kind.replace('_', ' ').capitalize()}: {finding.text}.")
-        for finding in outcome.campaign_findings
-        if finding.severity is not Severity.NOTE
-    ]
+def _campaign(outcome: Outcome) -> Iterator[Reason]:
+    for finding in outcome.campaign_findings:
+        if finding.severity is not Severity.NOTE:
+            text = f"{finding.kind.replace('_', ' ').capitalize()}: {finding.text}."
+            yield Reason(str(finding.kind), Grade.RESERVED, text)
 
 
-def _runs(verdicts: Sequence[RunVerdict]) -> Reason | None:
-    if not verdicts:
-        return None
+def _runs(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
     unusable = [one.number for one in verdicts if not one.is_usable]
-    doubtful = [one.number for one in verdicts if one.is_usable and _has_warning(one)]
+    doubtful = [one.number for one in verdicts if any(finding.severity is Severity.WARNING for finding in one.findings)]
+    in_all = counted(len(verdicts), "run")
     if unusable:
         grade = Grade.UNFIT if 2 * len(unusable) > len(verdicts) else Grade.RESERVED
-        return Reason("runs", grade, f"Of {counted(len(verdicts), 'run')} cannot be used: {_listed(unusable)}.")
-    if doubtful:
-        return Reason("runs", Grade.RESERVED, f"Of {counted(len(verdicts), 'run')} want a look: {_listed(doubtful)}.")
-    return Reason("runs", Grade.FIT, f"Without a fault: {counted(len(verdicts), 'run')}, all there are.")
-
-
-def _has_warning(verdict: RunVerdict) -> bool:
-    return any(finding.severity is Severity.WARNING for finding in verdict.findings)
+        yield Reason("runs", grade, f"Of {in_all} cannot be used: {_listed(unusable)}.")
+    elif doubtful:
+        yield Reason("runs", Grade.RESERVED, f"Of {in_all} want a look: {_listed(doubtful)}.")
+    elif verdicts:
+        yield Reason("runs", Grade.FIT, f"Without a fault: {in_all}, all there are.")
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
-from gateway.calibration.judgement.evidence import PART_NAMES, PART_TEXT, Judgement, Part
+from gateway.calibration.judgement.assessment import PART_NAMES, PART_TEXT, Judgement, Part
+from gateway.calibration.judgement.evaluation import TARGETS, Target
 from gateway.records import F64
 from gateway.reports.calibration.error_tables import batches_table, runs_table, summary_table
 from gateway.reports.calibration.text import estimator_name, percent, shown
@@ -20,11 +21,11 @@ _COLOURS: Final[Mapping[Part, int]] = {Part.LEFT_OUT: 0, Part.VALIDATION: 1, Par
 def accuracy_section(judgement: Judgement) -> Section:
     """Everything about one estimator's errors."""
     name = estimator_name(judgement.estimator)
-    quantities = [q for q in ("payload", "front_share") if _has_answers(judgement, q)]
+    targets = [target for target in TARGETS if _has_answers(judgement, target)]
     charts = (
-        _estimated_over_true(judgement, quantities),
-        _residuals(judgement, quantities),
-        _coverage(judgement, quantities),
+        _estimated_over_true(judgement, targets),
+        _residuals(judgement, targets),
+        _coverage(judgement, targets),
     )
     tables = tuple(runs_table(judgement, part) for part in judgement.tables)
     batches = tuple(batches_table(judgement, part) for part in judgement.tables)
@@ -38,21 +39,19 @@ def accuracy_section(judgement: Judgement) -> Section:
     )
 
 
-def _has_answers(judgement: Judgement, quantity: str) -> bool:
-    return any(table[quantity]["mean_abs_pct"] is not None for table in judgement.tables.values())
+def _has_answers(judgement: Judgement, target: Target) -> bool:
+    return any(table.errors.of(target).mean_abs is not None for table in judgement.tables.values())
 
 
 _TRUE: Final = {"payload": "payload [kg]", "front_share": "front share [%]"}
 _ERROR: Final = {"payload": "error of payload [kg]", "front_share": "error of front share [pp]"}
-_DOF: Final = {"payload": "payload_dof", "front_share": "front_share_dof"}
 
 
-def _sets(judgement: Judgement, quantity: str) -> list[tuple[Part, Answers]]:
+def _sets(judgement: Judgement, target: Target) -> list[tuple[Part, Answers]]:
     """What was not fitted to, or else what there is."""
-    unfitted = [part for part in judgement.judged if part is not Part.IDENTIFICATION]
-    parts: list[Part] = [*unfitted] or [*judgement.judged]
-    found = [(part, answers_of(judgement.judged[part], quantity)) for part in parts]
-    return [(part, answers) for part, answers in found if len(answers.run)]
+    unfitted = [part for part in judgement.tables if part is not Part.IDENTIFICATION]
+    sets = [(part, answers_of(judgement.tables[part].judged, target)) for part in unfitted or judgement.tables]
+    return [(part, answers) for part, answers in sets if len(answers.run)]
 
 
 def _points(part: Part, answers: Answers, x: F64, y: F64, half: F64 | None = None) -> Points:
@@ -60,21 +59,21 @@ def _points(part: Part, answers: Answers, x: F64, y: F64, half: F64 | None = Non
     return Points(x, y, PART_NAMES[part], _COLOURS[part], _MARKERS.get(part, "square"), low, high, answers.notes)
 
 
-def _estimated_over_true(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
-    if not quantities:
+def _estimated_over_true(judgement: Judgement, targets: Sequence[Target]) -> Chart | None:
+    if not targets:
         return None
     panels = []
-    for quantity in quantities:
-        sets = _sets(judgement, quantity)
+    for target in targets:
+        sets = _sets(judgement, target)
         ends = np.array([f([f(a.true) for _, a in sets]) for f in (min, max)])
         marks = [_points(part, a, a.true, a.estimated, a.half95) for part, a in sets]
         exact = Line(ends, ends, "exact", GREY, "dash")
-        panels.append(Panel(Axis(f"true {_TRUE[quantity]}"), Axis(f"estimated {_TRUE[quantity]}"), (exact, *marks)))
+        panels.append(Panel(Axis(f"true {_TRUE[target]}"), Axis(f"estimated {_TRUE[target]}"), (exact, *marks)))
     name = estimator_name(judgement.estimator)
     return Chart(
         f"estimated_over_true_{judgement.estimator}",
         f"Estimates of the {name} over the truth, with 95 % intervals. On the dashed line an estimate is exact.",
-        f"Estimated over true {' and '.join(_PLAIN[q] for q in quantities)} of the {name}. {_summary(judgement)}",
+        f"Estimated over true {' and '.join(_PLAIN[each] for each in targets)} of the {name}. {_summary(judgement)}",
         tuple(panels),
         row_height_px=400,
     )
@@ -85,17 +84,17 @@ _PLAIN: Final = {"payload": "payload", "front_share": "front share"}
 
 def _summary(judgement: Judgement) -> str:
     return " ".join(
-        f"{PART_NAMES[part].capitalize()}: mean error {shown(table['payload']['mean_abs_kg'], ' kg')} and "
-        f"{shown(table['front_share']['mean_abs_pp'], ' pp')}."
+        f"{PART_NAMES[part].capitalize()}: mean error {shown(table.errors.payload.mean_abs, ' kg')} and "
+        f"{shown(table.errors.front_share.mean_abs, ' pp')}."
         for part, table in judgement.tables.items()
     )
 
 
-def _residuals(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
+def _residuals(judgement: Judgement, targets: Sequence[Target]) -> Chart | None:
     """Errors over the truth, over speed and over what a normal law would have."""
-    if not quantities:
+    if not targets:
         return None
-    panels = [panel for quantity in quantities for panel in _residual_panels(judgement, quantity)]
+    panels = [panel for target in targets for panel in _residual_panels(judgement, target)]
     return Chart(
         f"residuals_{judgement.estimator}",
         "Errors over the truth and over speed: a slope or a bow is something the model misses. Right: errors in their "
@@ -108,20 +107,20 @@ def _residuals(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
     )
 
 
-def _residual_panels(judgement: Judgement, quantity: str) -> list[Panel]:
-    sets = _sets(judgement, quantity)
-    zero, error = Rule(0.0), Axis(_ERROR[quantity])
+def _residual_panels(judgement: Judgement, target: Target) -> list[Panel]:
+    sets = _sets(judgement, target)
+    zero, error = Rule(0.0), Axis(_ERROR[target])
     over_truth = tuple(_points(part, a, a.true, a.error) for part, a in sets)
     over_speed = tuple(_points(part, a, 3.6 * a.speed_mps, a.error) for part, a in sets)
-    dof = getattr(judgement, _DOF[quantity])
+    dof = judgement.dof.get(target)
     in_order = tuple(_in_order(part, a, dof) for part, a in sets)
     ends = np.array([-2.5, 2.5])
     return [
-        Panel(Axis(f"true {_TRUE[quantity]}"), error, (zero, *over_truth)),
+        Panel(Axis(f"true {_TRUE[target]}"), error, (zero, *over_truth)),
         Panel(Axis("mean speed [km/h]"), error, (zero, *over_speed)),
         Panel(
             Axis("normal quantile"),
-            Axis(f"{_PLAIN[quantity]}: error / standard deviation"),
+            Axis(f"{_PLAIN[target]}: error / standard deviation"),
             (Line(ends, ends, "exact", GREY, "dash"), *in_order),
         ),
     ]
@@ -135,8 +134,8 @@ def _in_order(part: Part, answers: Answers, dof: float | None) -> Points:
     return Points(expected, z[order], PART_NAMES[part], _COLOURS[part], _MARKERS.get(part, "square"), notes=notes)
 
 
-def _coverage(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
-    panels = [panel for quantity in quantities if (panel := _coverage_panel(judgement, quantity)) is not None]
+def _coverage(judgement: Judgement, targets: Sequence[Target]) -> Chart | None:
+    panels = [panel for target in targets if (panel := _coverage_panel(judgement, target)) is not None]
     if not panels:
         return None
     return Chart(
@@ -145,7 +144,7 @@ def _coverage(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
         "need be, below it narrower than they claim. Bars: what so few runs can tell, batches of one run being alike.",
         f"Observed over nominal coverage of the {estimator_name(judgement.estimator)}: "
         + " ".join(
-            f"95 % intervals of payload hold {percent(table['payload']['coverage95'])} over the {PART_NAMES[part]}."
+            f"95 % intervals of payload hold {percent(table.errors.payload.coverage95)} over the {PART_NAMES[part]}."
             for part, table in judgement.tables.items()
         ),
         tuple(panels),
@@ -153,11 +152,11 @@ def _coverage(judgement: Judgement, quantities: Sequence[str]) -> Chart | None:
     )
 
 
-def _coverage_panel(judgement: Judgement, quantity: str) -> Panel | None:
+def _coverage_panel(judgement: Judgement, target: Target) -> Panel | None:
     ends = np.array([0.0, 100.0])
-    dof = getattr(judgement, _DOF[quantity])
+    dof = judgement.dof.get(target)
     marks = []
-    for shift, (part, answers) in enumerate(_sets(judgement, quantity)):
+    for shift, (part, answers) in enumerate(_sets(judgement, target)):
         if len(np.unique(answers.run)) > 1:
             share, low, high = 100.0 * observed_coverage(answers, dof).T
             x, marker = 100.0 * LEVELS + 0.8 * shift, _MARKERS.get(part, "square")
@@ -165,4 +164,4 @@ def _coverage_panel(judgement: Judgement, quantity: str) -> Panel | None:
     if not marks:
         return None
     nominal = Line(ends, ends, "exact", GREY, "dash")
-    return Panel(Axis("nominal [%]"), Axis("observed [%]"), (nominal, *marks), _PLAIN[quantity])
+    return Panel(Axis("nominal [%]"), Axis("observed [%]"), (nominal, *marks), _PLAIN[target])

@@ -1,9 +1,11 @@
 """The error table (12) for people: in short, run by run and batch by batch."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Final
+import math
+from typing import Final
 
-from gateway.calibration.judgement.evidence import PART_NAMES, Judgement, Part
+from gateway.calibration.judgement.assessment import PART_NAMES, Judgement, Part
+from gateway.calibration.judgement.evaluation import TARGETS, Comparison, Judged, TargetErrors
+from gateway.records import iso_utc
 from gateway.reports.calibration.text import NONE, percent, shown
 from gateway.reports.charts.chart import Table
 
@@ -13,9 +15,9 @@ _COLUMNS: Final = ("mean |e|", "bias", "std", "max", "mean |e| %", "with misses 
 def summary_table(judgement: Judgement) -> Table:
     """Both quantities over every set."""
     rows = [
-        (PART_NAMES[part], label, f"{table['n_batches'] - table['n_rejected']} of {table['n_batches']}", *cells)
+        (PART_NAMES[part], label, table.errors.answered, *_cells(table.errors.of(target)))
         for part, table in judgement.tables.items()
-        for label, cells in (("payload", _cells(table["payload"], "kg")), ("share", _cells(table["front_share"], "pp")))
+        for label, target in zip(("payload", "share"), TARGETS, strict=True)
     ]
     return Table(
         "Errors (12): in kg and percentage points, and in percent of the campaign's ranges; of gross: in percent of "
@@ -26,12 +28,13 @@ def summary_table(judgement: Judgement) -> Table:
     )
 
 
-def _cells(errors: Mapping[str, Any], unit: str) -> tuple[str, ...]:
+def _cells(errors: TargetErrors) -> tuple[str, ...]:
     return (
-        *(shown(errors[f"{name}_{unit}"], f" {unit}") for name in ("mean_abs", "bias", "std", "max_abs")),
-        *(shown(errors[name]) for name in ("mean_abs_pct", "mean_abs_pct_with_misses")),
-        shown(errors.get("mean_abs_pct_of_gross")),
-        percent(errors["coverage95"]),
+        *(shown(e, f" {errors.unit}") for e in (errors.mean_abs, errors.bias, errors.std, errors.max_abs)),
+        shown(errors.mean_abs_pct),
+        shown(errors.mean_abs_pct_with_misses),
+        shown(errors.mean_abs_pct_of_gross),
+        percent(errors.coverage95),
     )
 
 
@@ -39,16 +42,14 @@ def runs_table(judgement: Judgement, part: Part) -> Table:
     """A line for every run of one set."""
     rows = tuple(
         (
-            str(run["run"]),
-            f"{run['true_payload_kg']:g} kg",
-            f"{run['true_front_share_pct']:.1f} %",
-            f"{run['n_batches'] - run['n_rejected']} of {run['n_batches']}",
-            *(shown(run["payload"][f"{name}_kg"], " kg") for name in ("mean_abs", "bias", "max_abs")),
-            percent(run["payload"]["coverage95"]),
-            *(shown(run["front_share"][f"{name}_pp"], " pp") for name in ("mean_abs", "bias", "max_abs")),
-            percent(run["front_share"]["coverage95"]),
+            str(first.run),
+            f"{first.payload_kg:g} kg",
+            f"{first.front_share_pct:.1f} %",
+            errors.answered,
+            *_run_cells(errors.payload),
+            *_run_cells(errors.front_share),
         )
-        for run in judgement.tables[part]["runs"]
+        for first, errors in judgement.tables[part].runs
     )
     errors = ("mean |e|", "bias", "max", "95 % covers")
     columns = (
@@ -62,9 +63,14 @@ def runs_table(judgement: Judgement, part: Part) -> Table:
     return Table(f"{PART_NAMES[part].capitalize()}, run by run", columns, rows)
 
 
+def _run_cells(errors: TargetErrors) -> tuple[str, ...]:
+    figures = (errors.mean_abs, errors.bias, errors.max_abs)
+    return (*(shown(figure, f" {errors.unit}") for figure in figures), percent(errors.coverage95))
+
+
 def batches_table(judgement: Judgement, part: Part) -> Table:
     """A line for every batch of one set."""
-    rows = tuple(_batch_row(one) for one in judgement.tables[part]["batches"])
+    rows = tuple(_batch_row(one) for one in judgement.tables[part].judged)
     columns = (
         "Run",
         "until",
@@ -79,19 +85,20 @@ def batches_table(judgement: Judgement, part: Part) -> Table:
     return Table(f"{PART_NAMES[part].capitalize()}, batch by batch", columns, rows)
 
 
-def _batch_row(one: Mapping[str, Any]) -> tuple[str, ...]:
+def _batch_row(one: Judged) -> tuple[str, ...]:
+    payload, share = one.compared("payload"), one.compared("front_share")
     return (
-        str(one["run"]),
-        str(one["t_end"])[:19] + "Z",
-        f"{one['true_payload_kg']:g} kg",
-        shown(one["payload_kg"], " kg"),
-        _interval(one["payload_interval95_kg"]),
-        f"{one['true_front_share_pct']:.1f} %",
-        shown(one["front_share_pct"], " %"),
-        _interval(one["front_share_interval95_pct"]),
-        ", ".join(one["rejected"]),
+        str(one.run),
+        iso_utc(one.estimate.t_end_ns)[:19] + "Z",
+        f"{payload.true:g} kg",
+        *_answer_cells(payload, " kg"),
+        f"{share.true:.1f} %",
+        *_answer_cells(share, " %"),
+        ", ".join(one.estimate.rejected),
     )
 
 
-def _interval(bounds: Sequence[float] | None) -> str:
-    return NONE if bounds is None else f"{shown(bounds[0])} to {shown(bounds[1])}"
+def _answer_cells(compared: Comparison, unit: str) -> tuple[str, str]:
+    is_told = math.isfinite(compared.estimated)
+    interval = f"{shown(compared.low)} to {shown(compared.high)}" if math.isfinite(compared.low) else NONE
+    return shown(compared.estimated if is_told else None, unit), interval

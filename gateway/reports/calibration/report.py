@@ -1,7 +1,7 @@
 """The report of a calibration, or of an evaluation alone: report.html with its figures, and report.json.
 
     write_calibration_report(DIR, campaign, outcome)      springscale calibrate ... --report DIR
-    write_evaluation_report(DIR, evidence)                springscale evaluate ... --report DIR
+    write_evaluation_report(DIR, assessment)                springscale evaluate ... --report DIR
 
 Where the directory cannot be made they raise ConfigurationError. It is whole: the page fetches nothing
 from elsewhere, and reads without scripts.
@@ -14,7 +14,7 @@ from typing import Any
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
-from gateway.calibration.judgement.evidence import PART_NAMES, Evidence, evidence_of_calibration
+from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, assess_calibration
 from gateway.calibration.judgement.learning_curve import LearningCurve
 from gateway.calibration.judgement.verdict import Verdict, verdicts_of
 from gateway.calibration.plan.plan import Plan, plan_next
@@ -44,16 +44,16 @@ def write_calibration_report(
     curve: LearningCurve | None = None,
 ) -> Path:
     """Everything known of a calibration, with its learning curve where one was made; the path of report.html."""
-    evidence = evidence_of_calibration(campaign, outcome)
+    assessment = assess_calibration(campaign, outcome)
     plan = plan_next(outcome, campaign.vehicle) if outcome.cross_spectrum else None
     learning = [learning_section(curve)] if curve else []
-    sections = [*_calibration_sections(outcome, campaign, plan), *learning, *_evaluation_sections(evidence)]
-    return _write(directory, evidence, sections, plan, on_chart, curve)
+    sections = [*_calibration_sections(outcome, campaign, plan), *learning, *_evaluation_sections(assessment)]
+    return _write(directory, assessment, sections, plan, on_chart, curve)
 
 
-def write_evaluation_report(directory: Path, evidence: Evidence, on_chart: OnChart = lambda done, of: None) -> Path:
+def write_evaluation_report(directory: Path, assessment: Assessment, on_chart: OnChart = lambda done, of: None) -> Path:
     """How a calibration did on a campaign; the path of report.html."""
-    return _write(directory, evidence, _evaluation_sections(evidence), None, on_chart)
+    return _write(directory, assessment, _evaluation_sections(assessment), None, on_chart)
 
 
 def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: Plan | None) -> Iterator[Section]:
@@ -71,13 +71,13 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: Plan | Non
         yield half_car_section(identification, outcome.cross_spectrum, campaign.vehicle)
 
 
-def _evaluation_sections(evidence: Evidence) -> list[Section]:
-    return [*(accuracy_section(judgement) for judgement in evidence.judgements), provenance_section(evidence)]
+def _evaluation_sections(assessment: Assessment) -> list[Section]:
+    return [*(accuracy_section(judgement) for judgement in assessment.judgements), provenance_section(assessment)]
 
 
 def _write(
     directory: Path,
-    evidence: Evidence,
+    assessment: Assessment,
     sections: list[Section],
     plan: Plan | None,
     on_chart: OnChart,
@@ -88,18 +88,18 @@ def _write(
     for done, chart in enumerate(charts, 1):
         save_still(chart, directory / "figures")
         on_chart(done, len(charts))
-    verdicts = verdicts_of(evidence, plan.now if plan else None)
+    verdicts = verdicts_of(assessment, plan.now if plan else None)
     page = Page(
-        evidence.title,
-        _subtitle(evidence),
+        assessment.title,
+        _subtitle(assessment),
         verdicts,
-        _in_short(evidence, verdicts[0]),
+        _in_short(assessment, verdicts[0]),
         best_next(plan) if plan else None,
         tuple(sections),
         {chart.name: plotly_json(chart) for chart in charts},
     )
     (directory / "plotly.min.js").write_text(plotly_script(), encoding="utf-8")
-    numbers = report_json(evidence, verdicts, plan) | {"learning_curve": curve.to_json() if curve else None}
+    numbers = report_json(assessment, verdicts, plan) | {"learning_curve": curve.to_json() if curve else None}
     text = json.dumps(numbers, indent=1, allow_nan=False)
     (directory / "report.json").write_text(text + "\n", encoding="utf-8")
     report = directory / "report.html"
@@ -121,35 +121,35 @@ def _charts(sections: list[Section]) -> Iterator[Chart]:
         yield from (item for _, inside in section.folded for item in inside if isinstance(item, Chart))
 
 
-def _subtitle(evidence: Evidence) -> str:
-    seen = evidence.file.seen
+def _subtitle(assessment: Assessment) -> str:
+    seen = assessment.file.seen
     speeds = span(3.6 * seen.speed_mps[0], 3.6 * seen.speed_mps[1], "km/h")
     return (
-        f"Calibrated on {counted(len(evidence.file.provenance.runs), 'run')}: payloads of "
+        f"Calibrated on {counted(len(assessment.file.provenance.runs), 'run')}: payloads of "
         f"{span(*seen.payload_kg, 'kg')}, front shares of {span(*seen.front_share_pct, '%', 1)}, {speeds}. "
-        f"{evidence.file.id}"
+        f"{assessment.file.id}"
     )
 
 
-def _in_short(evidence: Evidence, best: Verdict) -> str:
+def _in_short(assessment: Assessment, best: Verdict) -> str:
     """What a fitter wants to know in a sentence."""
-    judgement = next(one for one in evidence.judgements if one.estimator == best.estimator)
+    judgement = next(one for one in assessment.judgements if one.estimator == best.estimator)
     if judgement.unseen is None:
         return "How well it weighs is not known: nothing was held back to judge by."
-    table = judgement.tables[judgement.unseen]
-    payload, share = table["payload"], table["front_share"]
+    errors = judgement.tables[judgement.unseen].errors
+    payload, share = errors.payload, errors.front_share
     return (
-        f"Over the {PART_NAMES[judgement.unseen]} it weighs payloads to {shown(payload['mean_abs_kg'], ' kg', 1)} on "
-        f"average and {shown(payload['max_abs_kg'], ' kg', 1)} at worst, front shares to "
-        f"{shown(share['mean_abs_pp'], ' pp')} and {shown(share['max_abs_pp'], ' pp')}."
+        f"Over the {PART_NAMES[judgement.unseen]} it weighs payloads to {shown(payload.mean_abs, ' kg', 1)} on "
+        f"average and {shown(payload.max_abs, ' kg', 1)} at worst, front shares to "
+        f"{shown(share.mean_abs, ' pp')} and {shown(share.max_abs, ' pp')}."
     )
 
 
-def report_json(evidence: Evidence, verdicts: tuple[Verdict, ...], plan: Plan | None) -> dict[str, Any]:
+def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: Plan | None) -> dict[str, Any]:
     """The report's numbers: verdicts with reasons, error tables (12) by estimator and set, run verdicts, the plan."""
     return {
-        "calibration_id": evidence.file.id,
-        "vehicle": evidence.vehicle.name,
+        "calibration_id": assessment.file.id,
+        "vehicle": assessment.vehicle.name,
         "grade": str(verdicts[0].grade),
         "verdicts": [
             {
@@ -171,10 +171,11 @@ def report_json(evidence: Evidence, verdicts: tuple[Verdict, ...], plan: Plan | 
                     for f in one.findings
                 ],
             }
-            for one in (evidence.outcome.verdicts if evidence.outcome else ())
+            for one in (assessment.outcome.verdicts if assessment.outcome else ())
         ],
         "errors": {
-            one.estimator: {str(part): table for part, table in one.tables.items()} for one in evidence.judgements
+            one.estimator: {str(part): table.to_json() for part, table in one.tables.items()}
+            for one in assessment.judgements
         },
         "plan": plan.to_json() if plan else None,
     }

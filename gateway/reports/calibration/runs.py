@@ -3,7 +3,7 @@
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection.finding import Finding, RunVerdict
 from gateway.calibration.inspection.split_run import SplitRun
-from gateway.calibration.judgement.evidence import Evidence
+from gateway.calibration.judgement.assessment import Assessment
 from gateway.calibration.plan.plan import Advice, Expected, Plan
 from gateway.records import Why
 from gateway.reports.calibration.text import NONE, percent, shown, span
@@ -97,9 +97,9 @@ def _expected(expected: Expected) -> tuple[str, str, str]:
     return f"± {expected.payload_std_kg:.1f} kg", f"± {expected.front_share_std_pct:.2f} pp", reach
 
 
-def provenance_section(evidence: Evidence) -> Section:
+def provenance_section(assessment: Assessment) -> Section:
     """What to know to make the same again, and the ranges it holds in."""
-    file, provenance = evidence.file, evidence.file.provenance
+    file, provenance = assessment.file, assessment.file.provenance
     seen = file.seen
     roughness = "not known" if seen.roughness_mps2 is None else span(*seen.roughness_mps2, "m/s²", 2)
     facts = (

@@ -4,13 +4,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.inspection.split_run import SplitRun
-from gateway.calibration.judgement.evaluation import Judged, error_table, judge
+from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.fit import N_SEGMENT
 from gateway.calibration.ratio_index.regression import fit_regression
@@ -96,11 +96,11 @@ class Evidence:
         """The one calibrated on the simulated grid."""
         return ratio_index_of(self.simulated[0])
 
-    def table(self, kind: str, split: str, method: Method) -> dict[str, Any]:
-        """The error table (12) of one part of a campaign."""
+    def errors(self, kind: str, split: str, method: Method) -> Errors:
+        """(12) over one part of a campaign."""
         driven = self.driven[kind]
         runs = driven.identification if split == "identification" else driven.validation
-        return error_table(method.judge(runs), driven.campaign.vehicle, method.estimator)
+        return errors_of(method.judge(runs), driven.campaign.vehicle)
 
 
 def ratio_index_of(method: Method) -> RatioIndexCalibration:

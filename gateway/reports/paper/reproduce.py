@@ -38,8 +38,8 @@ def best_method(evidence: Evidence) -> Method:
     """The method with the least payload error over test 3, misses counted."""
 
     def error(method: Method) -> float:
-        found = evidence.table("test3", "validation", method)["payload"]["mean_abs_pct_with_misses"]
-        return float("inf") if found is None else float(found)
+        error_pct = evidence.errors("test3", "validation", method).payload.mean_abs_pct_with_misses
+        return math.inf if error_pct is None else error_pct
 
     return min(evidence.simulated, key=error)
 

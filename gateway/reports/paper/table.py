@@ -40,14 +40,13 @@ class Row:
 
 
 def tables_of(evidence: Evidence) -> list[dict[str, Any]]:
-    """The error table (12) of every drive by every method, without its runs and batches."""
+    """(12) over every drive by every method."""
     tables = []
     for kind, split in TITLES:
         methods = evidence.simulated if kind.startswith("test") else evidence.experimental
         for method in methods:
-            errors = evidence.table(kind, split, method)
-            summary = {name: part for name, part in errors.items() if name not in ("runs", "batches")}
-            tables.append({"drive": kind, "split": split, "method": method.label, **summary})
+            named = {"drive": kind, "split": split, "method": method.label, "estimator": method.estimator}
+            tables.append(named | evidence.errors(kind, split, method).to_json())
     return tables
 
 

@@ -1,0 +1,96 @@
+"""What a report of a calibration or an evaluation is made of: estimates held against known loads, by set."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from gateway.calibration.calibrate import Outcome
+from gateway.calibration.campaign import Campaign
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file.parts import RegressionPart
+from gateway.calibration.judgement.evaluation import ErrorTable, Target, error_table, judge
+from gateway.calibration.judgement.left_out import judged_left_out
+from gateway.core.vehicle import Vehicle
+
+
+class Part(StrEnum):
+    """A set of known-load batches by what calibration knew of them."""
+
+    LEFT_OUT = "left_one_run_out"
+    IDENTIFICATION = "identification"
+    VALIDATION = "validation"
+    ALL = "all"
+
+
+PART_NAMES: Mapping[Part, str] = {
+    Part.LEFT_OUT: "runs left out",
+    Part.IDENTIFICATION: "identification part (in-sample)",
+    Part.VALIDATION: "validation part",
+    Part.ALL: "all batches",
+}
+PART_TEXT: Mapping[Part, str] = {
+    Part.LEFT_OUT: "Runs left out: every run's identification part, weighed by a calibration from the other runs.",
+    Part.IDENTIFICATION: "Identification part: the batches that the calibration was fitted to, so errors look small.",
+    Part.VALIDATION: "Validation part: later batches of the same runs, which no fit has seen; their loads it has.",
+    Part.ALL: "All batches of the campaign, whether the calibration was fitted to them or not.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """One estimator's error tables (12) by set; a set without a batch is not there.
+
+    ``dof`` are the degrees of freedom behind its intervals, where they are Student's and not normal.
+    """
+
+    estimator: str
+    tables: Mapping[Part, ErrorTable]
+    dof: Mapping[Target, float] = field(default_factory=dict)
+
+    @property
+    def unseen(self) -> Part | None:
+        """The set that tells most of loads yet to come: runs left out, else validation."""
+        return next((part for part in (Part.LEFT_OUT, Part.VALIDATION, Part.ALL) if part in self.tables), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """A calibration file and how it did. ``outcome`` is how it came about; None where a file is only evaluated."""
+
+    title: str
+    file: CalibrationFile
+    vehicle: Vehicle
+    judgements: tuple[Judgement, ...]
+    outcome: Outcome | None = None
+
+
+def assess_calibration(campaign: Campaign, outcome: Outcome) -> Assessment:
+    """Every estimator judged on runs left out, on what it was fitted to and on the validation part."""
+    file, vehicle, calibrated = outcome.file, campaign.vehicle, outcome.file.for_core()
+    judgements = []
+    for estimator in file.estimators:
+        judged = {
+            Part.LEFT_OUT: judged_left_out(outcome, estimator),
+            Part.VALIDATION: [j for run in outcome.split for j in judge(run.validation, calibrated, estimator)],
+            Part.IDENTIFICATION: [j for run in outcome.split for j in judge(run.identification, calibrated, estimator)],
+        }
+        tables = {part: error_table(rows, vehicle, estimator) for part, rows in judged.items() if rows}
+        judgements.append(Judgement(estimator, tables, _dof(file, estimator)))
+    return Assessment(f"Calibration of {vehicle.name}", file, vehicle, tuple(judgements), outcome)
+
+
+def assess_evaluation(campaign: Campaign, file: CalibrationFile, part: Part, table: ErrorTable) -> Assessment:
+    """One estimator of a calibration file judged on one part of a campaign."""
+    judgement = Judgement(table.estimator, {part: table}, _dof(file, table.estimator))
+    return Assessment(f"Evaluation of {campaign.vehicle.name}", file, campaign.vehicle, (judgement,))
+
+
+def _dof(file: CalibrationFile, estimator: str) -> dict[Target, float]:
+    """The ratio index's intervals are a regression's."""
+    if estimator != "ratio_index" or file.ratio_index is None:
+        return {}
+    models: dict[Target, RegressionPart | None] = {
+        "payload": file.ratio_index.payload,
+        "front_share": file.ratio_index.front_share,
+    }
+    return {target: model.dof for target, model in models.items() if model is not None}
