@@ -14,13 +14,8 @@ from gateway.records import Batch, Motion
 from gateway.units import NS_PER_S
 
 
-def motion_of_whole_log(log: Path, signal_map: SignalMap) -> Motion:
-    """All rows of one log at once. Raises LogUnreadableError where nothing in it can be read."""
-    return read_whole_log(log, signal_map)[0]
-
-
 def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]:
-    """The same with what the reader met on its way."""
+    """All rows of one log at once, and what the reader met. Raises LogUnreadableError where nothing can be read."""
     motions, report, _ = motion_of_log(log, signal_map)
     parts = list(motions)
     report.require_frames()

@@ -11,7 +11,6 @@ from gateway.sim.drive import Drive
 from gateway.sim.integrator import FIRST_LOAD, GROUND, N_BODY, Course, accelerations, integrate, look_up_ground
 from gateway.sim.road import Road
 from gateway.sim.vehicle import Load, Vehicle
-from gateway.units import STANDARD_GRAVITY_MPS2
 
 STEP_S: Final = 0.001
 RECORD_EVERY: Final = 2
@@ -99,15 +98,6 @@ def equilibrium(chassis: Chassis, course: Course) -> tuple[F64, F64]:
             break
     _residual(chassis, position, still, tyre_n)
     return position, tyre_n
-
-
-def static_axle_loads_kg(vehicle: Vehicle, loads: tuple[Load, ...]) -> tuple[float, float]:
-    """Front and rear axle load on level ground, from the equilibrium of the whole model."""
-    level = np.zeros(2)
-    course = Course(1.0, level, level, vehicle.wheelbase_m, 1.0, level, level, level, level)
-    _, tyre_n = equilibrium(chassis_of(vehicle, loads), course)
-    front, rear = (float(np.sum(pair)) / STANDARD_GRAVITY_MPS2 for pair in (tyre_n[:2], tyre_n[2:]))
-    return front, rear
 
 
 def _residual(chassis: Chassis, position: F64, ground: Records, tyre_n: F64) -> F64:

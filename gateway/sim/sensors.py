@@ -106,8 +106,6 @@ class Sensors:
 
 _DEG: Final = math.pi / 180.0
 
-IDEAL: Final = Sensors()
-
 REFERENCE: Final = Sensors(
     mount=Mount(left_m=0.15, roll_deg=1.0, pitch_deg=-1.5, yaw_deg=2.0),
     imu=Imu(

@@ -11,6 +11,7 @@ from contextlib import closing
 import can
 import numpy as np
 import pytest
+from support.encoded import encode_signals
 from support.patience import PATIENCE_S
 
 from gateway.bus.frames import join, merge_frames
@@ -19,7 +20,6 @@ from gateway.bus.logs.candump_write import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.messages import message_of
 from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.encode import Encoder
 from gateway.bus.signals.signal_map import load_signal_map, shipped_map
 from gateway.bus.sink import BusSink, replay
 from gateway.errors import LogUnreadableError
@@ -64,7 +64,7 @@ def drive(signal_map) -> Frames:
         Signal.PITCH_RATE: rng.normal(0, 0.05, 200),
         Signal.SPEED: 14 + rng.normal(0, 0.1, 10),
     }
-    ours = Encoder(signal_map).encode_signals(t_ns, samples)
+    ours = encode_signals(signal_map, t_ns, samples)
     n = 300
     ids = rng.choice(np.array([0x7E8, 0x200, 0x18FEF100 | EXTENDED_ID], np.uint32), n)
     others = Frames(

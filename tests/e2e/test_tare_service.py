@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from support.calibrated import calibration_file
+from support.encoded import encode_signals
 from support.patience import wait_until
 from support.ports import first_answer
 
 from gateway.bus.logs.candump_write import write_candump
-from gateway.bus.signals.encode import Encoder
 from gateway.bus.signals.signal_map import load_signal_map
 from gateway.bus.sink import replay
 from gateway.cli import springscale
@@ -36,7 +36,8 @@ def drive(duration_s: float, start_ns: int, seed: int) -> Frames:
     n = round(100 * duration_s)
     t_ns = start_ns + np.arange(n) * 10_000_000
     gps_ns = start_ns + np.arange(round(5 * duration_s)) * 200_000_000
-    return Encoder(load_signal_map("springscale:reference")).encode_signals(
+    return encode_signals(
+        load_signal_map("springscale:reference"),
         {Signal.VERTICAL_ACCELERATION: t_ns, Signal.PITCH_RATE: t_ns, Signal.SPEED: gps_ns},
         {
             Signal.VERTICAL_ACCELERATION: 9.81 + 0.5 * rng.standard_normal(n),

@@ -15,7 +15,7 @@ from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.inspection.run import Inspected, inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
-from gateway.offline.batches import Stretch, batches_of_motion, motion_of_whole_log, rows_within
+from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
 from gateway.offline.campaigns import inspect
 
 SETTINGS = BatchSettings()
@@ -57,7 +57,7 @@ def test_a_spoiled_signal_map_is_named(
     loaded = load_campaign(source / f"{campaign}.toml")
     run = loaded.runs[log - 1]
     signal_map = load_signal_map(tmp_path / "signals.toml")
-    motion = rows_within(motion_of_whole_log(loaded.log_of(run), signal_map), Stretch(0.0, 700.0))
+    motion = rows_within(read_whole_log(loaded.log_of(run), signal_map)[0], Stretch(0.0, 700.0))
     batches = batches_of_motion(motion, signal_map, SETTINGS)
     known = KnownRun(log, str(run.log), run.payload_kg, loaded.front_share_pct(run), batches)
     one = Inspected(known, KnownRun(log, "", 0.0, 0.0, ()), row_facts(motion, signal_map.traits))

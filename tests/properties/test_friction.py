@@ -16,13 +16,19 @@ from gateway.core.cross_spectrum.estimator import CrossSpectrum, CrossSpectrumCa
 from gateway.core.cross_spectrum.friction import LEAST_LEFT, LEVELS, MOST, at_levels, level_weights
 from gateway.core.cross_spectrum.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.measured import log_amplitude_of
-from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, in_units
-from gateway.records import Batch
+from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, is_positive
+from gateway.records import F64, Batch
 
 ROADS_MPS2 = (0.4, 0.8, 1.4)
 MOVED_MPS2 = 0.8  # where friction makes up these shares of a rate
 DAMPER_SHARE, SPRING_SHARE = 0.35, 0.04
 amplitudes = st.floats(-2.0, 2.0)
+
+
+def in_units(theta: F64, name: str) -> float:
+    """One parameter of a vector (p,) in the unit its name ends in."""
+    entry = float(theta[INDEX[name]])
+    return float(np.exp(entry)) if is_positive(name) else entry
 
 
 def with_friction(shaken_mps2: float) -> HalfCar:

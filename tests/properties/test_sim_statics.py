@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.statics import static_axle_loads_kg
 
 from gateway.sim.drive import constant
-from gateway.sim.ride import ride, static_axle_loads_kg
+from gateway.sim.ride import ride
 from gateway.sim.road import PaperRoad
 from gateway.sim.vans import PAPER_VAN, VANS
 from gateway.sim.vehicle import Load, axle_loads_kg, front_share_pct, load_for_share, payload_kg

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.sensor_faults import Fault, with_fault
 
 from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.signal_map import load_signal_map
@@ -9,7 +10,6 @@ from gateway.core.settings import BatchSettings
 from gateway.offline.batches import batches_of_motion
 from gateway.records import Why
 from gateway.sim.drive import constant
-from gateway.sim.faults import Fault, with_fault
 from gateway.sim.road import iso_road
 from gateway.sim.scenario import START_NS, simulate_drive
 from gateway.sim.sensors import REFERENCE, Recording

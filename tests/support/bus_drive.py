@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from gateway.bus.signals.encode import Encoder
 from gateway.bus.signals.signal_map import load_signal_map
 from gateway.records import Frames, Signal
+from support.encoded import encode_signals
 
 START_NS = 1_790_000_000_000_000_000
 
@@ -16,7 +16,8 @@ def bus_drive(duration_s: float, seed: int, signals: str = "springscale:referenc
     road = np.convolve(rng.standard_normal(n + 40), np.hanning(12), mode="same")
     t_ns = start_ns + np.arange(n) * 10_000_000
     gps_ns = start_ns + np.arange(round(5 * duration_s)) * 200_000_000
-    return Encoder(load_signal_map(signals)).encode_signals(
+    return encode_signals(
+        load_signal_map(signals),
         {Signal.VERTICAL_ACCELERATION: t_ns, Signal.PITCH_RATE: t_ns, Signal.SPEED: gps_ns},
         {
             Signal.VERTICAL_ACCELERATION: 9.81 + 0.3 * road[20 : n + 20],

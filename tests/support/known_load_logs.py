@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from gateway.bus.logs.candump_write import write_candump
-from gateway.bus.signals.encode import Encoder
 from gateway.bus.signals.signal_map import load_signal_map
 from gateway.core.vehicle import front_share_pct
 from gateway.records import Signal
+from support.encoded import encode_signals
 from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS
 
@@ -69,4 +69,4 @@ def _write_drive(path: Path, number: int, payload_kg: float, share_pct: float, d
         Signal.PITCH_RATE: batch.pitch_rate_radps,
         Signal.SPEED: batch.speed_mps[::10] + 0.05 * rng.standard_normal(len(t_ns[::10])),
     }
-    write_candump(Encoder(load_signal_map(SIGNALS)).encode_signals(stamps, samples), "can0", path)
+    write_candump(encode_signals(load_signal_map(SIGNALS), stamps, samples), "can0", path)

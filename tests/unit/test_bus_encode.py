@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.encoded import encode_signals
 
 from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.encode import Encoder
@@ -29,7 +30,7 @@ def test_what_is_encoded_is_decoded_to_half_a_step(name):
     signal_map = load_signal_map(f"springscale:{name}")
     t_ns, samples = samples_of(signal_map)
     decoder = Decoder(signal_map)
-    motion = decoder.decode(Encoder(signal_map).encode_signals(t_ns, samples))
+    motion = decoder.decode(encode_signals(signal_map, t_ns, samples))
     for signal in signal_map.signals:
         found_ns, found = motion.of(signal)
         resolution = signal_map.traits[signal].resolution
@@ -71,13 +72,13 @@ def test_signals_of_one_message_travel_together():
     t_ns, samples = samples_of(signal_map)
     t_ns[Signal.LONGITUDINAL_ACCELERATION] = t_ns[Signal.LONGITUDINAL_ACCELERATION] + 1
     with pytest.raises(ValueError, match="'IMU_ACCEL' travel together"):
-        Encoder(signal_map).encode_signals(t_ns, samples)
+        encode_signals(signal_map, t_ns, samples)
 
 
 def test_messages_are_merged_in_order_of_time():
     signal_map = load_signal_map("springscale:reference")
     t_ns, samples = samples_of(signal_map, 50)
     t_ns[Signal.PITCH_RATE] = t_ns[Signal.PITCH_RATE] + 3_000_000
-    frames = Encoder(signal_map).encode_signals(t_ns, samples)
+    frames = encode_signals(signal_map, t_ns, samples)
     assert (np.diff(frames.t_ns) >= 0).all()
     assert len(frames) == 150

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.half_car_road import CAR
+from support.textbook import half_car as textbook_half_car
 
 from gateway.core.cross_spectrum.half_car import Axle, HalfCar, frequency_response
 from gateway.sim.vans import PAPER_VAN, SMALL_VAN
 from gateway.sim.vehicle import Axle as SimulatedAxle
 from gateway.sim.vehicle import Load, Vehicle, front_share_pct
-from tests.unit.test_sim_half_car import half_car as textbook_half_car
 
 STIFF = 1e12
 PLACE_ROUNDED = 5e-3  # 1/L is rounded off below 30 kg: 1 % of what the place of 300 kg does

@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from support.sensor_faults import Fault, with_fault
 
 from gateway.records import F64
-from gateway.sim.faults import Fault, with_fault
 from gateway.sim.sensors import Recording
 
 N, M, FROM_NS = 1000, 50, 6_000_000_000

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
+from support.iri import BASE_M, K1, K2, MU, SPEED_MPS, C, iri_by_section, iri_m_per_km
 
-from gateway.sim.iri import BASE_M, K1, K2, MU, SPEED_MPS, C, iri_by_section, iri_m_per_km
 from gateway.sim.road import PaperRoad, SpectralRoad, iso_roughness_m3
 
 

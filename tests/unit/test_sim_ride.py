@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.statics import static_axle_loads_kg
 
 from gateway.records import F64
 from gateway.sim.chassis import Chassis, chassis_of
 from gateway.sim.drive import Drive, Leg, constant, drive_of
 from gateway.sim.integrator import Course, integrate
-from gateway.sim.ride import Ride, ride, static_axle_loads_kg
+from gateway.sim.ride import Ride, ride
 from gateway.sim.road import PaperRoad, Road, iso_road
 from gateway.sim.vans import LARGE_VAN, PAPER_VAN, SMALL_VAN
 from gateway.sim.vehicle import Axle, Damper, Load, Vehicle, axle_loads_kg

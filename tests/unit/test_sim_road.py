@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from scipy import signal
+from support.iri import iri_by_section
 
-from gateway.sim.iri import iri_by_section
 from gateway.sim.obstacles import Bump, ObstacleRoad, UnevenRoad, with_bumps
 from gateway.sim.road import PaperRoad, Road, RoadRecipe, SpectralRoad, iso_road, iso_roughness_m3
 

@@ -6,10 +6,11 @@ import pytest
 from gateway.sim.drive import Leg, constant, drive_of, standstill
 from gateway.sim.road import PaperRoad
 from gateway.sim.scenario import START_NS, LoadStep, simulate_drive
-from gateway.sim.sensors import IDEAL, REFERENCE
+from gateway.sim.sensors import REFERENCE, Sensors
 from gateway.sim.vans import PAPER_VAN
 from gateway.sim.vehicle import Load
 
+IDEAL = Sensors()
 HOLD = constant(14.0, 20.0, np.random.default_rng(1))
 STOP_AND_GO = drive_of([Leg(10.0, 20.0), Leg(0.0, 1.0)]).then(standstill(20.0)).then(drive_of([Leg(10.0, 20.0)]))
 AT_REST_S = 45.0

@@ -12,7 +12,7 @@ from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.signal_map import load_signal_map, shipped_map
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.offline.batches import batches_of_motion, motion_of_whole_log
+from gateway.offline.batches import batches_of_motion, read_whole_log
 from gateway.records import EXTENDED_ID, Motion, Signal
 from gateway.sim.drive import constant
 from gateway.sim.road import PaperRoad
@@ -107,7 +107,7 @@ def test_batches_from_the_log_are_those_from_the_arrays(tmp_path: Path) -> None:
     signal_map = load_signal_map("springscale:reference")
     settings = BatchSettings(window_s=60.0)
     write_candump(Wiring("reference").frames_of(recording), "can0", tmp_path / "can.log")
-    from_log = batches_of_motion(motion_of_whole_log(tmp_path / "can.log", signal_map), signal_map, settings)
+    from_log = batches_of_motion(read_whole_log(tmp_path / "can.log", signal_map)[0], signal_map, settings)
     from_arrays = batches_of_motion(motion_of_arrays(recording), signal_map, settings)
     assert len(from_log) == len(from_arrays) == 3
     for read, direct in zip(from_log, from_arrays, strict=True):

@@ -1,13 +1,12 @@
-"""Samples to frames, whole columns at once: the decoder's mirror, for the simulator and for tests."""
+"""Samples to frames, whole columns at once: the decoder's mirror, for the simulator."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
-from gateway.bus.frames import merge_frames
 from gateway.bus.signals.bit_field import U64, BitField, Coding
 from gateway.bus.signals.mapping import MappedMessage, SignalMap
-from gateway.records import F64, I64, U8, Frames, Signal
+from gateway.records import F64, I64, U8, Frames
 
 _J1939_UNUSED = 0xFF  # SAE J1939: bits nobody sends are 1, "not available"
 
@@ -38,22 +37,6 @@ class Encoder:
             put_bits(payload, field, physical_bits(field, physical))
         can_id = np.full(len(t_ns), mapped.frame_id, np.uint32)
         return Frames(t_ns, can_id, np.full(len(t_ns), mapped.length, np.uint8), payload)
-
-    def encode_signals(self, t_ns: Mapping[Signal, I64], samples: Mapping[Signal, F64]) -> Frames:
-        """Frames of mapped signals in SI, each at its own times, in order of time.
-
-        Signals of one message must share their times. Raises ValueError where they do not.
-        """
-        parts = []
-        for message in self._map.messages:
-            mapped = [m for m in message.signals if m.signal in samples]
-            if not mapped:
-                continue
-            times = t_ns[mapped[0].signal]
-            if any(not np.array_equal(times, t_ns[m.signal]) for m in mapped[1:]):
-                raise ValueError(f"the signals of message {message.name!r} travel together: give them the same times")
-            parts.append(self.encode(message.name, times, {m.dbc_signal: samples[m.signal] / m.to_si for m in mapped}))
-        return merge_frames(parts)
 
     def _blank(self, message: MappedMessage, n: int) -> U8:
         """Payload rows (n, width) before any sample is put in."""

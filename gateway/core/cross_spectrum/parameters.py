@@ -79,12 +79,6 @@ def is_positive(name: str) -> bool:
     return name in _POSITIVE
 
 
-def in_units(theta: F64, name: str) -> float:
-    """One parameter of a vector (p,) in the unit its name ends in."""
-    entry = float(theta[INDEX[name]])
-    return float(np.exp(entry)) if is_positive(name) else entry
-
-
 def half_car(theta: F64, ground: Ground) -> HalfCar:
     """The vehicles of the parameter vectors theta (..., p), broadcasting against frequency."""
 

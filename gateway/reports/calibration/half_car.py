@@ -13,7 +13,7 @@ from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Vehicle
-from gateway.records import C128, F64, Spectra
+from gateway.records import F64, Spectra
 from gateway.reports.calibration.knowledge import knowledge_chart, knowledge_of, knowledge_table, told
 from gateway.reports.charts.chart import Axis, Chart, Line, Panel, Section, Table
 
@@ -72,12 +72,6 @@ def _joined(parts: Sequence[Spectra]) -> Spectra | None:
         coherence=np.abs(s_ga) ** 2 / (s_aa * s_gg),
         phase_rad=np.angle(s_ga),
     )
-
-
-def _cross(part: Spectra) -> C128:
-    magnitude = part.vertical_acceleration * part.pitch_rate * np.sqrt(part.coherence)
-    cross: C128 = magnitude * np.exp(1j * part.phase_rad)
-    return cross
 
 
 def half_car_section(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration, vehicle: Vehicle) -> Section:
