@@ -9,10 +9,16 @@ BIN := .venv/bin
 .venv/bin/python:
 	$(PYTHON) -m venv .venv
 
-# The package itself is installed in place: the code is read from here, so only its metadata makes a new set-up.
-.venv/.package: requirements.txt pyproject.toml | .venv/bin/python
-	$(BIN)/pip install --quiet --require-hashes -r requirements.txt
-	$(BIN)/pip install --quiet --no-deps --editable .
+# What builds the package is locked too: nothing is fetched without a hash.
+.venv/.build: requirements-build.txt | .venv/bin/python
+	$(BIN)/pip install --quiet --require-hashes -r requirements-build.txt
+	touch $@
+
+# The package itself, with the workbench, is installed in place: the code is read from here, so only its metadata makes
+# a new set-up.
+.venv/.package: requirements-workbench.txt pyproject.toml .venv/.build
+	$(BIN)/pip install --quiet --require-hashes -r requirements-workbench.txt
+	$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 
 .venv/.development: requirements-dev.txt .venv/.package
@@ -70,7 +76,7 @@ soak: .venv/.development deb
 # Debian packages in build/, for this machine's architecture or another, such as `make deb ARCHITECTURE=arm64`; dpkg-deb
 # must be there, root need not.
 PACKAGED := $(shell find gateway dbc deploy docs -type f -not -name '*.pyc') \
-	CHANGELOG.md LICENSE README.md pyproject.toml requirements.txt
+	CHANGELOG.md LICENSE README.md pyproject.toml requirements.txt requirements-workbench.txt
 PACKAGES := build/.packages$(addprefix -,$(ARCHITECTURE))
 deb: $(PACKAGES)
 $(PACKAGES): $(PACKAGED) | .venv/.package
@@ -94,13 +100,20 @@ docs: .venv/.development
 # --no-emit-*: the lock names no package index, so it serves behind any mirror.
 COMPILE = CUSTOM_COMPILE_COMMAND="make lock" .venv-lock/bin/pip-compile --quiet --generate-hashes --strip-extras \
 	--allow-unsafe --no-annotate --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-emit-options
-GROUPS = import tomllib; g = tomllib.load(open('pyproject.toml', 'rb'))['dependency-groups']; print(*g['dev'], *g['browser'], sep='\n')
+GROUPS = import sys, tomllib; g = tomllib.load(open('pyproject.toml', 'rb'))['dependency-groups']; \
+	print(*(each for name in sys.argv[1:] for each in g[name]), sep='\n')
+
+# What a vehicle needs, what a desk needs besides, what builds the package, what a developer needs besides.
 
 lock:
 	$(PYTHON) -m venv .venv-lock
 	.venv-lock/bin/pip install --quiet pip-tools
 	$(COMPILE) --output-file requirements.txt pyproject.toml
-	$(PYTHON) -c "$(GROUPS)" | $(COMPILE) --constraint requirements.txt --output-file requirements-dev.txt -
+	$(COMPILE) --extra workbench --constraint requirements.txt --output-file requirements-workbench.txt pyproject.toml
+	$(PYTHON) -c "$(GROUPS)" build | $(COMPILE) --constraint requirements-workbench.txt \
+		--output-file requirements-build.txt -
+	$(PYTHON) -c "$(GROUPS)" dev browser | $(COMPILE) --constraint requirements-workbench.txt \
+		--constraint requirements-build.txt --output-file requirements-dev.txt -
 
 clean:
 	rm -rf .venv .venv-lock build

@@ -1,7 +1,7 @@
 """Builds the Debian packages from the locked requirements, without root: `make deb`.
 
 springscale            what a vehicle needs: the service, its tools, estimators and calibration
-springscale-workbench  what only a desk needs: simulator, demo, reproduction, figures (numba, matplotlib)
+springscale-workbench  what only a desk needs: simulator, demo, reproduction, reports (numba, matplotlib, plotly)
 
 Both hold one relocatable tree, /usr/lib/springscale, with every dependency at its locked version: nothing of the
 system's Python packages is used. Wheels are chosen for Debian 12 on the architecture asked for, and all else is the
@@ -10,11 +10,11 @@ same on every processor, so any machine builds the package of any other.
 
 import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tomllib
-from fnmatch import fnmatch
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,11 +29,9 @@ DEPLOY: Final = PROJECT / "deploy"
 TREE: Final = Path("usr/lib/springscale")
 PYTHON: Final = f"python{sys.version_info.major}.{sys.version_info.minor}"
 
-WORKBENCH: Final = frozenset(  # distributions that only the workbench's commands import
-    ("contourpy", "cycler", "fonttools", "kiwisolver", "llvmlite", "matplotlib", "narwhals", "numba", "pillow",
-     "plotly", "pyparsing")
-)  # fmt: skip
-STAYING: Final = ("plotly/package_data/plotly.min.js", "plotly-*.dist-info/*")  # what the dashboard shows of them
+VEHICLE_LOCK: Final = PROJECT / "requirements.txt"
+DESK_LOCK: Final = PROJECT / "requirements-workbench.txt"  # all of the vehicle's, and more
+PINNED: Final = re.compile(r"^([a-z0-9][a-z0-9._-]*)==", re.MULTILINE)
 SOURCES: Final = ("gateway", "dbc", "pyproject.toml", "README.md", "LICENSE")
 
 # (source below the project, target in the package)
@@ -123,12 +121,12 @@ def install(tree: Path, architecture: str) -> None:
     """The locked requirements and the package itself into ``tree``."""
     pip = [sys.executable, "-m", "pip", "install", "-qq", "--no-compile", "--no-deps", "--target", str(tree)]
     pip.append("--disable-pip-version-check")
-    locked = ["--require-hashes", "-r", str(PROJECT / "requirements.txt")]
+    locked = ["--require-hashes", "-r", str(DESK_LOCK)]
     subprocess.run([*pip, *wheel_options(architecture), *locked], check=True)
     with TemporaryDirectory() as folder:  # setuptools leaves its traces beside what it builds
         for name in SOURCES:
             copy(PROJECT / name, Path(folder) / name)
-        subprocess.run([*pip, "--upgrade", folder], check=True)
+        subprocess.run([*pip, "--no-build-isolation", "--upgrade", folder], check=True)
     for leftover in ("bin", "share"):  # launchers of libraries, manual pages
         shutil.rmtree(tree / leftover, ignore_errors=True)
     for tests in [folder for folder in tree.rglob("tests") if folder.is_dir()]:  # the libraries' own: nobody runs them
@@ -139,17 +137,21 @@ def install(tree: Path, architecture: str) -> None:
 
 def part(tree: Path, desk: Path) -> None:
     """Move what only the workbench needs from one tree to the other."""
+    of_desk = pinned(DESK_LOCK) - pinned(VEHICLE_LOCK)
     for found in distributions(path=[str(tree)]):
-        if normal_name(found) in WORKBENCH:
+        if normal_name(found) in of_desk:
             move(found, tree, desk)
 
 
+def pinned(lock: Path) -> frozenset[str]:
+    """Names of the distributions in a lock file."""
+    return frozenset(PINNED.findall(lock.read_text()))
+
+
 def move(found: Distribution, tree: Path, desk: Path) -> None:
-    """The files of one distribution, wherever it recorded them, but for those that stay."""
+    """The files of one distribution, wherever it recorded them."""
     for file in found.files or ():
         source = tree / file
-        if any(fnmatch(str(file), pattern) for pattern in STAYING):
-            continue
         if source.is_file() and tree in source.resolve().parents:
             (desk / file).parent.mkdir(parents=True, exist_ok=True)
             source.rename(desk / file)

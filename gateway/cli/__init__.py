@@ -4,6 +4,7 @@ import os
 import sys
 from importlib import import_module
 from importlib.metadata import version
+from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads only cost
 
@@ -38,8 +39,9 @@ _COMMANDS = {
 }
 
 
-# The vehicle's Debian package leaves these to a package for desks.
+# What a vehicle does without: the extra "workbench", in Debian a package of its own.
 _WORKBENCH = frozenset({"matplotlib", "numba", "plotly"})
+_DEBIAN_TREE = Path("/usr/lib/springscale")
 
 
 class _Lazy(click.Group):
@@ -82,8 +84,14 @@ def main(arguments: list[str] | None = None) -> None:
     except ModuleNotFoundError as fault:
         if fault.name is None or fault.name.partition(".")[0] not in _WORKBENCH:
             raise
-        click.echo(f"springscale: this command needs {fault.name}: apt install springscale-workbench", err=True)
+        click.echo(f"springscale: this command needs {fault.name}: {_workbench_install()}", err=True)
         sys.exit(1)
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+
+
+def _workbench_install() -> str:
+    """The command that installs the workbench beside this installation."""
+    is_debian = Path(__file__).is_relative_to(_DEBIAN_TREE)
+    return "apt install springscale-workbench" if is_debian else "pip install 'springscale[workbench]'"
