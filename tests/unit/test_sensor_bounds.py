@@ -1,4 +1,4 @@
-"""Bounds obey what information must, and docs/method.md shows those that the command prints."""
+"""Bounds obey what information must, and benchmarks/accuracy/trials.md shows those that the command prints."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import Reading
 from gateway.core.cross_spectrum.parameters import Ground
 
-METHOD = Path(__file__).parents[2] / "docs" / "method.md"
+TRIALS = Path(__file__).parents[2] / "benchmarks" / "accuracy" / "trials.md"
 SCENE = Scene(
     point=Point(prior_of(VAN).mean, 200.0, 0.5),
     ground=Ground(VAN.empty_mass_kg, VAN.empty_front_share_pct / 100.0, VAN.wheelbase_m),
@@ -79,4 +79,4 @@ def test_without_slack_or_noise_nothing_would_limit_the_full_matrix() -> None:
 def test_the_page_shows_what_the_command_prints() -> None:
     printed = CliRunner().invoke(studies, ["bounds"], catch_exceptions=False)
     assert printed.exit_code == 0
-    assert printed.stdout in METHOD.read_text(encoding="utf-8")
+    assert printed.stdout in TRIALS.read_text(encoding="utf-8")
