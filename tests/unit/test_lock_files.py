@@ -5,9 +5,9 @@ import json
 import tomllib
 
 import pytest
+from build import DESK_LOCK, VEHICLE_LOCK, pinned
 from support.locks import ROOT, pins
 
-from build import DESK_LOCK, VEHICLE_LOCK, pinned
 from gateway.web.charting import VENDORED
 
 VEHICLE = pins("requirements.txt")
