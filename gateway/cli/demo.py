@@ -14,9 +14,9 @@ import click
 from gateway.bus.sink import BusSink, replay_frames
 from gateway.cli.text.estimate import sentence
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
+from gateway.log import set_up_log
 from gateway.records import json_line
 from gateway.service.gateway import Gateway
-from gateway.service.log import set_up_log
 from gateway.setup import setup_of
 from gateway.sim.scenario import START_NS, Truth
 from gateway.store import Store

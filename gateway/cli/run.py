@@ -9,8 +9,8 @@ import click
 
 from gateway.cli.options import FILE
 from gateway.config import load_settings
+from gateway.log import set_up_log
 from gateway.service.gateway import Gateway
-from gateway.service.log import set_up_log
 from gateway.setup import setup_of
 
 

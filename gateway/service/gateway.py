@@ -6,6 +6,7 @@ import logging
 import signal
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from functools import partial
 
 import uvicorn
 
@@ -13,7 +14,8 @@ from gateway.bus.live.source import OpenReceiver
 from gateway.bus.signals.decode import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError, StoreError
-from gateway.service.log import log_event
+from gateway.log import Event, log_event
+from gateway.service.changes import BatchLog, StateLog
 from gateway.service.notify import Notifier
 from gateway.service.parts import source_of, store_of, uplink_of
 from gateway.service.pipeline import Pipeline
@@ -22,7 +24,16 @@ from gateway.service.status import StatusReport
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.setup import Setup
 from gateway.uplink import uplink_settings
-from gateway.web import Board, KnownLoads, TokenFile, create_app, refuse_open_address, server_config
+from gateway.web import (
+    Board,
+    KnownLoads,
+    Scales,
+    TokenFile,
+    create_app,
+    refuse_open_address,
+    server_config,
+    weigh_latest,
+)
 
 SUPERVISE_S = 0.25
 
@@ -69,10 +80,11 @@ class Gateway:
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
         self.board = Board(stale_after_s=settings.web.stale_after_s)
-        self._restore_board()
+        self._restore_board(setup.calibration.id if setup.calibration else None)
         self.source = source_of(settings.bus, setup, open_receiver)
         flow = setup.flow(settings.batch.for_core(is_live=True))
-        self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board)
+        log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
+        self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board, log_batch)
         self.uplink = uplink_of(forwarding, setup, self.store)
         self.status = StatusReport(settings, setup, self.source, self.pipeline, self.store, self.board, self.uplink)
         self.tare = TareDesk(
@@ -98,12 +110,15 @@ class Gateway:
         self._stopping = asyncio.Event()
         self._failure: str | None = None
 
-    def _restore_board(self) -> None:
+    def _restore_board(self, calibration_id: str | None) -> None:
         """Show what was known before; a disk that refuses even to be read is no reason not to start."""
         try:
             self.board.restore(**asdict(self.store.reader().latest()))
         except StoreError as fault:
-            log_event("what was stored cannot be shown yet", level=logging.WARNING, fault=str(fault))
+            log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
+        heard = self.board.heard()
+        if heard["id"] is not None and heard["calibration_id"] != calibration_id:
+            log_event(Event.CALIBRATION_CHANGED, calibration_id=calibration_id, before=heard["calibration_id"])
 
     @property
     def url(self) -> str:
@@ -133,6 +148,8 @@ class Gateway:
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.request_stop)
         loop.add_signal_handler(signal.SIGHUP, self._reload_told)
+        bus = self._settings.bus
+        log_event(Event.STARTED, version=self.status().version, interface=bus.interface, channel=bus.channel)
         self.source.start()
         self.pipeline.start()
         if self.uplink is not None:
@@ -162,17 +179,20 @@ class Gateway:
     async def _supervise(self, serving: asyncio.Task[None]) -> None:
         """Until asked to stop or a part dies: readiness, watchdog by progress, status line."""
         is_ready, seen, sentence = False, -1, ""
+        log_state = StateLog(self.board)
         while not self._stopping.is_set() and self._failure is None:
             self._failure = self._dead_part(serving)
             if self._server.started and not is_ready:
                 is_ready = True
                 self._notifier.send(READY="1")
-                log_event("ready", url=self.url)
+                log_event(Event.READY, url=self.url)
                 self._on_started(self)
             if self.pipeline.progress != seen:
                 seen = self.pipeline.progress
                 self._notifier.send(WATCHDOG="1")
-            if (told := self.status().sentence()) != sentence:
+            now = self.status()
+            log_state(now)
+            if (told := now.sentence()) != sentence:
                 sentence = told
                 self._notifier.send(STATUS=told)
             with contextlib.suppress(TimeoutError):
@@ -203,4 +223,4 @@ class Gateway:
         self.store.write_event("stopped", {"failure": self._failure})
         n_lost = self.store.close()
         level = logging.ERROR if n_lost or self._failure else logging.INFO
-        log_event("stopped", level=level, failure=self._failure, rows_lost=n_lost)
+        log_event(Event.STOPPED, level=level, failure=self._failure, rows_lost=n_lost)

@@ -5,8 +5,8 @@ import logging
 import threading
 import time
 from collections import Counter
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from gateway.bus.live.inbox import Inbox
 from gateway.bus.signals.decode import Decoder
 from gateway.core.flow import Flow
 from gateway.core.tare import Weighed
+from gateway.log import Event, log_event
 from gateway.records import Estimate, Motion, Signal, estimate_to_json
-from gateway.service.log import log_event
 from gateway.store import Store
 from gateway.units import NS_PER_S
 from gateway.web import Board, boot_clock_s
@@ -53,7 +53,16 @@ class SignalWatch:
 class Pipeline:
     """Runs until :meth:`stop`; what kills it is kept in ``failure``."""
 
-    def __init__(self, inbox: Inbox, decoder: Decoder, flow: Flow, store: Store, board: Board) -> None:
+    def __init__(
+        self,
+        inbox: Inbox,
+        decoder: Decoder,
+        flow: Flow,
+        store: Store,
+        board: Board,
+        on_batch: Callable[[Estimate], None] = lambda found: None,
+    ) -> None:
+        """``on_batch`` hears of every estimate once it is stored and shown."""
         self.decoder = decoder
         self.flow = flow
         self.watch = SignalWatch(decoder.signals)
@@ -66,6 +75,7 @@ class Pipeline:
         self._inbox = inbox
         self._store = store
         self._board = board
+        self._on_batch = on_batch
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="pipeline", daemon=True)
 
@@ -78,7 +88,7 @@ class Pipeline:
         self._stop.set()
         self._thread.join(timeout_s)
         if self._thread.is_alive():
-            log_event("pipeline did not finish in time", level=logging.ERROR, n_frames_waiting=len(self._inbox))
+            log_event(Event.PIPELINE_LATE, level=logging.ERROR, n_frames_waiting=len(self._inbox))
 
     def weighed_age_s(self) -> float | None:
         """Seconds since ``flow.weighed`` was found, on the board's clock; None where there is none. From any thread."""
@@ -99,7 +109,7 @@ class Pipeline:
             self._hand_over(self.flow.flush())
         except BaseException as failure:  # noqa: BLE001 - kept for the service, which ends the process with it
             self.failure = failure
-            log_event("pipeline died", level=logging.CRITICAL, failure=repr(failure))
+            log_event(Event.PIPELINE_DIED, level=logging.CRITICAL, failure=repr(failure))
 
     def _turn(self, timeout_s: float) -> bool:
         """One drain of the inbox; True where there were frames."""
@@ -114,7 +124,7 @@ class Pipeline:
         self.n_frames += len(frames)
         return True
 
-    def _hand_over(self, estimates: Any) -> None:
+    def _hand_over(self, estimates: Iterable[Estimate]) -> None:
         for found in estimates:
             self._count(found)
             if self.flow.weighed is not self._weighed_at[0]:
@@ -122,14 +132,7 @@ class Pipeline:
             record = estimate_to_json(found)
             cursor = None if found.is_provisional else self._store.write_estimate(record)
             self._board.publish(record, cursor)
-            log_event(
-                "provisional estimate" if found.is_provisional else "estimate" if found.counted else "batch rejected",
-                batch=record["id"],
-                payload_kg=record["payload_kg"],
-                payload_std_kg=record["payload_std_kg"],
-                front_share_pct=record["front_share_pct"],
-                rejected=record["rejected"],
-            )
+            self._on_batch(found)
 
     def _count(self, found: Estimate) -> None:
         if found.is_provisional:

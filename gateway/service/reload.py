@@ -13,7 +13,7 @@ import uvicorn
 
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
-from gateway.service.log import log_event, set_log_level
+from gateway.log import Event, log_event, set_log_level
 from gateway.web import Tls, renew_certificate
 
 LIVE: Final = frozenset({"log.level", "web.tls_certificate", "web.tls_key"})
@@ -37,11 +37,11 @@ class Reloader:
             if tls is not None and self._web.is_ssl:
                 renew_certificate(self._web, tls)
         except SpringscaleError as fault:
-            log_event("reload refused, everything stays as it was", level=logging.ERROR, fault=str(fault))
+            log_event(Event.RELOAD_REFUSED, level=logging.ERROR, fault=str(fault))
             return False
         waiting = [key for key in changed_keys(self._running, wanted) if not self._is_live(key, tls)]
         level = logging.WARNING if waiting else logging.INFO
-        log_event("reloaded", level=level, log_level=wanted.log.level, waits_for_restart=waiting)
+        log_event(Event.RELOADED, level=level, log_level=wanted.log.level, waits_for_restart=waiting)
         set_log_level(wanted.log.level)  # last: "warning" would hide that it was done
         return True
 

@@ -1,5 +1,6 @@
 """Where a running service is re-zeroed: the one owner of its tare.json."""
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -12,8 +13,8 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow
 from gateway.core.tare import Refusal, Weighed, Zero, zero_of
 from gateway.errors import TareRefusedError
+from gateway.log import Event, log_event
 from gateway.records import iso_utc, json_line
-from gateway.service.log import log_event
 
 SERVICE = "service"  # who ended a tare where nobody asked for it
 
@@ -98,7 +99,7 @@ class TareDesk:
                 estimator=self._subject.estimator,
             )
             self._keep(self._history.with_entry(entry))
-            self._on_event("tare_set", {"tare_id": entry.id, "by": by, **asdict(zero)})
+            self._tell(Event.TARE_SET, {"tare_id": entry.id, "by": by, **asdict(zero)})
             return json_line(entry.model_dump(mode="json"))
 
     def undo(self, by: str, *, to_factory: bool) -> str:
@@ -110,7 +111,7 @@ class TareDesk:
             chosen = standing if to_factory else standing[-1:]
             end = TareEnd(at=iso_utc(self._clock_ns()), by=by, why="back_to_factory" if to_factory else "undone")
             self._keep(self._history.ended({entry.id for entry in chosen}, end))
-            self._on_event("tare_undone", {"tare_ids": [entry.id for entry in chosen], "by": by})
+            self._tell(Event.TARE_UNDONE, {"tare_ids": [entry.id for entry in chosen], "by": by})
             return self.told()
 
     def _active(self) -> TareEntry | None:
@@ -171,6 +172,11 @@ class TareDesk:
         self._history = history
         self._use()
 
+    def _tell(self, event: Event, fields: Mapping[str, Any]) -> None:
+        """To the log, and to whoever keeps what happened."""
+        log_event(event, **fields)
+        self._on_event(event.value.replace(" ", "_"), fields)
+
     def _use(self) -> None:
         active = self._active()
         self._pipeline.flow.tare = None if active is None else active.for_core()
@@ -187,5 +193,5 @@ class TareDesk:
         try:
             self._keep(self._history.ended(others, end))
         except TareRefusedError as refusal:  # they are not used in any case; the next start tries again
-            log_event("tares of another calibration could not be ended", detail=str(refusal))
-        self._on_event("tare_dropped", {"tare_ids": sorted(others), "calibration_id": calibration_id})
+            log_event(Event.TARE_NOT_DROPPED, level=logging.WARNING, fault=str(refusal))
+        self._tell(Event.TARE_DROPPED, {"tare_ids": sorted(others), "calibration_id": calibration_id})

@@ -12,13 +12,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
+from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.store.database import FILE_NAME, Database, Retention, is_damaged
 from gateway.store.held import Held
 from gateway.store.reader import StoreReader
 from gateway.store.rows import CalibrationRow, EstimateRow, EventRow
-
-_log = logging.getLogger(__name__)
 
 IDLE_S: Final = 60.0  # without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5
@@ -156,7 +155,7 @@ class Store:
         self._thread.join(timeout_s)
         n_lost = len(self._held)
         if n_lost:
-            _log.error("store closed with %d rows that could not be written: %s", n_lost, self._reason or "no time")
+            log_event(Event.STORE_LOST_ROWS, level=logging.ERROR, n_rows=n_lost, reason=self._reason or "no time")
         return n_lost
 
     def _suspect_damage(self) -> None:
@@ -221,7 +220,7 @@ class Store:
             self._n_written += n_new
             self._n_duplicates += n_known
         if self._reason is not None:
-            _log.warning("store is on disk again, %d rows had been held", len(rows))
+            log_event(Event.STORE_RECOVERED, n_held=len(rows))
             self._reason = None
         self._held.settle()
         self._n_pruned += self._database.prune(self._clock_ns())
@@ -230,7 +229,7 @@ class Store:
     def _degrade(self, reason: str) -> bool:
         """Note what the disk refuses. The connection stays: as long as it lives, readers need no new file."""
         if self._reason != reason:
-            _log.warning("store keeps estimates in memory: %s", reason)
+            log_event(Event.STORE_HOLDS, level=logging.WARNING, reason=reason)
         self._reason = reason
         return False
 
@@ -240,5 +239,6 @@ class Store:
             self._set_aside = self._database.set_aside()
         except OSError as refusal:
             return self._degrade(f"{self._path} is damaged ({error}) and cannot be set aside: {refusal}")
-        _log.error("%s is damaged (%s): set aside as %s, a new one begins", self._path, error, self._set_aside)
+        fault = f"{self._path} is damaged ({error})"
+        log_event(Event.STORE_DAMAGED, level=logging.ERROR, fault=fault, set_aside=self._set_aside)
         return self._degrade(f"{self._path} was damaged and set aside as {self._set_aside}, a new one is on its way")

@@ -10,12 +10,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 from gateway.errors import ConfigurationError, StoreError
+from gateway.log import Event, log_event
 from gateway.uplink.back_off import BackOff
 from gateway.uplink.link import Answer, LinkError, MqttLink
 from gateway.uplink.outbox import Letter, Outbox
 from gateway.uplink.settings import UplinkSettings
-
-_log = logging.getLogger(__name__)
 
 POLL_S: Final = 0.5  # how long a new estimate may lie before it is seen
 LOOK_S: Final = 5.0  # how often the backlog is counted
@@ -120,7 +119,7 @@ class Uplink:
         self._report = replace(
             self._report, is_connected=True, n_connections=self._report.n_connections + 1, last_fault=None
         )
-        _log.info("uplink connected to %s", self._settings.broker)
+        log_event(Event.UPLINK_CONNECTED, broker=self._settings.broker)
         try:
             self._deliver(link)
             link.close()
@@ -152,7 +151,9 @@ class Uplink:
         if answer.is_accepted:
             self._report = replace(report, n_delivered=report.n_delivered + 1)
         elif answer.is_hopeless:
-            _log.error("uplink: %s will never take estimate %s: %s", report.broker, letter.id, answer.reason)
+            log_event(
+                Event.UPLINK_REFUSED, level=logging.ERROR, broker=report.broker, id=letter.id, reason=answer.reason
+            )
             self._report = replace(report, n_refused=report.n_refused + 1)
         else:
             raise LinkError(f"{report.broker} does not take estimates: {answer.reason}")
@@ -180,6 +181,9 @@ class Uplink:
         )
 
     def _note(self, fault: str) -> None:
+        """Keep what went wrong, and tell it where it is news; a connection that was there had no fault."""
         if fault != self._report.last_fault:
-            _log.warning("uplink: %s; estimates wait in the store", fault)
+            was_connected = self._report.n_connections > 0 and self._report.last_fault is None
+            event = Event.UPLINK_LOST if was_connected else Event.UPLINK_NOT_REACHED
+            log_event(event, level=logging.WARNING, broker=self._report.broker, fault=fault)
         self._report = replace(self._report, last_fault=fault)

@@ -6,6 +6,7 @@ from gateway.web.door.tokens import Scope, Token, TokenFile
 from gateway.web.live.board import Board, boot_clock_s
 from gateway.web.reader import Reader
 from gateway.web.routes.known_loads import KnownLoad, KnownLoads
+from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 from gateway.web.settings import WebSettings
 from gateway.web.status import (
     BatchCounts,
@@ -25,7 +26,9 @@ __all__ = [
     "DecodeCount",
     "KnownLoad",
     "KnownLoads",
+    "LatestWeights",
     "Reader",
+    "Scales",
     "Scope",
     "SignalHealth",
     "State",
@@ -41,4 +44,5 @@ __all__ = [
     "refuse_open_address",
     "renew_certificate",
     "server_config",
+    "weigh_latest",
 ]

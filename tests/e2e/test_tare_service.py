@@ -7,44 +7,25 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from support.bus_drive import START_NS, white_noise
 from support.calibrated import calibration_file
-from support.encoded import encode_signals
+from support.log import fields_of, names
 from support.patience import wait_until
 from support.ports import first_answer
 
 from gateway.bus.logs.candump_write import write_candump
-from gateway.bus.signals.signal_map import load_signal_map
 from gateway.bus.sink import replay
 from gateway.cli import springscale
 from gateway.config import load_settings
 from gateway.errors import SpringscaleError
-from gateway.records import Frames, Signal
+from gateway.log import Event
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
 from gateway.store import Store
 
-START_NS = 1_790_000_000_000_000_000
 HOUR_NS = 3_600 * 10**9
-
-
-def drive(duration_s: float, start_ns: int, seed: int) -> Frames:
-    """White noise on both sensors at 15 m/s: enough for a regression that always answers the same."""
-    rng = np.random.default_rng(seed)
-    n = round(100 * duration_s)
-    t_ns = start_ns + np.arange(n) * 10_000_000
-    gps_ns = start_ns + np.arange(round(5 * duration_s)) * 200_000_000
-    return encode_signals(
-        load_signal_map("springscale:reference"),
-        {Signal.VERTICAL_ACCELERATION: t_ns, Signal.PITCH_RATE: t_ns, Signal.SPEED: gps_ns},
-        {
-            Signal.VERTICAL_ACCELERATION: 9.81 + 0.5 * rng.standard_normal(n),
-            Signal.PITCH_RATE: 0.02 * rng.standard_normal(n),
-            Signal.SPEED: 15.0 + 0.1 * rng.standard_normal(len(gps_ns)),
-        },
-    )
 
 
 @pytest.fixture
@@ -155,7 +136,7 @@ def logs(tmp_path: Path) -> list[Path]:
     """Three drives, an hour from one to the next."""
     paths = [tmp_path / f"drive{n}.log" for n in range(3)]
     for n, path in enumerate(paths):
-        write_candump(drive(45.0, START_NS + n * HOUR_NS, seed=n), "can0", path)
+        write_candump(white_noise(45.0, START_NS + n * HOUR_NS, seed=n), "can0", path)
     return paths
 
 
@@ -240,7 +221,7 @@ def test_check_config_looks_at_the_tare_too(config: Path, logs: list[Path], tmp_
 
 def test_a_drive_that_has_begun_since_is_refused(config: Path, logs: list[Path], tmp_path: Path) -> None:
     short = tmp_path / "short.log"
-    write_candump(drive(5.0, START_NS + HOUR_NS, seed=9), "can0", short)
+    write_candump(white_noise(5.0, START_NS + HOUR_NS, seed=9), "can0", short)
 
     def meet(service: Running) -> None:
         service.play(logs[0])
@@ -251,3 +232,22 @@ def test_a_drive_that_has_begun_since_is_refused(config: Path, logs: list[Path],
 
     serve(config, meet)
     assert not (tmp_path / "state" / "tare.json").exists()
+
+
+def test_the_log_tells_of_another_calibration_and_of_the_tare_that_ends_with_it(
+    config: Path, logs: list[Path], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "gateway")
+    before = calibration_file(payload_kg=12.0, front_share_pct=51.0).id
+
+    def meet(service: Running) -> None:
+        service.play(logs[0])
+        service.told("set", "--empty")
+
+    serve(config, meet)
+    assert Event.CALIBRATION_CHANGED not in names(caplog)
+    other = calibration_file(payload_kg=13.0, front_share_pct=51.0)
+    (tmp_path / "vehicle.json").write_text(other.to_json())
+    serve(config, lambda service: None)
+    assert fields_of(caplog, Event.CALIBRATION_CHANGED) == {"calibration_id": other.id, "before": before}
+    assert fields_of(caplog, Event.TARE_DROPPED)["calibration_id"] == other.id

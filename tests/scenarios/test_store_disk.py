@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 from support.estimates import make_record, texts
+from support.log import fields_of, names
 from support.patience import PATIENCE_S
 
 from gateway.errors import StoreError
+from gateway.log import Event
 from gateway.store import Retention, Store, StoreReader, StoreState, schema
 
 
@@ -205,3 +207,18 @@ def test_a_question_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     with pytest.raises(TimeoutError, match="ask for less"):
         reader.estimates(limit=5000, with_spectra=False)
     store.close()
+
+
+def test_the_log_tells_when_the_disk_refuses_and_when_it_is_back(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "gateway")
+    directory = blocked_directory(tmp_path)
+    with closing(Store.open(directory)) as store:
+        store.write_estimate(make_record(0))
+        store.write_estimate(make_record(1))
+        directory.parent.unlink()
+        assert store.flush(PATIENCE_S)
+    assert names(caplog) == [Event.STORE_HOLDS, Event.STORE_RECOVERED]
+    assert str(directory.parent) in fields_of(caplog, Event.STORE_HOLDS)["reason"]
+    assert fields_of(caplog, Event.STORE_RECOVERED) == {"n_held": 2}

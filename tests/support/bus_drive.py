@@ -25,3 +25,20 @@ def bus_drive(duration_s: float, seed: int, signals: str = "springscale:referenc
             Signal.SPEED: 13.9 + 0.1 * rng.standard_normal(len(gps_ns)),
         },
     )
+
+
+def white_noise(duration_s: float, start_ns: int, seed: int) -> Frames:
+    """White noise on both sensors at 15 m/s: enough for a regression that always answers the same."""
+    rng = np.random.default_rng(seed)
+    n = round(100 * duration_s)
+    t_ns = start_ns + np.arange(n) * 10_000_000
+    gps_ns = start_ns + np.arange(round(5 * duration_s)) * 200_000_000
+    return encode_signals(
+        load_signal_map("springscale:reference"),
+        {Signal.VERTICAL_ACCELERATION: t_ns, Signal.PITCH_RATE: t_ns, Signal.SPEED: gps_ns},
+        {
+            Signal.VERTICAL_ACCELERATION: 9.81 + 0.5 * rng.standard_normal(n),
+            Signal.PITCH_RATE: 0.02 * rng.standard_normal(n),
+            Signal.SPEED: 15.0 + 0.1 * rng.standard_normal(len(gps_ns)),
+        },
+    )

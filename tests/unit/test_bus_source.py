@@ -7,6 +7,7 @@ import time
 import can
 import numpy as np
 import pytest
+from support.log import logged, names
 from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus.frames import empty_frames
@@ -15,6 +16,7 @@ from gateway.bus.live.receiver import Burst
 from gateway.bus.live.source import LiveSource, SourceState
 from gateway.bus.signals.signal_map import load_signal_map
 from gateway.errors import BusError
+from gateway.log import Event
 from gateway.records import Frames
 
 MAP = load_signal_map("springscale:reference")
@@ -273,3 +275,35 @@ def test_other_identifiers_error_and_remote_frames_do_not_reach_the_inbox():
     wait_for(lambda: source.counts().frames + source.counts().remote_frames == 2)
     source.stop()
     assert source.inbox.drain(0.0).payload.tolist() == [[1, 2, 3, 4, 0, 0, 0, 0]]
+
+
+def test_the_log_tells_when_the_bus_goes_and_comes_and_why(listen, caplog):
+    caplog.set_level("INFO", "gateway")
+    down, gone = OSError(errno.ENETDOWN, "Network is down"), OSError(errno.ENODEV, "No such device")
+    source, interface = listen(
+        Burst(frames(1)),
+        Burst(frames(1)),
+        down,
+        AtOpening(down),
+        AtOpening(gone),
+        Burst(empty_frames(8)),
+        silence_s=0.02,
+    )
+    wait_for(lambda: source.state is SourceState.BUS_SILENT)
+    interface.script.append(Burst(frames(1)))
+    wait_for(lambda: source.counts().frames == 3)
+    source.stop()
+    assert names(caplog)[:6] == [
+        Event.BUS_RECEIVING,
+        Event.BUS_FAULT,  # down; that it stays so is no news
+        Event.BUS_FAULT,  # gone
+        Event.BUS_REOPENED,
+        Event.BUS_SILENT,
+        Event.BUS_RECEIVING,
+    ]
+    told = [fields for event, fields in logged(caplog) if event is Event.BUS_FAULT]
+    assert [fields["reason"].partition(":")[0] for fields in told] == [
+        "the interface is down",
+        "the interface does not exist (not plugged in, or removed)",
+    ]
+    assert all((fields["interface"], fields["channel"]) == ("socketcan", "can9") for fields in told)

@@ -13,7 +13,7 @@ from support.web import Gateway, Server, serving
 
 from gateway.config import Settings, load_settings
 from gateway.errors import ConfigurationError
-from gateway.service.log import LOGGER, set_log_level
+from gateway.log import LOGGER, set_log_level
 from gateway.service.notify import Notifier
 from gateway.service.reload import Reloader, changed_keys, tls_of
 from gateway.web import server_config

@@ -8,11 +8,13 @@ from typing import Any
 
 import pytest
 from support.calibrated import calibration_file
+from support.log import fields_of, names
 from support.tare import FakePipeline
 
 from gateway.calibration.tare_file import FILE_NAME, MOST_ENTRIES, load_tares
 from gateway.core.tare import Refusal
 from gateway.errors import ConfigurationError, TareRefusedError
+from gateway.log import Event
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.units import NS_PER_S
 from gateway.web.routes.tare import TareState
@@ -212,3 +214,13 @@ def test_a_file_that_cannot_be_believed_is_refused_and_says_what_to_do(
         Desk(tmp_path)
     assert str(path) in str(fault.value)
     assert "remove it to go on from the factory zero" in str(fault.value)
+
+
+def test_the_log_tells_of_every_change_of_the_zero(desk: Desk, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", "gateway")
+    made = json.loads(desk.desk.tare("workshop", None))
+    desk.desk.undo("office", to_factory=False)
+    assert names(caplog) == [Event.TARE_SET, Event.TARE_UNDONE]
+    told = fields_of(caplog, Event.TARE_SET)
+    assert (told["tare_id"], told["by"], told["payload_kg"]) == (made["id"], "workshop", 12.0)
+    assert fields_of(caplog, Event.TARE_UNDONE) == {"tare_ids": [made["id"]], "by": "office"}

@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 from support.estimates import make_record
+from support.log import fields_of, names
 from support.patience import PATIENCE_S, wait_until
 
 from gateway.config import UplinkSection, VehicleSection
 from gateway.errors import ConfigurationError
+from gateway.log import Event
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings, uplink_settings
 from gateway.uplink.back_off import BackOff
@@ -150,7 +152,7 @@ def test_what_the_broker_will_never_take_is_counted_and_holds_nothing_up(
     uplink = deliver(store, broker, lambda uplink: uplink.report().n_delivered == 5)
     assert [letter.id for letter in broker.taken] == [*ids[:2], *ids[3:]]
     assert uplink.report().n_refused == 1
-    assert ids[2] in caplog.text
+    assert fields_of(caplog, Event.UPLINK_REFUSED)["id"] == ids[2]
 
 
 def test_nothing_leaves_before_the_letter_ahead_is_answered(store: Store) -> None:
@@ -286,3 +288,34 @@ def test_a_setting_that_cannot_work_is_told_at_the_start(section: dict[str, Any]
 def test_settings_that_contradict_each_other_are_refused(section: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         UplinkSection(**section)
+
+
+def test_the_log_tells_of_a_link_when_it_comes_and_when_it_goes(store: Store, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", "gateway")
+    fill(store, 3)
+    faults = iter(["no route", "no route", "no name", None, None])
+
+    def connect(settings: UplinkSettings, birth: Any) -> FakeBroker:
+        if (fault := next(faults)) is not None:
+            raise LinkError(fault)
+        return broker(settings, birth)
+
+    def answer(n: int, letter: Letter) -> Answer:
+        if n == 2:
+            raise LinkError("cut")
+        return accepted(n, letter)
+
+    broker = FakeBroker(answer)
+    uplink = Uplink(SETTINGS, Outbox(store.reader(), store, "fleet"), {}, connect, BackOff(0.001, 0.002))
+    uplink.start()
+    assert wait_until(lambda: uplink.report().n_delivered == 3)
+    uplink.stop()
+    assert names(caplog) == [
+        Event.UPLINK_NOT_REACHED,  # twice for one reason is one line
+        Event.UPLINK_NOT_REACHED,
+        Event.UPLINK_CONNECTED,
+        Event.UPLINK_LOST,
+        Event.UPLINK_CONNECTED,
+    ]
+    assert fields_of(caplog, Event.UPLINK_NOT_REACHED) == {"broker": "broker.example:8883", "fault": "no name"}
+    assert fields_of(caplog, Event.UPLINK_LOST) == {"broker": "broker.example:8883", "fault": "cut"}

@@ -22,8 +22,7 @@ from gateway.bus.live.python_can import open_python_can, require_known_interface
 from gateway.bus.live.receiver import BUS_OFF, Burst, Receiver
 from gateway.bus.live.socketcan import interface_statistics, open_socketcan
 from gateway.bus.signals.signal_map import SignalMap
-
-log = logging.getLogger(__name__)
+from gateway.log import Event, log_event
 
 POLL_S: Final = 0.1  # longest wait inside a receiver: how soon a stop is heeded
 FIRST_PAUSE_S: Final = 0.25
@@ -50,6 +49,14 @@ class SourceState(StrEnum):
     BUS_SILENT = "bus_silent"
     READER_FAULT = "reader_fault"
     STOPPED = "stopped"
+
+
+_EVENTS: Final[Mapping[SourceState, Event]] = {  # that it stops is the service's to tell
+    SourceState.STARTING: Event.BUS_REOPENED,  # entered from a fault only: the first start is no change
+    SourceState.RECEIVING: Event.BUS_RECEIVING,
+    SourceState.BUS_SILENT: Event.BUS_SILENT,
+    SourceState.READER_FAULT: Event.BUS_FAULT,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,8 +222,10 @@ class LiveSource:
         self._error_classes.update(burst.error_classes)
 
     def _enter(self, state: SourceState, reason: str | None) -> None:
-        if state is not self._state:
-            log.info("%s %s: %s%s", self._interface, self._channel, state, f" ({reason})" if reason else "")
+        is_new_fault = state is SourceState.READER_FAULT and reason != self._reason
+        if (state is not self._state or is_new_fault) and state in _EVENTS:
+            level = logging.WARNING if state is SourceState.READER_FAULT else logging.INFO
+            log_event(_EVENTS[state], level=level, interface=self._interface, channel=self._channel, reason=reason)
         self._state, self._reason = state, reason
 
     def _silence(self) -> str:

@@ -17,8 +17,7 @@ from typing import Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from gateway.errors import ConfigurationError
-
-_log = logging.getLogger(__name__)
+from gateway.log import Event, log_event
 
 _PREFIX: Final = "spr"  # lets secret scanners recognise a token that leaked
 
@@ -133,7 +132,7 @@ class TokenFile:
             try:
                 self._read = _Read(stamp, {token.id: token for token in self.tokens()})
             except ConfigurationError as fault:
-                _log.error("no token is accepted: %s", fault)
+                log_event(Event.TOKENS_UNREADABLE, level=logging.ERROR, fault=str(fault))
                 self._read = _Read(stamp, {})
         return self._read.by_id
 

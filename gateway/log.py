@@ -1,0 +1,147 @@
+"""The log: every event under one logger, at one level, written one way; one JSON line each, plain at a terminal.
+
+Standard error is the service's log; systemd keeps it in the journal. docs/deployment.md tells of every event.
+"""
+
+import json
+import logging
+import sys
+import threading
+import time
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable
+from datetime import UTC, datetime
+from enum import StrEnum
+from typing import Any, Final
+
+LOGGER: Final = logging.getLogger("gateway")
+MOST_IN_A_MINUTE: Final = 30  # lines of one event
+
+_SYSLOG_PRIORITY: Final = {
+    logging.DEBUG: 7,
+    logging.INFO: 6,
+    logging.WARNING: 4,
+    logging.ERROR: 3,
+    logging.CRITICAL: 2,
+}
+
+
+class Event(StrEnum):
+    """All that the service writes of itself; what it was about stands in the fields beside it."""
+
+    STARTED = "started"
+    READY = "ready"
+    STATE = "state"
+    STOPPED = "stopped"
+    RELOADED = "reloaded"
+    RELOAD_REFUSED = "reload refused"
+    NOT_RESTORED = "stored estimates cannot be shown yet"
+    CALIBRATION_CHANGED = "calibration changed"
+    PIPELINE_DIED = "pipeline died"
+    PIPELINE_LATE = "pipeline did not finish in time"
+    BUS_RECEIVING = "bus receiving"
+    BUS_SILENT = "bus silent"
+    BUS_FAULT = "bus fault"
+    BUS_REOPENED = "bus reopened"
+    ESTIMATE = "estimate"
+    PROVISIONAL = "provisional estimate"
+    REJECTED = "batch rejected"
+    REASONS_CHANGED = "reasons of rejection changed"
+    STALE = "estimate stale"
+    FRESH = "estimate fresh"
+    OVERLOAD_BEGINS = "overload begins"
+    OVERLOAD_ENDS = "overload ends"
+    STORE_HOLDS = "store keeps rows in memory"
+    STORE_RECOVERED = "store is on disk again"
+    STORE_DAMAGED = "database set aside"
+    STORE_LOST_ROWS = "store closed with rows unwritten"
+    UPLINK_CONNECTED = "uplink connected"
+    UPLINK_LOST = "uplink lost"
+    UPLINK_NOT_REACHED = "uplink not reached"
+    UPLINK_REFUSED = "uplink refused an estimate"
+    TARE_SET = "tare set"
+    TARE_UNDONE = "tare undone"
+    TARE_DROPPED = "tare dropped"
+    TARE_NOT_DROPPED = "tare of another calibration could not be ended"
+    TOKENS_UNREADABLE = "no token is accepted"
+
+
+def log_event(event: Event, *, level: int = logging.INFO, **fields: object) -> None:
+    """Write one event; fields keep their names, so that programs can ask for them."""
+    LOGGER.log(level, event.value, extra={"fields": fields})
+
+
+class FloodGate(logging.Filter):
+    """Lets each event of ours through so often in a minute; the next line that passes tells how many were left out."""
+
+    def __init__(self, most: int = MOST_IN_A_MINUTE, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._written_s: defaultdict[str, deque[float]] = defaultdict(lambda: deque(maxlen=most))
+        self._left_out: Counter[str] = Counter()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """False where this event was written too often; other libraries' records always pass."""
+        if record.name != LOGGER.name:
+            return True
+        event, now_s = record.getMessage(), self._clock()
+        with self._lock:
+            written_s = self._written_s[event]
+            if len(written_s) == written_s.maxlen and now_s - written_s[0] < 60.0:
+                self._left_out[event] += 1
+                return False
+            written_s.append(now_s)
+            n_left_out = self._left_out.pop(event, 0)
+        if n_left_out:
+            record.fields = {**_fields(record), "left_out": n_left_out}
+        return True
+
+
+class JsonFormatter(logging.Formatter):
+    """{"t": ..., "level": ..., "event": ..., further keys}; journald reads the priority before it (sd-daemon(3))."""
+
+    def __init__(self, *, with_priority: bool) -> None:
+        super().__init__()
+        self._with_priority = with_priority
+
+    def format(self, record: logging.LogRecord) -> str:
+        """One line."""
+        entry: dict[str, Any] = {
+            "t": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "event": record.getMessage(),
+            **_fields(record),
+        }
+        if record.exc_info:
+            entry["exception"] = self.formatException(record.exc_info)
+        prefix = f"<{_SYSLOG_PRIORITY.get(record.levelno, 6)}>" if self._with_priority else ""
+        return prefix + json.dumps(entry, default=str)
+
+
+class PlainFormatter(logging.Formatter):
+    """level event key=value ..., for people at a terminal."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """One line."""
+        fields = " ".join(f"{key}={said}" for key, said in _fields(record).items())
+        line = f"{record.levelname.lower():7} {record.getMessage()} {fields}".rstrip()
+        return f"{line}\n{self.formatException(record.exc_info)}" if record.exc_info else line
+
+
+def set_up_log(level: str, *, under_journald: bool) -> None:
+    """Everything goes to standard error; other libraries' warnings and worse come through as well."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(PlainFormatter() if sys.stderr.isatty() else JsonFormatter(with_priority=under_journald))
+    handler.addFilter(FloodGate())
+    logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
+    set_log_level(level)
+
+
+def set_log_level(level: str) -> None:
+    """The least level of our own events that is written: debug, info, warning or error."""
+    LOGGER.setLevel(level.upper())
+
+
+def _fields(record: logging.LogRecord) -> dict[str, object]:
+    return getattr(record, "fields", {})

@@ -1,0 +1,87 @@
+"""What changed, for the log: a line where the batches or the service turn to something else, none while they stay."""
+
+import logging
+import math
+from collections.abc import Callable
+from typing import Final
+
+from gateway.log import Event, log_event
+from gateway.records import Estimate, Why
+from gateway.web import Board, LatestWeights, State, Status
+
+PLACES: Final = ("gross", "front_axle", "rear_axle")
+
+
+class BatchLog:
+    """Told of every batch by the pipeline. ``weigh`` gives the weights the web shows, warnings included."""
+
+    def __init__(self, weigh: Callable[[], LatestWeights]) -> None:
+        self._weigh = weigh
+        self._rejected: frozenset[Why] = frozenset()  # of the last full batch; before the first, as if it had counted
+        self._overloaded = self._now_overloaded()
+
+    def __call__(self, found: Estimate) -> None:
+        """A new estimate is a line; rejected and provisional ones are for those who look for a fault (debug)."""
+        is_answer = found.counted and not found.is_provisional
+        event = Event.PROVISIONAL if found.is_provisional else Event.ESTIMATE if found.counted else Event.REJECTED
+        log_event(
+            event,
+            level=logging.INFO if is_answer else logging.DEBUG,
+            batch=found.id,
+            payload_kg=_or_none(found.payload_kg),
+            payload_std_kg=_or_none(found.payload_std_kg),
+            front_share_pct=_or_none(found.front_share_pct),
+            rejected=found.rejected,
+        )
+        if not found.is_provisional:
+            self._tell_reasons(found.rejected)
+            self._tell_overload()
+
+    def _tell_reasons(self, rejected: tuple[Why, ...]) -> None:
+        """Where the set is another than that of the batch before."""
+        before, self._rejected = self._rejected, frozenset(rejected)
+        if self._rejected != before:
+            log_event(Event.REASONS_CHANGED, rejected=rejected, before=sorted(before))
+
+    def _tell_overload(self) -> None:
+        before, self._overloaded = self._overloaded, self._now_overloaded()
+        if before == self._overloaded:
+            return
+        weights = self._weigh()
+        for where in PLACES:
+            if (where in before) is not (where in self._overloaded):
+                figure = getattr(weights, where)
+                is_over = where in self._overloaded
+                log_event(
+                    Event.OVERLOAD_BEGINS if is_over else Event.OVERLOAD_ENDS,
+                    level=logging.WARNING if is_over else logging.INFO,
+                    where=where,
+                    kg=figure.kg,
+                    limit_kg=figure.limit_kg,
+                )
+
+    def _now_overloaded(self) -> frozenset[str]:
+        weights = self._weigh()
+        return frozenset(where for where in PLACES if getattr(weights, where).is_over_limit)
+
+
+class StateLog:
+    """Told of the service's state by whoever watches it, often; writes where it is another than before."""
+
+    def __init__(self, board: Board) -> None:
+        self._board = board
+        self._state: State | None = None
+        self._is_stale = board.is_stale()
+
+    def __call__(self, now: Status) -> None:
+        """The state, and apart from it whether the estimate shown is too old."""
+        if now.state is not self._state:
+            log_event(Event.STATE, state=now.state, before=self._state, sentence=now.sentence())
+            self._state = now.state
+        if (is_stale := self._board.is_stale()) is not self._is_stale:
+            log_event(Event.STALE if is_stale else Event.FRESH, age_s=round(self._board.age_s() or 0.0, 1))
+            self._is_stale = is_stale
+
+
+def _or_none(x: float) -> float | None:
+    return round(x, 3) if math.isfinite(x) else None

@@ -1,0 +1,39 @@
+"""``python -m support.replayed_service CONFIG LOG``: the service, and a drive on its in-process bus, in one process."""
+
+import asyncio
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from gateway.bus.sink import replay
+from gateway.config import load_settings
+from gateway.log import set_up_log
+from gateway.service.gateway import Gateway
+from gateway.setup import setup_of
+from support.unhurried import unhurry
+
+
+def main(config: Path, log: Path) -> None:
+    """Plays the log at full speed; a line on standard input ends the service."""
+    settings = load_settings(config)
+    set_up_log(settings.log.level, under_journald=True)
+
+    def on_started(gateway: Gateway) -> None:
+        loop = asyncio.get_running_loop()
+        threading.Thread(target=play, args=(gateway, loop), daemon=True).start()
+
+    def play(gateway: Gateway, loop: asyncio.AbstractEventLoop) -> None:
+        try:
+            replay(log, settings.bus.interface, settings.bus.channel, speed="max")
+            sys.stdin.readline()  # whoever started us has seen enough
+        finally:
+            loop.call_soon_threadsafe(gateway.request_stop)
+
+    Gateway(settings, setup_of(settings), on_started=on_started).run()
+
+
+if __name__ == "__main__":
+    unhurry(pytest.MonkeyPatch())
+    main(*map(Path, sys.argv[1:]))

@@ -1,0 +1,111 @@
+"""One logger, one level, one form; nothing floods, and the documents tell of every event."""
+
+import json
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support.log import names
+
+from gateway.log import LOGGER, Event, FloodGate, JsonFormatter, PlainFormatter, log_event, set_log_level, set_up_log
+
+DEPLOYMENT = Path(__file__).parents[2] / "docs" / "deployment.md"
+
+
+@pytest.fixture
+def restored() -> Iterator[None]:
+    """The logging of the test run as it was."""
+    root = logging.getLogger()
+    before = root.handlers[:], root.level, LOGGER.level
+    yield
+    root.handlers[:], level, ours = before
+    root.setLevel(level)
+    LOGGER.setLevel(ours)
+
+
+def record_of(event: str, name: str = LOGGER.name, **fields: object) -> logging.LogRecord:
+    return logging.makeLogRecord(
+        {"name": name, "msg": event, "levelno": logging.INFO, "levelname": "INFO", "created": 0.5, "fields": fields}
+    )
+
+
+@pytest.mark.usefixtures("restored")
+@pytest.mark.parametrize(
+    ("level", "written"),
+    [("debug", ["debug", "info", "warning"]), ("info", ["info", "warning"]), ("warning", ["warning"]), ("error", [])],
+)
+def test_the_level_holds_for_every_event_of_ours(
+    level: str, written: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    set_up_log(level, under_journald=False)
+    log_event(Event.READY, level=logging.DEBUG, url="a")
+    log_event(Event.READY, url="b")
+    log_event(Event.READY, level=logging.WARNING, url="c")
+    lines = [json.loads(line) for line in capsys.readouterr().err.splitlines()]
+    assert [line["level"] for line in lines] == written
+    assert all(line["event"] == "ready" and set(line) == {"t", "level", "event", "url"} for line in lines)
+
+
+@pytest.mark.usefixtures("restored")
+def test_others_come_through_from_warning_on_whatever_our_level(capsys: pytest.CaptureFixture[str]) -> None:
+    set_up_log("error", under_journald=False)
+    logging.getLogger("some.library").info("chatter")
+    logging.getLogger("some.library").warning("careful")
+    assert [json.loads(line)["event"] for line in capsys.readouterr().err.splitlines()] == ["careful"]
+
+
+def test_a_line_is_json_with_the_priority_journald_reads_before_it() -> None:
+    line = JsonFormatter(with_priority=True).format(record_of("bus silent", reason="no frame for 2 s"))
+    assert line[:3] == "<6>"
+    assert json.loads(line[3:]) == {
+        "t": "1970-01-01T00:00:00.500+00:00",
+        "level": "info",
+        "event": "bus silent",
+        "reason": "no frame for 2 s",
+    }
+
+
+def test_a_person_at_a_terminal_reads_words() -> None:
+    said = PlainFormatter().format(record_of("bus silent", channel="can0"))
+    assert said == "info    bus silent channel=can0"
+
+
+def test_an_event_that_comes_too_often_is_left_out_and_counted() -> None:
+    now_s = [0.0]
+    gate = FloodGate(most=3, clock=lambda: now_s[0])
+    assert [gate.filter(record_of("bus fault")) for _ in range(5)] == [True, True, True, False, False]
+    assert gate.filter(record_of("bus silent"))  # another event has room of its own
+    now_s[0] = 61.0
+    late = record_of("bus fault", reason="down")
+    assert gate.filter(late)
+    assert vars(late)["fields"] == {"reason": "down", "left_out": 2}
+    again = record_of("bus fault")
+    assert gate.filter(again)
+    assert vars(again)["fields"] == {}
+
+
+def test_the_gate_is_for_our_events_alone() -> None:
+    gate = FloodGate(most=1)
+    assert all(gate.filter(record_of("careful", "some.library")) for _ in range(5))
+
+
+@pytest.mark.usefixtures("restored")
+def test_a_reload_can_change_the_level(caplog: pytest.LogCaptureFixture) -> None:
+    set_log_level("warning")
+    log_event(Event.READY)
+    set_log_level("info")
+    log_event(Event.STOPPED)
+    assert names(caplog) == [Event.STOPPED]
+
+
+def test_the_documents_tell_of_every_event_and_of_no_other() -> None:
+    _, _, section = DEPLOYMENT.read_text().partition("## What the journal shows")
+    table = section.partition("\n## ")[0]
+    rows = [row for row in table.splitlines() if row.startswith("| `")]
+    assert sorted(name for row in rows for name in first_cell(row)) == sorted(Event)
+
+
+def first_cell(row: str) -> list[str]:
+    """The events that a row of the table is about."""
+    return row.split("|")[1].split("`")[1::2]

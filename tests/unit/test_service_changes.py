@@ -1,0 +1,112 @@
+"""The service's log has a line for each change, and none while all stays as it is."""
+
+from dataclasses import replace
+
+import pytest
+from support.calibrated import calibration_file
+from support.estimates import make_estimate
+from support.log import fields_of, logged, names
+
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.log import Event
+from gateway.records import Estimate, Why, estimate_to_json
+from gateway.service.changes import BatchLog, StateLog
+from gateway.web import Board, Scales, State, Status, weigh_latest
+
+
+class Told:
+    """A board and the log of what is put on it, as in the pipeline."""
+
+    def __init__(self, calibrated: CalibratedVehicle | None = None) -> None:
+        self.clock_s = 0.0
+        self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
+        self.log = BatchLog(lambda: weigh_latest(self.board, Scales(calibrated)))
+
+    def hear(self, *estimates: Estimate) -> None:
+        for estimate in estimates:
+            self.board.publish(estimate_to_json(estimate))
+            self.log(estimate)
+
+
+@pytest.fixture(autouse=True)
+def _at_info(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", "gateway")
+
+
+def test_an_estimate_is_a_line_with_its_numbers(caplog: pytest.LogCaptureFixture) -> None:
+    found = make_estimate(3)
+    Told().hear(found)
+    assert logged(caplog) == [
+        (
+            Event.ESTIMATE,
+            {"batch": found.id, "payload_kg": 103.0, "payload_std_kg": 6.0, "front_share_pct": 50.5, "rejected": ()},
+        )
+    ]
+
+
+def test_reasons_are_a_line_only_where_their_set_changes(caplog: pytest.LogCaptureFixture) -> None:
+    told = Told()
+    told.hear(
+        make_estimate(0, Why.TOO_SLOW, Why.GAP),
+        make_estimate(1, Why.GAP, Why.TOO_SLOW),
+        make_estimate(2, Why.GAP),
+        make_estimate(2, Why.TOO_SHORT, is_provisional=True),
+        make_estimate(3, Why.GAP),
+        make_estimate(4),
+        make_estimate(5),
+    )
+    changes = [fields for event, fields in logged(caplog) if event is Event.REASONS_CHANGED]
+    assert changes == [
+        {"rejected": (Why.TOO_SLOW, Why.GAP), "before": []},
+        {"rejected": (Why.GAP,), "before": [Why.GAP, Why.TOO_SLOW]},
+        {"rejected": (), "before": [Why.GAP]},
+    ]
+    assert names(caplog).count(Event.ESTIMATE) == 2
+    assert not {Event.REJECTED, Event.PROVISIONAL} & set(names(caplog))
+
+
+def test_whoever_looks_for_a_fault_reads_of_every_batch(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("DEBUG", "gateway")
+    Told().hear(make_estimate(0, Why.GAP), make_estimate(1, is_provisional=True))
+    assert names(caplog) == [Event.REJECTED, Event.REASONS_CHANGED, Event.PROVISIONAL]
+    assert dict(logged(caplog))[Event.REJECTED]["payload_kg"] is None
+
+
+def test_an_overload_begins_and_ends_once(caplog: pytest.LogCaptureFixture) -> None:
+    calibrated = calibration_file().for_core()
+    limited = replace(calibrated.vehicle, unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1_800.0)
+    told = Told(replace(calibrated, vehicle=limited))
+    empty_kg = limited.empty_mass_kg + 200.0
+
+    def loaded(n: int, gross_kg: float) -> Estimate:
+        return replace(make_estimate(n), payload_kg=gross_kg - empty_kg, front_share_std_pct=0.1)
+
+    told.hear(loaded(0, 1_790.0))
+    assert Event.OVERLOAD_BEGINS not in names(caplog)
+    told.hear(loaded(1, 1_820.0), loaded(2, 1_790.0), loaded(3, 1_850.0))  # 1 % below is not yet the end
+    assert names(caplog).count(Event.OVERLOAD_BEGINS) == 1
+    assert fields_of(caplog, Event.OVERLOAD_BEGINS) == {"where": "gross", "kg": 1_820.0, "limit_kg": 1_800.0}
+    assert Event.OVERLOAD_ENDS not in names(caplog)
+    told.hear(loaded(4, 1_700.0))
+    assert fields_of(caplog, Event.OVERLOAD_ENDS) == {"where": "gross", "kg": 1_700.0, "limit_kg": 1_800.0}
+
+
+def test_the_state_and_an_old_estimate_are_lines_when_they_change(caplog: pytest.LogCaptureFixture) -> None:
+    told = Told()
+    log = StateLog(told.board)
+    now = Status(version="1", state=State.COLLECTING, uptime_s=1.0, calibration_id="sha256:ab")
+    driving = now.model_copy(update={"state": State.ESTIMATING})
+    for status in (now, now, driving, driving):
+        log(status)
+    assert [fields["state"] for _, fields in logged(caplog)] == [State.COLLECTING, State.ESTIMATING]
+    assert logged(caplog)[1][1]["before"] is State.COLLECTING
+
+    told.hear(make_estimate(0))
+    caplog.clear()
+    for told.clock_s in (899.0, 901.0, 950.0):
+        log(driving)
+    assert logged(caplog) == [(Event.STALE, {"age_s": 901.0})]
+    told.hear(make_estimate(1))
+    log(driving)
+    log(driving)
+    assert names(caplog) == [Event.STALE, Event.ESTIMATE, Event.FRESH]
