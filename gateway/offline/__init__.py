@@ -1,1 +1,4 @@
-"""The same pipeline without clock or network: logs in, batches and estimates out."""
+"""The same pipeline without clock or network: what the service does live, over log files.
+
+Logs and campaign files come in; batches, estimates, calibrations and their errors go out.
+"""

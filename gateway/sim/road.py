@@ -104,9 +104,9 @@ def iso_roughness_m3(road_class: str) -> float:
     return 1e-6 * 4.0 ** "ABCDEFGH".index(road_class)
 
 
-def iso_road(road_class: str, waviness: float = 2.0) -> SpectralRoad:
+def iso_road(road_class: str) -> SpectralRoad:
     """The middle of an ISO 8608 class, two tracks."""
-    return SpectralRoad(iso_roughness_m3(road_class), waviness)
+    return SpectralRoad(iso_roughness_m3(road_class))
 
 
 def _n_samples(length_m: float, step_m: float) -> int:

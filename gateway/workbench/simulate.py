@@ -118,8 +118,9 @@ def write_campaign(
     return campaign
 
 
-def simulated_frames(bench: Bench, start_ns: int = START_NS) -> Iterator[Frames]:
+def simulated_frames(bench: Bench) -> Iterator[Frames]:
     """The plan's drives one after the other, the vehicle parked in between; a chunk of frames a drive."""
+    start_ns = START_NS
     for number, planned in enumerate(bench.plan().drives):
         driven = bench.simulate(planned, number, start_ns)
         yield bench.frames_of(planned, number, driven)

@@ -49,11 +49,9 @@ class CrossSpectrumFit:
     front_share_errors_pct: F64 | None = None
 
 
-def calibrate_cross_spectrum(
-    runs: Sequence[KnownRun], vehicle: Vehicle, progress: Callable[[int, int], None] | None = None
-) -> CrossSpectrumCalibration:
+def calibrate_cross_spectrum(runs: Sequence[KnownRun], vehicle: Vehicle) -> CrossSpectrumCalibration:
     """The calibration alone; see :func:`fit_cross_spectrum`."""
-    return fit_cross_spectrum(runs, vehicle, progress).calibration
+    return fit_cross_spectrum(runs, vehicle).calibration
 
 
 def fit_cross_spectrum(

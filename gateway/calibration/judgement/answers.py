@@ -58,11 +58,11 @@ def standardised(answers: Answers, dof: float | None) -> F64:
     return np.asarray(ndtri(np.clip(stdtr(dof, scaled), 1e-12, 1.0 - 1e-12)))
 
 
-def observed_coverage(answers: Answers, dof: float | None, levels: F64 = LEVELS) -> F64:
-    """Share, and its lower and upper 95 % limit (k, 3), of intervals of each nominal level that hold the truth."""
+def observed_coverage(answers: Answers, dof: float | None) -> F64:
+    """Share, and its lower and upper 95 % limit (k, 3), of intervals of each of LEVELS that hold the truth."""
     reach = np.abs(standardised(answers, dof))
     rows = []
-    for level in levels:
+    for level in LEVELS:
         coverage = coverage_of((reach <= ndtri(0.5 + 0.5 * level)).tolist(), answers.run.tolist())
         rows.append((coverage.share, coverage.low, coverage.high))
     return np.array(rows)
