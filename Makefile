@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check bench deb soak test-vm vm-image vcan lock docs screenshots clean
+.PHONY: demo test check bench deb soak test-vm vm-image vcan lock docs site screenshots clean
 .DEFAULT_GOAL := demo
 
 .venv/bin/python:
@@ -45,6 +45,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_findings.py --check
 	$(BIN)/python docs/make_calibration_schema.py --check
 	$(BIN)/python docs/make_readme_table.py --check
+	$(BIN)/python docs/make_site.py
 
 bench: .venv/.development
 	for what in day decode live simulator web; do echo "== $$what"; $(BIN)/python -m benchmarks.speed.$$what || exit 1; done
@@ -96,6 +97,10 @@ docs: .venv/.development
 	$(BIN)/python docs/make_findings.py
 	$(BIN)/python docs/make_calibration_schema.py
 	$(BIN)/python docs/make_readme_table.py
+
+# The documents as a site, in build/site.
+site: .venv/.development
+	$(BIN)/python docs/make_site.py
 
 # --no-emit-*: the lock names no package index, so it serves behind any mirror.
 COMPILE = CUSTOM_COMPILE_COMMAND="make lock" .venv-lock/bin/pip-compile --quiet --generate-hashes --strip-extras \

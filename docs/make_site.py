@@ -1,0 +1,71 @@
+"""The documents as a site, `make site`: every page of docs/ and those of the top folder, built strictly by mkdocs.
+
+A link in a document is relative to its place in the repository. In the site it becomes relative to the page; where it
+leads to something that is no page, such as a test, its words stay and the link goes.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+ROOT: Final = Path(__file__).parents[1]
+DOCS: Final = ROOT / "docs"
+PAGES: Final = ROOT / "build/site-pages"  # docs_dir of mkdocs.yml
+TOP_PAGES: Final = ("CHANGELOG.md", "CONTRIBUTING.md")
+STATIC: Final = ("*.md", "*.svg", "*.png", "calibration.schema.json")
+LINK: Final = re.compile(r"(?P<mark>!?)\[(?P<words>(?:`[^`]*`|[^\[\]`])*)\]\((?P<target>[^)\s]+)\)")
+
+
+def main() -> None:
+    """Gather the pages, then build them: any warning is an error. An argument names another output folder."""
+    gather()
+    output = sys.argv[1] if len(sys.argv) > 1 else str(ROOT / "build/site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", output]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}  # docs/adr/docs-site.md
+    sys.exit(subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode)
+
+
+def gather() -> None:
+    """Every page where the site has it, with links that fit there."""
+    shutil.rmtree(PAGES, ignore_errors=True)
+    places = {file: file.relative_to(DOCS) for pattern in STATIC for file in DOCS.rglob(pattern)}
+    places |= {ROOT / name: Path(name) for name in TOP_PAGES}
+    places |= {ROOT / "README.md": Path("index.md"), DOCS / "adr": Path("adr/index.md")}
+    for source, place in places.items():
+        target = PAGES / place
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if source.suffix == ".md":
+            target.write_text(fitted(source, places), encoding="utf-8")
+        elif source.is_dir():
+            target.write_text(list_of(source), encoding="utf-8")
+        else:
+            shutil.copyfile(source, target)
+
+
+def fitted(source: Path, places: dict[Path, Path]) -> str:
+    """The text of one page with links that fit its place in the site."""
+
+    def fit(link: re.Match[str]) -> str:
+        target, hash_sign, anchor = link["target"].partition("#")
+        if "://" in target or not target:
+            return link[0]
+        place = places.get((source.parent / target).resolve())
+        if place is None:
+            return link["words"]
+        return f"{link['mark']}[{link['words']}]({os.path.relpath(place, places[source].parent)}{hash_sign}{anchor})"
+
+    return LINK.sub(fit, source.read_text(encoding="utf-8"))
+
+
+def list_of(decisions: Path) -> str:
+    """A page that names every decision by its first line."""
+    titles = {page.name: page.read_text(encoding="utf-8").splitlines()[0] for page in sorted(decisions.glob("*.md"))}
+    return "# Decisions\n\n" + "".join(f"- [{title.removeprefix('# ')}]({name})\n" for name, title in titles.items())
+
+
+if __name__ == "__main__":
+    main()
