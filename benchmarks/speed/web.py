@@ -35,9 +35,10 @@ from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.records import Estimate, Spectra, estimate_to_json
 from gateway.service.pipeline import Pipeline
+from gateway.status import BusStatus, State, Status
 from gateway.store import Store
 from gateway.units import NS_PER_S
-from gateway.web import Board, BusStatus, State, Status, create_app, server_config
+from gateway.web import Board, create_app, server_config
 
 LATEST = b"GET /api/v1/estimates/latest HTTP/1.1\r\nHost: localhost\r\n\r\n"
 STREAM = b"GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n"

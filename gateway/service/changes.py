@@ -7,7 +7,8 @@ from typing import Final
 
 from gateway.log import Event, log_event
 from gateway.records import Estimate, Why
-from gateway.web import Board, LatestWeights, State, Status
+from gateway.status import State, Status
+from gateway.web import Board, LatestWeights
 
 PLACES: Final = ("gross", "front_axle", "rear_axle")
 

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from importlib.metadata import version
 
 from gateway.bus.live.source import LiveSource, SourceState
@@ -10,19 +9,10 @@ from gateway.config import Settings
 from gateway.records import Signal
 from gateway.service.pipeline import Pipeline
 from gateway.setup import Setup
+from gateway.status import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status
 from gateway.store import Store
 from gateway.uplink import Uplink
-from gateway.web import (
-    BatchCounts,
-    Board,
-    BusStatus,
-    DecodeCount,
-    SignalHealth,
-    State,
-    Status,
-    StoreStatus,
-    UplinkStatus,
-)
+from gateway.web import Board
 
 SENSOR_LOST_S = 10.0  # a sensor silent for this long on a bus that is alive is at fault
 NEEDED_SENSORS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
@@ -74,8 +64,8 @@ class StatusReport:
                 n_provisional=self._pipeline.n_provisional,
                 rejected_by_reason=dict(self._pipeline.rejected_by_reason),
             ),
-            store=StoreStatus.model_validate(asdict(self._store.health())),
-            uplink=UplinkStatus.model_validate(asdict(self._uplink.report())) if self._uplink else None,
+            store=self._store.health(),
+            uplink=self._uplink.report() if self._uplink else None,
             is_ready=not_ready is None,
             not_ready_reason=not_ready,
         )

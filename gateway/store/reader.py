@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
+from gateway.history import Delivery, Page
 from gateway.records import json_line
 from gateway.store.database import is_damaged
 from gateway.store.rows import EstimateRow
@@ -22,20 +23,6 @@ _FIRST_NS: Final = -(1 << 63)
 _LAST_NS: Final = (1 << 63) - 1
 
 HeldEstimates = Callable[[], tuple[str, tuple[EstimateRow, ...]]]
-
-
-@dataclass(frozen=True, slots=True)
-class Page:
-    """A piece of the history: JSON texts in order, the cursor of each beside it.
-
-    ``next_cursor`` asks for more, None where there is no more now; ``last_cursor`` is the newest row
-    of this page: the place to go on from when more arrives (None while there is nothing at all).
-    """
-
-    items: tuple[str, ...]
-    cursors: tuple[str, ...]
-    next_cursor: str | None
-    last_cursor: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,19 +41,6 @@ class Event:
     t_ns: int
     kind: str
     detail: str
-
-
-@dataclass(frozen=True, slots=True)
-class Delivery:
-    """How far an uplink has delivered. ``n_pruned`` estimates were removed by retention before it could.
-
-    ``waiting_age_s`` is the age of the oldest that waits, since its receipt; None where none waits.
-    """
-
-    cursor: str | None
-    n_pruned: int
-    n_waiting: int
-    waiting_age_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,14 +6,13 @@ import sqlite3
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
 from gateway.log import Event, log_event
 from gateway.records import json_line
+from gateway.status import StoreState, StoreStatus
 from gateway.store.database import FILE_NAME, Database, Retention, is_damaged
 from gateway.store.held import Held
 from gateway.store.reader import StoreReader
@@ -22,30 +21,6 @@ from gateway.store.rows import CalibrationRow, EstimateRow, EventRow
 IDLE_S: Final = 60.0  # without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5
 RETRY_LAST_S: Final = 30.0
-
-
-class StoreState(StrEnum):
-    OK = "ok"
-    DEGRADED = "degraded"
-
-
-@dataclass(frozen=True, slots=True)
-class StoreHealth:
-    """What the store tells of itself. ``reason`` says what the disk refuses while degraded.
-
-    ``n_held`` rows wait in memory; ``n_dropped`` had to give way there; ``set_aside`` names the last
-    damaged database that was renamed out of the way.
-    """
-
-    state: StoreState
-    reason: str | None
-    n_written: int
-    n_held: int
-    n_dropped: int
-    n_duplicates: int
-    n_pruned: int
-    size_bytes: int
-    set_aside: str | None
 
 
 class Store:
@@ -131,8 +106,8 @@ class Store:
         """Answers questions from any thread, from what is on disk and what is held."""
         return StoreReader(self._path, self._held.estimates, self._clock_ns, self._suspect_damage)
 
-    def health(self) -> StoreHealth:
-        return StoreHealth(
+    def health(self) -> StoreStatus:
+        return StoreStatus(
             state=StoreState.OK if self._reason is None else StoreState.DEGRADED,
             reason=self._reason,
             n_written=self._n_written,

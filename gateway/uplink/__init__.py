@@ -2,6 +2,6 @@
 
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings, uplink_settings
-from gateway.uplink.uplink import Uplink, UplinkReport
+from gateway.uplink.uplink import Uplink
 
-__all__ = ["Outbox", "Uplink", "UplinkReport", "UplinkSettings", "uplink_settings"]
+__all__ = ["Outbox", "Uplink", "UplinkSettings", "uplink_settings"]

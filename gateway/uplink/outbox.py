@@ -1,9 +1,10 @@
 """What is still to be delivered. The store is the queue: the outbox only knows how far it has come."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
+
+from gateway.history import Delivery, Page
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,28 +14,6 @@ class Letter:
     cursor: str
     id: str
     text: str
-
-
-class Page(Protocol):
-    """A piece of the history, in order of arrival."""
-
-    @property
-    def items(self) -> Sequence[str]: ...
-    @property
-    def cursors(self) -> Sequence[str]: ...
-
-
-class Delivery(Protocol):
-    """What the store remembers of an uplink."""
-
-    @property
-    def cursor(self) -> str | None: ...
-    @property
-    def n_pruned(self) -> int: ...
-    @property
-    def n_waiting(self) -> int: ...
-    @property
-    def waiting_age_s(self) -> float | None: ...
 
 
 class History(Protocol):

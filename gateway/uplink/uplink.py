@@ -6,11 +6,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final, Protocol
 
 from gateway.errors import ConfigurationError, StoreError
 from gateway.log import Event, log_event
+from gateway.status import UplinkStatus
 from gateway.uplink.back_off import BackOff
 from gateway.uplink.link import Answer, LinkError, MqttLink
 from gateway.uplink.outbox import Letter, Outbox
@@ -21,25 +22,6 @@ LOOK_S: Final = 5.0  # how often the backlog is counted
 ANSWER_TIMEOUT_S: Final = 30.0  # a broker that takes longer is as good as gone
 PAGE: Final = 100
 FIRST_PAUSE_S: Final = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class UplinkReport:
-    """How the uplink is: what ``gateway.web.UplinkStatus`` describes to clients, field by field.
-
-    The figures of the store (waiting, pruned) are of a few seconds ago, whether there is a link or not.
-    """
-
-    broker: str
-    is_connected: bool = False
-    n_delivered: int = 0
-    n_refused: int = 0
-    n_waiting: int = 0
-    waiting_age_s: float | None = None
-    n_pruned: int = 0
-    n_connections: int = 0
-    n_cuts: int = 0
-    last_fault: str | None = None
 
 
 class Link(Protocol):
@@ -71,7 +53,7 @@ class Uplink:
         self._birth = {"state": "online", **birth}
         self._connect = connect
         self._back_off = back_off or BackOff(FIRST_PAUSE_S, settings.back_off_max_s)
-        self._report = UplinkReport(settings.broker)
+        self._report = UplinkStatus(settings.broker)
         self._stop = threading.Event()
         self._looked_s = -LOOK_S
         self._thread = threading.Thread(target=self._run, name="uplink", daemon=True)
@@ -89,8 +71,8 @@ class Uplink:
         """True while the thread runs."""
         return self._thread.is_alive()
 
-    def report(self) -> UplinkReport:
-        """How it is; safe from any thread."""
+    def report(self) -> UplinkStatus:
+        """How it is; safe from any thread. What waits and what was pruned is of a few seconds ago, link or none."""
         return self._report
 
     def _run(self) -> None:

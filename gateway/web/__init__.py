@@ -8,36 +8,18 @@ from gateway.web.reader import Reader
 from gateway.web.routes.known_loads import KnownLoad, KnownLoads
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 from gateway.web.settings import WebSettings
-from gateway.web.status import (
-    BatchCounts,
-    BusStatus,
-    DecodeCount,
-    SignalHealth,
-    State,
-    Status,
-    StoreStatus,
-    UplinkStatus,
-)
 
 __all__ = [
-    "BatchCounts",
     "Board",
-    "BusStatus",
-    "DecodeCount",
     "KnownLoad",
     "KnownLoads",
     "LatestWeights",
     "Reader",
     "Scales",
     "Scope",
-    "SignalHealth",
-    "State",
-    "Status",
-    "StoreStatus",
     "Tls",
     "Token",
     "TokenFile",
-    "UplinkStatus",
     "WebSettings",
     "boot_clock_s",
     "create_app",

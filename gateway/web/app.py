@@ -9,6 +9,7 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.status import Status
 from gateway.web import pages
 from gateway.web.door import problems
 from gateway.web.door.guard import Failures, Guard, describe_guard
@@ -31,7 +32,6 @@ from gateway.web.routes.vehicle import vehicle_router
 from gateway.web.routes.vss import vss_router
 from gateway.web.routes.weights import Scales, weights_router
 from gateway.web.settings import WebSettings
-from gateway.web.status import Status
 
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.

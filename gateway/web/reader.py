@@ -2,18 +2,7 @@
 
 from typing import Protocol
 
-
-class Page(Protocol):
-    """A piece of the history; items are JSON texts, ``cursors`` stand beside them."""
-
-    @property
-    def items(self) -> tuple[str, ...]: ...
-    @property
-    def cursors(self) -> tuple[str, ...]: ...
-    @property
-    def next_cursor(self) -> str | None: ...
-    @property
-    def last_cursor(self) -> str | None: ...
+from gateway.history import Page
 
 
 class Reader(Protocol):

@@ -13,7 +13,8 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
 from gateway.records import Why
-from gateway.web import Board, SignalHealth, State, Status, create_app
+from gateway.status import SignalHealth, State, Status
+from gateway.web import Board, create_app
 from gateway.web.routes.export import COLUMNS
 
 N_ROWS = 1203  # several pages of the store, the last one not full

@@ -15,7 +15,8 @@ from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.web import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, UplinkStatus, create_app
+from gateway.status import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, UplinkStatus
+from gateway.web import create_app
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 RULES = [

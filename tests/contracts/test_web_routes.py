@@ -12,7 +12,7 @@ from support.patience import PATIENCE_S
 from support.web import Client, Gateway
 
 from gateway.records import Why
-from gateway.web import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
+from gateway.status import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
 
 JSON = "application/json"
 

@@ -11,7 +11,8 @@ from support.estimates import make_record
 from support.web import Gateway, serving
 
 from gateway.records import Why
-from gateway.web import Scope, State, TokenFile
+from gateway.status import State
+from gateway.web import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect

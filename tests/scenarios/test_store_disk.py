@@ -15,7 +15,8 @@ from support.patience import PATIENCE_S
 
 from gateway.errors import StoreError
 from gateway.log import Event
-from gateway.store import Retention, Store, StoreReader, StoreState, schema
+from gateway.status import StoreState
+from gateway.store import Retention, Store, StoreReader, schema
 
 
 def test_a_full_disk_degrades_to_memory_and_heals(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.spectrum import spectra_of
 from gateway.records import Estimate, Why, estimate_to_json
-from gateway.web import BusStatus, KnownLoad, SignalHealth, State, Status, StoreStatus, UplinkStatus
+from gateway.status import BusStatus, SignalHealth, State, Status, StoreStatus, UplinkStatus
+from gateway.web import KnownLoad
 from support.estimates import WINDOW_NS, make_estimate
 from support.half_car_road import batch_over_road
 from support.patience import PATIENCE_S

@@ -6,7 +6,8 @@ import resource
 import sys
 from pathlib import Path
 
-from gateway.store import Store, StoreState
+from gateway.status import StoreState
+from gateway.store import Store
 from support.estimates import make_record
 from support.patience import PATIENCE_S, wait_until
 

@@ -14,8 +14,9 @@ import uvicorn
 from fastapi import FastAPI
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.status import State, Status
 from gateway.store import Store
-from gateway.web import Board, KnownLoads, State, Status, TokenFile, WebSettings, create_app, server_config
+from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
 from gateway.web.routes.tare import TareDesk
 from support.patience import PATIENCE_S
 

@@ -11,7 +11,8 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.log import Event
 from gateway.records import Estimate, Why, estimate_to_json
 from gateway.service.changes import BatchLog, StateLog
-from gateway.web import Board, Scales, State, Status, weigh_latest
+from gateway.status import State, Status
+from gateway.web import Board, Scales, weigh_latest
 
 
 class Told:

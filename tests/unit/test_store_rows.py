@@ -11,7 +11,8 @@ from support.patience import PATIENCE_S
 
 from gateway.errors import StoreError
 from gateway.records import Why
-from gateway.store import Retention, Store, StoreState
+from gateway.status import StoreState
+from gateway.store import Retention, Store
 from gateway.units import NS_PER_S
 
 

@@ -12,15 +12,16 @@ from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
+from gateway.history import Page
 from gateway.records import json_line
+from gateway.status import Status
 from gateway.web.instant import Instant
 from gateway.web.live.board import Board
 from gateway.web.live.latest import LatestResponse
 from gateway.web.live.stream import EVENT_SCHEMA, EventStream
-from gateway.web.reader import Page, Reader
+from gateway.web.reader import Reader
 from gateway.web.schemas import EstimatesPage, Latest, problem_responses
 from gateway.web.settings import PAGE_LIMIT, WebSettings
-from gateway.web.status import Status
 
 PREFIX: Final = "/api/v1"
 JSON: Final = "application/json"

@@ -12,8 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
 from starlette.responses import Response, StreamingResponse
 
+from gateway.history import Page
 from gateway.web.instant import Instant
-from gateway.web.reader import Page, Reader
+from gateway.web.reader import Reader
 from gateway.web.schemas import problem_responses
 
 COLUMNS: Final = [

@@ -6,9 +6,9 @@ from fastapi import APIRouter, Request
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 from starlette.responses import JSONResponse, Response
 
+from gateway.status import Status
 from gateway.web.door.problems import problem_response
 from gateway.web.schemas import Alive, Ready, problem_responses
-from gateway.web.status import Status
 
 
 def health_router(status: Callable[[], Status], registry: CollectorRegistry) -> APIRouter:

@@ -8,9 +8,9 @@ from typing import Final
 from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
+from gateway.status import State, Status, UplinkStatus
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
-from gateway.web.status import State, Status, UplinkStatus
 
 
 class StatusCollector:

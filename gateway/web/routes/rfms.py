@@ -19,13 +19,13 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
 from gateway.core.weights import Weight
+from gateway.status import Status
 from gateway.web.instant import Instant
 from gateway.web.live.board import Board
 from gateway.web.reader import Reader
 from gateway.web.routes.estimates import Cursor
 from gateway.web.routes.weights import Scales
 from gateway.web.schemas import problem_responses
-from gateway.web.status import Status
 
 PREFIX: Final = "/rfms"
 TRIGGER: Final = "TIMER"  # batches end by the clock

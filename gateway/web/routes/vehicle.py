@@ -6,7 +6,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle, believed
-from gateway.web.status import SignalHealth, Status
+from gateway.status import SignalHealth, Status
 
 
 class VehicleFigures(BaseModel):

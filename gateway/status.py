@@ -1,7 +1,8 @@
-"""What the service tells of itself, in types and in words."""
+"""What the service tells of itself, in types and in words: filled in by its parts, sent as it is by the web."""
 
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -84,32 +85,43 @@ class BatchCounts(_Told):
     rejected_by_reason: dict[str, int] = Field(default_factory=dict)
 
 
-class StoreStatus(_Told):
+class StoreState(StrEnum):
+    """Whether estimates reach the disk."""
+
+    OK = "ok"
+    DEGRADED = "degraded"
+
+
+@dataclass(frozen=True, slots=True)
+class StoreStatus:
     """Whether estimates reach the disk. Degraded: they are kept in memory, and ``reason`` says why."""
 
-    state: str = Field("ok", examples=["ok", "degraded"])
+    state: Annotated[str, Field(examples=["ok", "degraded"])] = StoreState.OK
     reason: str | None = None
     n_written: int = 0
-    n_held: int = Field(0, description="rows that wait in memory")
-    n_dropped: int = Field(0, description="rows that had to give way in memory")
+    n_held: Annotated[int, Field(description="rows that wait in memory")] = 0
+    n_dropped: Annotated[int, Field(description="rows that had to give way in memory")] = 0
     n_duplicates: int = 0
-    n_pruned: int = Field(0, description="rows removed by age or size")
+    n_pruned: Annotated[int, Field(description="rows removed by age or size")] = 0
     size_bytes: int = 0
-    set_aside: str | None = Field(None, description="damaged database that was renamed out of the way")
+    set_aside: Annotated[str | None, Field(description="damaged database that was renamed out of the way")] = None
 
 
-class UplinkStatus(_Told):
+@dataclass(frozen=True, slots=True)
+class UplinkStatus:
     """How estimates get to the fleet's broker; counts begin at the start but for those the store keeps."""
 
-    broker: str = Field(examples=["fleet.example:8883"])
+    broker: Annotated[str, Field(examples=["fleet.example:8883"])]
     is_connected: bool = False
-    n_delivered: int = Field(0, description="acknowledged by the broker")
-    n_refused: int = Field(0, description="given up: the broker will never take them")
-    n_waiting: int = Field(0, description="in the store, still to be delivered; as of a few seconds ago")
-    waiting_age_s: float | None = Field(None, description="of the oldest of them, since its receipt; null: none waits")
-    n_pruned: int = Field(0, description="removed by retention before they could be delivered")
+    n_delivered: Annotated[int, Field(description="acknowledged by the broker")] = 0
+    n_refused: Annotated[int, Field(description="given up: the broker will never take them")] = 0
+    n_waiting: Annotated[int, Field(description="in the store, still to be delivered; as of a few seconds ago")] = 0
+    waiting_age_s: Annotated[
+        float | None, Field(description="of the oldest of them, since its receipt; null: none waits")
+    ] = None
+    n_pruned: Annotated[int, Field(description="removed by retention before they could be delivered")] = 0
     n_connections: int = 0
-    n_cuts: int = Field(0, description="times an established link broke")
+    n_cuts: Annotated[int, Field(description="times an established link broke")] = 0
     last_fault: str | None = None
 
 
@@ -149,7 +161,7 @@ class Status(_Told):
             said.append(f"Last fault: {self.bus.last_fault}.")
         if self.calibration_id is None:
             said.append("No calibration: spectra only, no payload.")
-        if self.store.state != "ok":
+        if self.store.state != StoreState.OK:
             said.append(f"Estimates are kept in memory only ({self.store.reason}).")
         if self.uplink is not None and not self.uplink.is_connected and self.uplink.last_fault:
             said.append(f"Not connected to the fleet's broker ({self.uplink.last_fault}); estimates wait.")

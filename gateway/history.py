@@ -1,0 +1,30 @@
+"""The history as rooms hand it to each other: what the store answers, the web sends and the uplink delivers."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A piece of the history: JSON texts in order, the cursor of each beside it.
+
+    ``next_cursor`` asks for more, None where there is no more now; ``last_cursor`` is the newest row
+    of this page: the place to go on from when more arrives (None while there is nothing at all).
+    """
+
+    items: tuple[str, ...]
+    cursors: tuple[str, ...]
+    next_cursor: str | None
+    last_cursor: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """How far an uplink has delivered. ``n_pruned`` estimates were removed by retention before it could.
+
+    ``waiting_age_s`` is the age of the oldest that waits, since its receipt; None where none waits.
+    """
+
+    cursor: str | None
+    n_pruned: int
+    n_waiting: int
+    waiting_age_s: float | None = None
