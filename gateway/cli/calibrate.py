@@ -14,8 +14,7 @@ from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
 from gateway.calibration.plan.plan import Plan, plan_first, plan_next
-from gateway.calibration.ratio_index.choice import BandChoice
-from gateway.calibration.ratio_index.structures import StructureChoice
+from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
 from gateway.cli.progress import bar, counted
 from gateway.cli.text.inspection import inspection_json, inspection_sentences

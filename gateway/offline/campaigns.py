@@ -17,8 +17,7 @@ from gateway.calibration.inspection.run import Inspected
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.choice import BandChoice
-from gateway.calibration.ratio_index.structures import StructureChoice
+from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError

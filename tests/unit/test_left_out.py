@@ -9,8 +9,8 @@ from support.known_load_logs import write_known_loads
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.judgement.left_out import index_rows, judged_left_out
-from gateway.calibration.ratio_index.regression import fit_regression
+from gateway.calibration.judgement.left_out import judged_left_out
+from gateway.calibration.ratio_index import fit_regression, index_rows
 from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import calibrate
 
@@ -42,16 +42,18 @@ def test_every_run_is_judged_once_a_batch_with_an_interval_about_its_answer(outc
         assert high - low > 0.0
 
 
-def test_where_no_choice_can_be_made_anew_bands_and_terms_stay(outcome: Outcome) -> None:
-    """Then the error of a run is that of the same regression fitted to the other runs."""
-    fit = outcome.ratio_index
+def test_where_no_choice_can_be_made_anew_bands_and_terms_stay(tmp_path: Path) -> None:
+    """Three runs: the error of each is that of the same regression fitted to the other two."""
+    campaign = load_campaign(write_known_loads(tmp_path, LOADS[:3], duration_s=150.0))
+    few = calibrate(campaign, BatchSettings(window_s=100.0), estimators=("ratio_index",))
+    fit = few.ratio_index
     assert fit is not None
     assert fit.calibration.payload is not None
-    blank = replace(fit.chosen, nested=replace(fit.chosen.nested, error=np.full_like(fit.chosen.nested.error, np.nan)))
-    found = errors_kg(replace(outcome, ratio_index=replace(fit, trials=(blank, *fit.trials[1:]))))
-    rows = index_rows([one.identification for one in outcome.split], fit.calibration)
+    rows = index_rows([one.identification for one in few.split], fit.calibration)
     again = fit_regression(fit.calibration.payload.terms, rows.ra, rows.rg, rows.payload_kg, rows.run)
-    assert found == pytest.approx(again.held_out_errors, rel=1e-4, abs=1e-3)
+    assert errors_kg(few) == pytest.approx(again.held_out_errors, rel=1e-4, abs=1e-3)
+    bands = {(one.acceleration_bands, one.pitch_rate_bands) for one in fit.without.values()}
+    assert bands == {(fit.calibration.acceleration_bands, fit.calibration.pitch_rate_bands)}
 
 
 def test_two_runs_leave_nothing_to_learn_from(outcome: Outcome) -> None:

@@ -16,7 +16,7 @@ from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.fit import fit_ratio_index
+from gateway.calibration.ratio_index import fit_ratio_index
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle, payload_position_m

@@ -1,1 +1,34 @@
-"""TODO-ROOM."""
+"""Calibrates the ratio index, the paper's estimator: known-load drives in, bands and static regressions out.
+
+The method is whole, for comparison with the cross-spectral estimator: bands chosen on the campaign or those of
+Table 2, the structures (9), (10) and (11), and a stepwise one by partial F-tests. What comes in are inspected
+known runs with their batches; what goes out is a RatioIndexCalibration for the core, with what the other runs
+teach without each run and its errors (``fit_ratio_index``); for the reports, the two indexes of known runs
+(``index_rows``) and J of (4) and (5) over all bands (``band_maps``).
+"""
+
+from gateway.calibration.ratio_index.band_map import BandMap, band_maps
+from gateway.calibration.ratio_index.bands import BandChoice
+from gateway.calibration.ratio_index.choice import Choice
+from gateway.calibration.ratio_index.fit import N_SEGMENT, FamilyTrial, RatioIndexFit, fit_ratio_index
+from gateway.calibration.ratio_index.indexes import IndexRows, index_rows
+from gateway.calibration.ratio_index.regression import FittedRegression, fit_regression
+from gateway.calibration.ratio_index.stepwise import Selection
+from gateway.calibration.ratio_index.structures import StructureChoice
+
+__all__ = [
+    "N_SEGMENT",
+    "BandChoice",
+    "BandMap",
+    "Choice",
+    "FamilyTrial",
+    "FittedRegression",
+    "IndexRows",
+    "RatioIndexFit",
+    "Selection",
+    "StructureChoice",
+    "band_maps",
+    "fit_ratio_index",
+    "fit_regression",
+    "index_rows",
+]

@@ -1,18 +1,23 @@
-"""Which frequency bands tell load from road: found on the vehicle's own known-load drives."""
+"""Which frequency bands tell load from road: chosen on the vehicle's own known-load drives, or the paper's."""
 
 from dataclasses import dataclass
-from typing import Final
+from itertools import product
+from typing import Final, Literal
 
 import numpy as np
 from scipy.stats import rankdata
 
 from gateway.calibration.ratio_index.scatter import bin_covariance, integral_covariance
-from gateway.calibration.ratio_index.table import IndexTable
-from gateway.core.ratio_index.index import UPPER_LIMIT_HZ, Band, SpectrumKind, band_pass_gain
+from gateway.calibration.ratio_index.table import SpectrumTable
+from gateway.core.ratio_index.index import PAPER_BANDS, UPPER_LIMIT_HZ, Band, SpectrumKind, band_pass_gain
+from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, I64
+
+BandChoice = Literal["campaign", "table2"]
 
 WIDTHS_HZ: Final = (0.25, 0.5, 1.0)  # narrower ones scatter too much to be told from luck in a few runs
 CENTRES_HZ: Final = np.arange(1.0, UPPER_LIMIT_HZ - 0.4, 0.25)
+N_CANDIDATES: Final = 12  # pairs of each sensor and width
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,51 +34,73 @@ class BandPair:
     monotonicity: float = float("nan")
 
 
-def band_weights(freq_hz: F64, bands: list[Band], kind: SpectrumKind) -> F64:
-    """Gains (b, m) of the band-passes (6) as they weigh a spectrum of this kind."""
-    order = 1 if kind == "amplitude" else 2
-    return np.array([band_pass_gain(freq_hz, band) ** order for band in bands])
+Pairs = tuple[BandPair | None, BandPair | None]  # of acceleration and of pitch rate; None without the sensor
 
 
-def band_levels(freq_hz: F64, spectra: F64, bands: list[Band], kind: SpectrumKind) -> F64:
-    """Integrals (n, b) of the spectra (n, m) through each band-pass (6): either half of (7) and (8)."""
-    passed: F64 = spectra @ band_weights(freq_hz, bands, kind).T
-    return passed
+def indexes(table: SpectrumTable, pairs: Pairs) -> tuple[F64, F64]:
+    """R_a and R_g (n,) of every batch; NaN without the sensor."""
+    return ratios(table, 0, pairs[0]), ratios(table, 1, pairs[1])
 
 
-def ratios(table: IndexTable, spectra: F64 | None, pair: BandPair | None) -> F64:
-    """R_a or R_g (n,) of every batch; NaN without the sensor."""
+def ratios(table: SpectrumTable, sensor: int, pair: BandPair | None) -> F64:
+    """One sensor's index (n,), the integrals of the spectra through both band-passes (6), one over the other."""
+    spectra = table.spectra[sensor]
     if pair is None or spectra is None:
         return np.full(len(table.run), np.nan)
-    passed = band_levels(table.freq_hz, spectra, list(pair.bands), table.kind)
+    passed = spectra @ _band_weights(table.freq_hz, list(pair.bands), table.kind).T
     return np.asarray(passed[:, 0] / passed[:, 1])
 
 
-def candidate_pairs(
-    table: IndexTable, spectra: F64, target: F64, other: F64, width_hz: float, n_best: int
-) -> list[BandPair]:
-    """The ``n_best`` pairs of one width whose log ratio follows ``target`` (n,) best, neighbours left out.
+def candidates(table: SpectrumTable, bands: BandChoice) -> list[Pairs]:
+    """Band pairs worth a regression: of each width the most significant of the campaign, or the paper's alone.
 
-    Runs are the independent observations, so the batches of a run are averaged first; what goes with
-    ``other`` (the other of payload and share) linearly is taken out of both sides, because a
-    campaign's loads and shares are correlated. The numerator rises with the target against the
-    denominator, as J > 0 over J < 0 in (4) and (5); the measure is significance times monotonicity, not
-    the raw difference, which would be largest where the bands are narrowest and scatter most.
+    Raises CalibrationImpossibleError where no pair follows the load.
     """
+    if bands == "table2":
+        paper = (BandPair(PAPER_BANDS["acceleration"]), BandPair(PAPER_BANDS["pitch_rate"]))
+        of_a, of_g = (None if seen is None else pair for seen, pair in zip(table.spectra, paper, strict=True))
+        return [(of_a, of_g)]
+    pairs: list[Pairs] = []
+    for width_hz in WIDTHS_HZ:
+        of_each = [
+            [None] if spectra is None else candidate_pairs(table, sensor, width_hz, N_CANDIDATES)
+            for sensor, spectra in enumerate(table.spectra)
+        ]
+        pairs.extend(product(of_each[0], of_each[1]))
+    if not pairs:
+        raise CalibrationImpossibleError(
+            "no pair of bands follows the load over these runs: drive more different loads"
+        )
+    return pairs
+
+
+def candidate_pairs(table: SpectrumTable, sensor: int, width_hz: float, n_best: int) -> list[BandPair]:
+    """The ``n_best`` pairs of one width whose log ratio follows the sensor's target best, neighbours left out.
+
+    Runs are the independent observations, so the batches of a run are averaged first; what goes with the
+    other of payload and share linearly is taken out of both sides, because a campaign's loads and shares
+    are correlated. The numerator rises with the target against the denominator, as J > 0 over J < 0 in (4)
+    and (5); the measure is significance times monotonicity, not the raw difference, which would be largest
+    where the bands are narrowest and scatter most.
+    """
+    spectra = table.spectra[sensor]
+    if spectra is None:
+        return []
     bands = [Band(float(centre), width_hz) for centre in CENTRES_HZ]
-    levels = np.log(band_levels(table.freq_hz, spectra, bands, table.kind))
-    rest, aim = partial_residuals(table.run, levels, target, other)
-    scatter = _log_scatter(table, spectra, bands) * (1.0 - 2.0 / len(rest))
-    strength = _significance(rest, aim, scatter)
+    weights = _band_weights(table.freq_hz, bands, table.kind)
+    rest, aim = partial_residuals(
+        table.run, np.log(spectra @ weights.T), table.targets[sensor], table.targets[1 - sensor]
+    )
+    strength = _significance(rest, aim, _log_scatter(table, spectra, weights) * (1.0 - 2.0 / len(rest)))
     peaks = _peaks(strength, n_best)
     if not peaks:
         return []
     order = rank_correlations(np.column_stack([rest[:, i] - rest[:, j] for i, j in peaks]), aim)
-    found = [
+    pairs = [
         BandPair((bands[i], bands[j]), float(strength[i, j]), float(rho))
         for (i, j), rho in zip(peaks, order, strict=True)
     ]
-    return sorted(found, key=lambda pair: -pair.significance * pair.monotonicity)
+    return sorted(pairs, key=lambda pair: -pair.significance * pair.monotonicity)
 
 
 def partial_residuals(run: I64, levels: F64, target: F64, other: F64) -> tuple[F64, F64]:
@@ -94,13 +121,18 @@ def rank_correlations(columns: F64, target: F64) -> F64:
     ranks, aim = rankdata(columns.round(12), axis=0), rankdata(target.round(12))
     ranks, aim = ranks - ranks.mean(axis=0), aim - aim.mean()
     with np.errstate(divide="ignore", invalid="ignore"):
-        found: F64 = np.nan_to_num(aim @ ranks / (np.linalg.norm(ranks, axis=0) * np.linalg.norm(aim)))
-    return found
+        rho: F64 = np.nan_to_num(aim @ ranks / (np.linalg.norm(ranks, axis=0) * np.linalg.norm(aim)))
+    return rho
 
 
-def _log_scatter(table: IndexTable, spectra: F64, bands: list[Band]) -> F64:
+def _band_weights(freq_hz: F64, bands: list[Band], kind: SpectrumKind) -> F64:
+    """Gains (b, m) of the band-passes (6) as they weigh a spectrum of this kind."""
+    order = 1 if kind == "amplitude" else 2
+    return np.array([band_pass_gain(freq_hz, band) ** order for band in bands])
+
+
+def _log_scatter(table: SpectrumTable, spectra: F64, weights: F64) -> F64:
     """Sum over runs of the covariance (b, b) that log band levels have by the scatter of spectra alone."""
-    weights = band_weights(table.freq_hz, bands, table.kind)
     mean = spectra.mean(axis=0)
     level = weights @ mean
     covariance = bin_covariance(table.n_segment, len(table.freq_hz), table.kind)
@@ -118,9 +150,8 @@ def _significance(rest: F64, aim: F64, scatter: F64) -> F64:
     with np.errstate(divide="ignore", invalid="ignore"):
         explained = joint**2 / (aim @ aim)
         residual = np.maximum(total - explained, _of_differences(scatter))
-        strength = np.where((joint > 0.0) & (total > 0.0), explained / (explained + residual), 0.0)
-    found: F64 = np.nan_to_num(strength)
-    return found
+        strength: F64 = np.where((joint > 0.0) & (total > 0.0), explained / (explained + residual), 0.0)
+    return np.nan_to_num(strength)
 
 
 def _of_differences(covariance: F64) -> F64:
@@ -131,12 +162,13 @@ def _of_differences(covariance: F64) -> F64:
 
 
 def _peaks(strength: F64, n_best: int) -> list[tuple[int, int]]:
+    """Places of the greatest strengths (b, b), each apart from those before it."""
     strength = strength.copy()
-    found: list[tuple[int, int]] = []
-    while len(found) < n_best:
+    peaks: list[tuple[int, int]] = []
+    while len(peaks) < n_best:
         i, j = (int(k) for k in np.unravel_index(int(np.argmax(strength)), strength.shape))
         if strength[i, j] <= 0.0:
             break
-        found.append((i, j))
+        peaks.append((i, j))
         strength[max(0, i - 1) : i + 2, max(0, j - 1) : j + 2] = 0.0
-    return found
+    return peaks

@@ -1,13 +1,12 @@
 """The choice of bands, and of terms where these are not fixed, by errors on runs left out."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
-from gateway.calibration.ratio_index.bands import WIDTHS_HZ, BandPair, candidate_pairs, ratios
+from gateway.calibration.ratio_index.bands import Pairs, indexes, ratios
 from gateway.calibration.ratio_index.regression import (
     FittedRegression,
     fit_regression,
@@ -15,168 +14,107 @@ from gateway.calibration.ratio_index.regression import (
     without_each_run,
 )
 from gateway.calibration.ratio_index.stepwise import Selection, select_stepwise
-from gateway.calibration.ratio_index.structures import Family, Target, terms_of
-from gateway.calibration.ratio_index.table import IndexTable
-from gateway.core.ratio_index.index import PAPER_BANDS
-from gateway.core.ratio_index.regression import scaled_columns, term_columns
+from gateway.calibration.ratio_index.structures import Family, terms_of
+from gateway.calibration.ratio_index.table import SpectrumTable
+from gateway.core.ratio_index.regression import RegressionModel, scaled_columns, term_columns
 from gateway.core.vehicle import Vehicle
-from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
 
-BandChoice = Literal["campaign", "table2"]
-Pairs = tuple[BandPair | None, BandPair | None]  # of acceleration and of pitch rate; None without the sensor
-
-TARGETS: Final[tuple[Target, Target]] = ("payload", "front_share")
-N_CANDIDATES: Final = 12  # pairs of each sensor and width
 N_STEPWISE: Final = 12  # pairs of pairs, the best with both logarithms, worth a stepwise choice
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
-    """A regression of one family on given bands; ``selection`` tells how a stepwise one came about."""
-
-    family: Family
-    fitted: FittedRegression
-    selection: Selection | None = None
-
-    @property
-    def held_out_rms(self) -> float:
-        """Root mean square error on runs left out of the regression, the bands given; kg or percentage points."""
-        return float(np.sqrt(np.mean(self.fitted.held_out_errors**2)))
-
-
-@dataclass(frozen=True, slots=True)
 class Choice:
-    """Bands, and one family's regressions on them.
+    """Bands, and one family's regressions of payload and of front share on them, None where there is none.
 
-    ``score`` is the sum of mean square errors on runs left out, as shares of the ranges of (12).
+    ``selections`` tell how stepwise ones came about. ``score`` is the sum of mean square errors on runs left
+    out of the regressions, the bands given, as shares of the ranges of (12).
     """
 
+    family: Family
     pairs: Pairs
-    payload: Tried | None
-    front_share: Tried | None
+    regressions: tuple[FittedRegression | None, FittedRegression | None]
+    selections: tuple[Selection, Selection]
     score: float
 
     @property
-    def tried(self) -> tuple[Tried | None, Tried | None]:
+    def is_told(self) -> tuple[bool, bool]:
+        """Whether it tells payload, and front share."""
+        return self.regressions[0] is not None, self.regressions[1] is not None
+
+    @property
+    def models(self) -> tuple[RegressionModel | None, RegressionModel | None]:
         """Of payload and of front share."""
-        return self.payload, self.front_share
+        payload, front_share = self.regressions
+        return payload.model if payload else None, front_share.model if front_share else None
+
+    def predict(self, table: SpectrumTable) -> tuple[F64, F64]:
+        """Answers and their standard deviations (2, n) for the table's batches; NaN where none is told."""
+        shown = list(zip(*indexes(table, self.pairs), strict=True))
+        told = np.full((2, len(shown), 2), np.nan)
+        for target, model in enumerate(self.models):
+            if model is not None:
+                told[target] = [model.predict(float(ra), float(rg))[:2] for ra, rg in shown]
+        return told[..., 0], told[..., 1]
 
 
-def candidates(table: IndexTable, bands: BandChoice) -> list[list[Pairs]]:
-    """Band pairs worth a regression, a list for each width: the most significant of the campaign, or the paper's.
-
-    Raises CalibrationImpossibleError where no pair follows the load.
-    """
-    if bands == "table2":
-        sensors = (("acceleration", table.acceleration), ("pitch_rate", table.pitch_rate))
-        of_a, of_g = (None if seen is None else BandPair(PAPER_BANDS[name]) for name, seen in sensors)
-        return [[(of_a, of_g)]]
-    found = []
-    for width_hz in WIDTHS_HZ:
-        of_load = _pairs_of(table, table.acceleration, table.payload_kg, table.front_share_pct, width_hz)
-        of_share = _pairs_of(table, table.pitch_rate, table.front_share_pct, table.payload_kg, width_hz)
-        found.append(list(product(of_load, of_share)))
-    if not any(found):
-        raise CalibrationImpossibleError(
-            "no pair of bands follows the load over these runs: drive more different loads"
-        )
-    return found
-
-
-def choose(table: IndexTable, found: list[list[Pairs]], family: Family, vehicle: Vehicle) -> Choice | None:
-    """The bands among the candidates ``found`` with which ``family`` errs least on runs left out.
+def choose(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, vehicle: Vehicle) -> Choice | None:
+    """The bands among the candidates with which ``family`` errs least on runs left out.
 
     None where these runs cannot carry a regression of this family.
     """
-    pairs = [one for of_width in found for one in of_width]
-    ranking: Family = "log" if family == "stepwise" else family
-    scores = np.concatenate([_scores(table, of_width, ranking, vehicle) for of_width in found])
+    scores = _scores(table, candidates, "log" if family == "stepwise" else family, vehicle)
     if family != "stepwise":
         best = int(np.argmin(scores))
-        return choice_on(table, pairs[best], family, vehicle) if np.isfinite(scores[best]) else None
-    finalists = [pairs[int(i)] for i in np.argsort(scores, kind="stable")[:N_STEPWISE]]
-    choices = [choice_on(table, one, family, vehicle) for one in finalists]
-    carried = [one for one in choices if one is not None]
-    return min(carried, key=_rank, default=None)
+        return _choice_on(table, candidates[best], family, vehicle) if np.isfinite(scores[best]) else None
+    finalists = [candidates[int(i)] for i in np.argsort(scores, kind="stable")[:N_STEPWISE]]
+    choices = [_choice_on(table, pairs, family, vehicle) for pairs in finalists]
+    carried = [choice for choice in choices if choice is not None]
+    return min(carried, key=lambda choice: (-sum(choice.is_told), choice.score), default=None)
 
 
-def choice_on(table: IndexTable, pairs: Pairs, family: Family, vehicle: Vehicle) -> Choice | None:
+def spans_of(vehicle: Vehicle) -> tuple[float, float]:
+    """The ranges of (12): payload in kg, front share in percentage points."""
+    payload_kg, share_pct = vehicle.payload_range_kg, vehicle.front_share_range_pct
+    return payload_kg[1] - payload_kg[0], share_pct[1] - share_pct[0]
+
+
+def _choice_on(table: SpectrumTable, pairs: Pairs, family: Family, vehicle: Vehicle) -> Choice | None:
     """One family's regressions with given bands; None where there is none."""
-    payload, front_share = (_tried(table, pairs, family, target) for target in TARGETS)
-    shares = [
-        (tried.held_out_rms / span) ** 2
-        for tried, span in zip((payload, front_share), _spans(vehicle), strict=True)
-        if tried is not None
-    ]
-    return Choice(pairs, payload, front_share, sum(shares)) if shares else None
+    ra, rg = indexes(table, pairs)
+    regressions: list[FittedRegression | None] = []
+    selections: list[Selection] = []
+    score = 0.0
+    for target, (known, span) in enumerate(zip(table.targets, spans_of(vehicle), strict=True)):
+        terms, selection = terms_of(family, target, table), Selection()
+        if terms and family == "stepwise":
+            selection = select_stepwise(terms, ra, rg, known, table.run)
+            terms = selection.terms
+        regression = fit_regression(terms, ra, rg, known, table.run) if terms else None
+        regressions.append(regression)
+        selections.append(selection)
+        if regression is not None:
+            score += (float(np.sqrt(np.mean(regression.held_out_errors**2))) / span) ** 2
+    choice = Choice(family, pairs, (regressions[0], regressions[1]), (selections[0], selections[1]), score)
+    return choice if any(choice.is_told) else None
 
 
-def n_answered(choice: Choice) -> int:
-    """How many of payload and front share a choice tells."""
-    return sum(tried is not None for tried in choice.tried)
-
-
-def indexes(table: IndexTable, pairs: Pairs) -> tuple[F64, F64]:
-    """R_a and R_g (n,) of every batch; NaN without the sensor."""
-    return ratios(table, table.acceleration, pairs[0]), ratios(table, table.pitch_rate, pairs[1])
-
-
-def truth(table: IndexTable, target: Target) -> F64:
-    """What was weighed, of every batch (n,)."""
-    return table.payload_kg if target == "payload" else table.front_share_pct
-
-
-def _rank(choice: Choice) -> tuple[int, float]:
-    return -n_answered(choice), choice.score
-
-
-def _pairs_of(
-    table: IndexTable, spectra: F64 | None, target: F64, other: F64, width_hz: float
-) -> list[BandPair | None]:
-    if spectra is None:
-        return [None]
-    return [*candidate_pairs(table, spectra, target, other, width_hz, N_CANDIDATES)]
-
-
-def _scores(table: IndexTable, found: list[Pairs], family: Family, vehicle: Vehicle) -> F64:
-    """Score (c,) of a fixed family on each of the candidate bands: all at once."""
-    if not found:
-        return np.empty(0)
-    ra, rg = (
-        _ratios_of_all(table, table.acceleration, [of_a for of_a, _ in found]),
-        _ratios_of_all(table, table.pitch_rate, [of_g for _, of_g in found]),
-    )
-    scores = np.full(len(found), np.inf)
-    for target, span in zip(TARGETS, _spans(vehicle), strict=True):
+def _scores(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, vehicle: Vehicle) -> F64:
+    """Score (c,) of a fixed family on each of the candidate bands, all at once; infinite where it cannot be fitted."""
+    ra, rg = (_ratios_of_all(table, candidates, sensor) for sensor in (0, 1))
+    parts = []
+    for target, (known, span) in enumerate(zip(table.targets, spans_of(vehicle), strict=True)):
         terms = terms_of(family, target, table)
         if terms:
-            known = truth(table, target)
             raw = term_columns(terms, ra, rg)
             lows, highs = raw.min(axis=1, keepdims=True), raw.max(axis=1, keepdims=True)
             columns = scaled_columns(terms, ra, rg, lows, highs)
-            without, _ = without_each_run(columns, known, table.run)
-            errors = held_out_errors(columns, without, known, table.run)
-            scores = np.where(np.isinf(scores), 0.0, scores) + np.mean((errors / span) ** 2, axis=1)
-    return scores
+            errors = held_out_errors(columns, without_each_run(columns, known, table.run)[0], known, table.run)
+            parts.append(np.mean((errors / span) ** 2, axis=1))
+    return np.sum(parts, axis=0) if parts else np.full(len(candidates), np.inf)
 
 
-def _ratios_of_all(table: IndexTable, spectra: F64 | None, pairs: list[BandPair | None]) -> F64:
+def _ratios_of_all(table: SpectrumTable, candidates: Sequence[Pairs], sensor: int) -> F64:
     """Indexes (c, n) of one sensor; a pair that comes again is not worked out again."""
-    found = {pair: ratios(table, spectra, pair) for pair in dict.fromkeys(pairs)}
-    return np.array([found[pair] for pair in pairs])
-
-
-def _tried(table: IndexTable, pairs: Pairs, family: Family, target: Target) -> Tried | None:
-    terms = terms_of(family, target, table)
-    selection = None
-    if terms and family == "stepwise":
-        selection = select_stepwise(terms, *indexes(table, pairs), truth(table, target), table.run)
-        terms = selection.terms
-    if not terms:
-        return None
-    return Tried(family, fit_regression(terms, *indexes(table, pairs), truth(table, target), table.run), selection)
-
-
-def _spans(vehicle: Vehicle) -> Iterator[float]:
-    return (high - low for low, high in (vehicle.payload_range_kg, vehicle.front_share_range_pct))
+    by_pair = {pair: ratios(table, sensor, pair) for pair in {pairs[sensor] for pairs in candidates}}
+    return np.array([by_pair[pairs[sensor]] for pairs in candidates])

@@ -1,4 +1,4 @@
-"""Calibrates the ratio index: bands found on the campaign, then the static regression (9), (10), (11).
+"""Calibrates the ratio index: bands chosen on the campaign, then the static regression (9), (10), (11).
 
 Bands and terms are chosen by errors on runs left out. The least of many such errors flatters, for the runs
 left out took part in the choice. The nested error does not: there the whole choice is made anew without
@@ -6,7 +6,8 @@ the run that is then judged. By it the families of structures are compared, and 
 is widened where it demands so.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -14,74 +15,61 @@ import numpy as np
 from scipy.special import stdtrit
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.band_map import BandMap, band_maps
-from gateway.calibration.ratio_index.choice import (
-    TARGETS,
-    BandChoice,
-    Choice,
-    Pairs,
-    candidates,
-    choose,
-    indexes,
-    n_answered,
-    truth,
-)
+from gateway.calibration.ratio_index.bands import BandChoice, Pairs, candidates
+from gateway.calibration.ratio_index.choice import Choice, choose, spans_of
 from gateway.calibration.ratio_index.structures import FAMILIES, Family, StructureChoice
-from gateway.calibration.ratio_index.table import IndexTable, index_table
+from gateway.calibration.ratio_index.table import SpectrumTable, spectrum_table
 from gateway.core.ratio_index.index import RatioIndexCalibration, SpectrumKind
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
-from gateway.records import F64, Batch
+from gateway.records import F64, Bool
 
 N_SEGMENT: Final = 1024  # 20.5 s at 50 Hz: resolves 0.05 Hz and still fits between two traffic lights
 SPEED_STD_FACTOR: Final = 2.0  # a batch's speed may spread this many times as much as the widest calibrated
 MOST: Final = 0.8  # quantile of nested errors that a spread must allow for; the rest may lie far outside the loads seen
 
-
-@dataclass(frozen=True, slots=True)
-class NestedErrors:
-    """Of batches of runs that took no part in any choice, (2, n), payload and front share; NaN where none is told.
-
-    error is estimate less truth, in kg and percentage points; std is what the fold's own model stated.
-    """
-
-    error: F64
-    std: F64
-
-    @property
-    def rms(self) -> tuple[float, float]:
-        """Root mean square of either target; NaN where one batch or more got no answer."""
-        found = np.sqrt(np.mean(self.error**2, axis=1))
-        return float(found[0]), float(found[1])
+Models = Sequence[RegressionModel | None]  # of payload and of front share
+Fold = tuple[Bool, SpectrumTable, list[Pairs]]  # batches left out (n,), the others, and bands worth a try on these
 
 
 @dataclass(frozen=True, slots=True)
 class FamilyTrial:
-    """The best bands for one family of structures, and how such a choice fares on runs unseen."""
+    """The best bands for one family of structures, and how such a choice fares on runs unseen.
 
-    family: Family
+    ``without`` holds the choice made anew without each run, by the run's number. Its error (estimate less truth,
+    kg and percentage points) and the standard deviation it states are of the batches of that run: nested_error
+    and nested_std (2, n), payload and front share; NaN where none is told.
+    """
+
     choice: Choice
-    nested: NestedErrors
+    without: Mapping[int, Choice]
+    nested_error: F64
+    nested_std: F64
+
+    @property
+    def nested_rms(self) -> tuple[float, float]:
+        """Root mean square of either target's nested error; NaN where one batch or more got no answer."""
+        payload_kg, share_pct = np.sqrt(np.mean(self.nested_error**2, axis=1)).tolist()
+        return payload_kg, share_pct
 
 
 @dataclass(frozen=True, slots=True)
 class RatioIndexFit:
     """The calibration and what stands behind it.
 
-    payload_errors_kg and front_share_errors_pct (n,) are the nested errors of the family chosen, batches in
-    the order of ``table``; where so few runs allow none, those of the regression alone, bands given.
-    ``trials`` are all families, the chosen one first; ``band_maps`` hold what every band could tell.
+    ``without`` holds, by run number, what the other runs teach without that run: bands and terms chosen anew, or
+    where so few runs allow no such choice the same ones fitted anew. payload_errors_kg and
+    front_share_errors_pct (n,) are its errors, batches in the order of ``table``. Its intervals are widened as
+    much as all runs demand. ``trials`` are all families, the chosen one first.
     """
 
     calibration: RatioIndexCalibration
+    without: Mapping[int, RatioIndexCalibration]
     payload_errors_kg: F64 | None
     front_share_errors_pct: F64 | None
-    n_runs: int
-    n_batches: int
-    table: IndexTable
+    table: SpectrumTable
     trials: tuple[FamilyTrial, ...]
-    band_maps: tuple[BandMap, ...] = ()
 
     @property
     def chosen(self) -> FamilyTrial:
@@ -98,70 +86,60 @@ def fit_ratio_index(
     structure: StructureChoice = "auto",
 ) -> RatioIndexFit:
     """Identification runs -> calibration. Raises CalibrationImpossibleError where they cannot carry one."""
-    table = index_table(runs, kind, N_SEGMENT)
-    families = FAMILIES if structure == "auto" else (structure,)
-    trials = _family_trials(table, vehicle, bands, families)
+    table = spectrum_table(runs, kind, N_SEGMENT)
+    trials = _family_trials(table, vehicle, bands, FAMILIES if structure == "auto" else (structure,))
     chosen = trials[0]
-    models = [
-        _widened(tried.fitted.model, chosen.nested, row) if tried else None
-        for row, tried in enumerate(chosen.choice.tried)
-    ]
-    errors = [_errors(chosen, row) for row in range(2)]
     batches = [batch for run in runs for batch in run.batches if not batch.rejected]
-    speeds = [batch.mean_speed_mps for batch in batches]
-    of_a, of_g = chosen.choice.pairs
+    speeds_mps = [batch.mean_speed_mps for batch in batches]
+    speed_stds_mps = [float(np.std(batch.speed_mps[batch.usable])) for batch in batches]
+    blank = RatioIndexCalibration(
+        spectrum=kind,
+        n_segment=N_SEGMENT,
+        acceleration_bands=None,
+        pitch_rate_bands=None,
+        payload=None,
+        front_share=None,
+        speed_range_mps=(min(speeds_mps), max(speeds_mps)),
+        speed_std_max_mps=SPEED_STD_FACTOR * max(speed_stds_mps),
+    )
+    models = chosen.choice.models
+    widening = [_widening(model, chosen, target) for target, model in enumerate(models)]
+    dof = table.n_runs - 1.0
     return RatioIndexFit(
-        RatioIndexCalibration(
-            spectrum=kind,
-            n_segment=N_SEGMENT,
-            acceleration_bands=of_a.bands if of_a else None,
-            pitch_rate_bands=of_g.bands if of_g else None,
-            payload=models[0],
-            front_share=models[1],
-            speed_range_mps=(min(speeds), max(speeds)),
-            speed_std_max_mps=SPEED_STD_FACTOR * max(_speed_std_mps(batch) for batch in batches),
-        ),
-        payload_errors_kg=errors[0],
-        front_share_errors_pct=errors[1],
-        n_runs=table.n_runs,
-        n_batches=len(table.run),
+        calibration=_calibration(blank, chosen.choice.pairs, models, widening, dof),
+        without={
+            number: _calibration(blank, pairs, others, widening, dof)
+            for number, (pairs, others) in _models_without(chosen, table).items()
+        },
+        payload_errors_kg=_errors(chosen, 0),
+        front_share_errors_pct=_errors(chosen, 1),
         table=table,
         trials=trials,
-        band_maps=band_maps(table),
     )
 
 
 def _family_trials(
-    table: IndexTable, vehicle: Vehicle, bands: BandChoice, families: Sequence[Family]
+    table: SpectrumTable, vehicle: Vehicle, bands: BandChoice, families: Sequence[Family]
 ) -> tuple[FamilyTrial, ...]:
     """Every family these runs can carry, the best first: most targets told, then least nested error."""
     _check(table)
-    found = candidates(table, bands)
-    choices = {family: choose(table, found, family, vehicle) for family in families}
-    carried = {family: choice for family, choice in choices.items() if choice is not None}
-    if not carried:
+    pairs = candidates(table, bands)
+    choices = [choice for family in families if (choice := choose(table, pairs, family, vehicle)) is not None]
+    if not choices:
         raise CalibrationImpossibleError(
             f"no regression ({', '.join(families)}) can be made of {table.n_runs} runs with {table.n_loads} payloads "
             f"and {table.n_shares} front shares: drive another known load"
         )
-    nested = _nested(table, vehicle, bands, tuple(carried))
-    trials = [FamilyTrial(family, choice, nested[family]) for family, choice in carried.items()]
+    folds = _folds(table, bands)
+    trials = [_trial(table, folds, choice, vehicle) for choice in choices]
     return tuple(sorted(trials, key=lambda trial: _rank(trial, vehicle)))
 
 
-def _rank(trial: FamilyTrial, vehicle: Vehicle) -> tuple[int, bool, float]:
-    spans = [high - low for low, high in (vehicle.payload_range_kg, vehicle.front_share_range_pct)]
-    told = [tried is not None for tried in trial.choice.tried]
-    score = sum((rms / span) ** 2 for rms, span, is_told in zip(trial.nested.rms, spans, told, strict=True) if is_told)
-    is_nested = bool(np.isfinite(score))
-    return -n_answered(trial.choice), not is_nested, score if is_nested else trial.choice.score
-
-
-def _check(table: IndexTable) -> None:
+def _check(table: SpectrumTable) -> None:
     if table.n_loads < 2:
         raise CalibrationImpossibleError(
             "the ratio index needs runs with at least two different payloads; all of these carry "
-            f"{table.payload_kg[0]:g} kg: drive the vehicle empty and loaded"
+            f"{table.targets[0][0]:g} kg: drive the vehicle empty and loaded"
         )
     if table.n_runs < 3:
         raise CalibrationImpossibleError(
@@ -169,53 +147,82 @@ def _check(table: IndexTable) -> None:
         )
 
 
-def _nested(
-    table: IndexTable, vehicle: Vehicle, bands: BandChoice, families: Sequence[Family]
-) -> dict[Family, NestedErrors]:
-    """For each run, bands and terms of every family chosen and fitted on the others, then held against it."""
-    blank = np.full((2, len(table.run)), np.nan)
-    nested = {family: NestedErrors(blank.copy(), blank.copy()) for family in families}
+def _folds(table: SpectrumTable, bands: BandChoice) -> list[Fold]:
+    """One for each run without which bands can still be chosen."""
+    folds: list[Fold] = []
     for number in np.unique(table.run):
-        out = table.run == number
-        rest, left = table.rows(~out), table.rows(out)
-        if rest.n_loads < 2:
+        is_out = table.run == number
+        rest = table.rows(~is_out)
+        if rest.n_loads > 1:
+            with suppress(CalibrationImpossibleError):
+                folds.append((is_out, rest, candidates(rest, bands)))
+    return folds
+
+
+def _trial(table: SpectrumTable, folds: Sequence[Fold], choice: Choice, vehicle: Vehicle) -> FamilyTrial:
+    """For each run, bands and terms of the family chosen and fitted on the others, then held against it."""
+    error, std = np.full((2, 2, len(table.run)), np.nan)
+    without: dict[int, Choice] = {}
+    for is_out, rest, pairs in folds:
+        again = choose(rest, pairs, choice.family, vehicle)
+        if again is None:
             continue
-        try:
-            found = candidates(rest, bands)
-        except CalibrationImpossibleError:
-            continue
-        for family in families:
-            choice = choose(rest, found, family, vehicle)
-            for row, tried in enumerate(choice.tried if choice else ()):
-                if choice is not None and tried is not None:
-                    predicted, std = _predicted(tried.fitted.model, left, choice.pairs)
-                    nested[family].error[row, out] = predicted - truth(left, TARGETS[row])
-                    nested[family].std[row, out] = std
-    return nested
+        left = table.rows(is_out)
+        without[int(left.number[0])] = again
+        answer, std[:, is_out] = again.predict(left)
+        error[:, is_out] = answer - np.array(left.targets)
+    return FamilyTrial(choice, without, error, std)
 
 
-def _predicted(model: RegressionModel, table: IndexTable, pairs: Pairs) -> tuple[F64, F64]:
-    told = [model.predict(float(ra), float(rg))[:2] for ra, rg in zip(*indexes(table, pairs), strict=True)]
-    centre, std = np.array(told).T
-    return centre, std
+def _rank(trial: FamilyTrial, vehicle: Vehicle) -> tuple[int, bool, float]:
+    parts = zip(trial.nested_rms, spans_of(vehicle), trial.choice.is_told, strict=True)
+    score = sum((rms / span) ** 2 for rms, span, is_told in parts if is_told)
+    is_nested = bool(np.isfinite(score))
+    return -sum(trial.choice.is_told), not is_nested, score if is_nested else trial.choice.score
 
 
-def _widened(model: RegressionModel, nested: NestedErrors, row: int) -> RegressionModel:
-    """The model with a spread that four fifths of the nested errors bear out; never a smaller one."""
-    z = np.abs(nested.error[row] / nested.std[row])
-    if not np.all(np.isfinite(z)):
-        return model
-    expected = float(stdtrit(model.dof, 0.5 + MOST / 2.0))
-    return replace(model, residual_std=model.residual_std * max(1.0, float(np.quantile(z, MOST)) / expected))
-
-
-def _errors(trial: FamilyTrial, row: int) -> F64 | None:
-    tried = trial.choice.tried[row]
-    if tried is None:
+def _widening(model: RegressionModel | None, trial: FamilyTrial, target: int) -> float | None:
+    """By how much to widen a spread so that four fifths of the nested errors bear it out; None where none is told."""
+    if model is None:
         return None
-    nested: F64 = trial.nested.error[row]
-    return nested if np.all(np.isfinite(nested)) else tried.fitted.held_out_errors
+    z = np.abs(trial.nested_error[target] / trial.nested_std[target])
+    if not np.all(np.isfinite(z)):
+        return 1.0
+    return max(1.0, float(np.quantile(z, MOST)) / float(stdtrit(model.dof, 0.5 + MOST / 2.0)))
 
 
-def _speed_std_mps(batch: Batch) -> float:
-    return float(np.std(batch.speed_mps[batch.usable]))
+def _models_without(trial: FamilyTrial, table: SpectrumTable) -> dict[int, tuple[Pairs, Models]]:
+    """By run number, bands and regressions that did not see that run."""
+    choice = trial.choice
+    if np.isfinite(trial.nested_error[list(choice.is_told)]).all():
+        return {number: (again.pairs, again.models) for number, again in trial.without.items()}
+    places = dict(zip(table.number.tolist(), table.run.tolist(), strict=True))
+    return {
+        number: (choice.pairs, [one.without[place] if one else None for one in choice.regressions])
+        for number, place in places.items()
+    }
+
+
+def _calibration(
+    blank: RatioIndexCalibration, pairs: Pairs, models: Models, widening: Sequence[float | None], dof: float
+) -> RatioIndexCalibration:
+    of_a, of_g = pairs
+    payload, front_share = (
+        replace(model, residual_std=model.residual_std * factor, dof=dof) if model and factor else None
+        for model, factor in zip(models, widening, strict=True)
+    )
+    return replace(
+        blank,
+        acceleration_bands=of_a.bands if of_a else None,
+        pitch_rate_bands=of_g.bands if of_g else None,
+        payload=payload,
+        front_share=front_share,
+    )
+
+
+def _errors(trial: FamilyTrial, target: int) -> F64 | None:
+    regression = trial.choice.regressions[target]
+    if regression is None:
+        return None
+    nested: F64 = trial.nested_error[target]
+    return nested if np.all(np.isfinite(nested)) else regression.held_out_errors

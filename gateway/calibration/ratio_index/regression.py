@@ -1,6 +1,6 @@
 """Least squares over the batches of known runs, judged by whole runs left out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -13,15 +13,21 @@ RIDGE: Final = 1e-12  # of the Gram matrix's mean diagonal: solves what a left-o
 
 @dataclass(frozen=True, slots=True)
 class FittedRegression:
-    """A regression and its errors (n,) on runs left out, estimate less truth.
-
-    covariance (p + 1, p + 1) is of the coefficients, by jackknife over runs, so batches of a run may share
-    whatever error they like (Efron and Tibshirani, An Introduction to the Bootstrap, ch. 11).
-    """
+    """A regression, those of the same terms without each run by rising number, and their errors (n,) on these runs."""
 
     model: RegressionModel
+    without: tuple[RegressionModel, ...]
     held_out_errors: F64
-    covariance: F64
+
+    @property
+    def covariance(self) -> F64:
+        """Of the coefficients (p + 1, p + 1), by jackknife over runs: batches of a run may share any error they like.
+
+        B. Efron and R. J. Tibshirani, An Introduction to the Bootstrap, ch. 11.
+        """
+        without = np.array([model.coefficients for model in self.without])
+        moved = without - without.mean(axis=0)
+        return np.asarray((len(moved) - 1.0) / len(moved) * moved.T @ moved)
 
 
 def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I64) -> FittedRegression:
@@ -35,24 +41,21 @@ def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I
     lows, highs = raw.min(axis=0), raw.max(axis=0)
     columns = scaled_columns(terms, ra, rg, lows, highs)
     gram_inverse: F64 = np.linalg.pinv(columns.T @ columns).astype(float)
-    coefficients = gram_inverse @ columns.T @ target
     without, inverse = without_each_run(columns, target, run)
     place = np.unique(run, return_inverse=True)[1]
     errors = held_out_errors(columns, without, target, run)
     leverage = np.einsum("ni,nij,nj->n", columns, inverse[place], columns)
-    n_runs = len(without)
-    moved = without - without.mean(axis=0)
     model = RegressionModel(
         terms=terms,
         lows=lows,
         highs=highs,
-        coefficients=coefficients,
+        coefficients=gram_inverse @ columns.T @ target,
         gram_inverse=gram_inverse,
         residual_std=float(np.sqrt(np.mean(errors**2) / (1.0 + np.mean(leverage)))),
-        dof=float(n_runs - 1),
+        dof=float(len(without) - 1),
     )
-    covariance = (n_runs - 1.0) / n_runs * moved.T @ moved
-    return FittedRegression(model, errors, covariance)
+    others = zip(without, inverse, strict=True)
+    return FittedRegression(model, tuple(replace(model, coefficients=b, gram_inverse=g) for b, g in others), errors)
 
 
 def without_each_run(columns: F64, target: F64, run: I64) -> tuple[F64, F64]:

@@ -46,8 +46,8 @@ class Step:
 class Selection:
     """The terms chosen and how; the p-values are those at the time of each step and are not uniform."""
 
-    terms: tuple[str, ...]
-    steps: tuple[Step, ...]
+    terms: tuple[str, ...] = ()
+    steps: tuple[Step, ...] = ()
 
 
 def partial_f(columns: F64, added: F64, target: F64) -> PartialF:
@@ -67,89 +67,60 @@ def partial_f(columns: F64, added: F64, target: F64) -> PartialF:
 
 
 def select_stepwise(
-    library: tuple[str, ...],
-    ra: F64,
-    rg: F64,
-    target: F64,
-    run: I64,
-    *,
-    p_enter: float = P_ENTER,
-    p_leave: float = P_LEAVE,
+    library: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I64, *, p_enter: float = P_ENTER
 ) -> Selection:
     """Forward selection from ``library`` with a look back after each step; ra, rg, target, run (n,).
 
-    The best term enters while its p-value is under ``p_enter`` and it lowers the error on runs left out;
-    one whose p-value rose above ``p_leave`` leaves. Tests are over run means, one a run. May choose nothing.
+    The best term enters while its p-value is under ``p_enter`` and it lowers the error on runs left out; one
+    whose p-value rose above P_LEAVE leaves where that costs no such error. Tests are over run means, one a
+    run. May choose nothing.
     """
-    pool = _Pool(library, ra, rg, target, run)
-    chosen: tuple[str, ...] = ()
-    steps: list[Step] = []
-    while len(chosen) < min(MAX_TERMS, pool.n_runs - 2):
-        entering = pool.best_addition(chosen)
-        if entering is None or not entering[1].p_value < p_enter:
-            break
-        term, test = entering
-        rms = pool.held_out_rms((*chosen, term))
-        if rms >= pool.held_out_rms(chosen):
-            break
-        chosen = (*chosen, term)
-        steps.append(Step("enter", term, test, rms))
-        term, test = max(((t, pool.test_of(t, chosen)) for t in chosen), key=lambda one: one[1].p_value)
-        if test.p_value > p_leave and term != chosen[-1]:
-            without = tuple(t for t in chosen if t != term)
-            if pool.held_out_rms(without) <= rms:
-                chosen = without
-                steps.append(Step("leave", term, test, pool.held_out_rms(chosen)))
-    return Selection(chosen, tuple(steps))
+    raw = term_columns(library, ra, rg)
+    batches = scaled_columns(library, ra, rg, raw.min(axis=0), raw.max(axis=0))
+    means, aim = run_means(run, batches), run_means(run, target)
 
-
-class _Pool:
-    """All columns of a library: of batches, to be judged by runs left out, and of run means, to be tested."""
-
-    def __init__(self, library: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I64) -> None:
-        raw = term_columns(library, ra, rg)
-        self._place = {name: i for i, name in enumerate(library, 1)}
-        self._batches = scaled_columns(library, ra, rg, raw.min(axis=0), raw.max(axis=0))
-        self._target, self._run = target, run
-        self._means = run_means(run, self._batches)
-        self._target_means = run_means(run, target)
-
-    @property
-    def n_runs(self) -> int:
-        return len(self._means)
-
-    def best_addition(self, chosen: tuple[str, ...]) -> tuple[str, PartialF] | None:
-        """The term whose addition leaves least, and its test; None where all depend on those chosen."""
-        columns = self._means[:, self._places(chosen)]
-        basis = np.linalg.qr(columns)[0]
-        rest = self._means - basis @ (basis.T @ self._means)
-        length = np.linalg.norm(rest, axis=0)
-        is_new = length > INDEPENDENT * np.linalg.norm(self._means, axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            gain = np.where(is_new, np.abs(rest.T @ self._target_means) / length, -1.0)
-        best = int(np.argmax(gain))
-        if gain[best] <= 0.0:
-            return None
-        name = next(name for name, place in self._place.items() if place == best)
-        return name, partial_f(columns, self._means[:, [best]], self._target_means)
-
-    def test_of(self, term: str, chosen: tuple[str, ...]) -> PartialF:
-        """The test of one chosen term given the others."""
-        others = tuple(name for name in chosen if name != term)
-        return partial_f(self._means[:, self._places(others)], self._means[:, [self._place[term]]], self._target_means)
-
-    def held_out_rms(self, chosen: tuple[str, ...]) -> float:
-        columns = self._batches[:, self._places(chosen)]
-        without, _ = without_each_run(columns, self._target, self._run)
-        errors = held_out_errors(columns, without, self._target, self._run)
+    def held_out_rms(chosen: list[int]) -> float:
+        columns = batches[:, chosen]
+        errors = held_out_errors(columns, without_each_run(columns, target, run)[0], target, run)
         return float(np.sqrt(np.mean(errors**2)))
 
-    def _places(self, chosen: tuple[str, ...]) -> list[int]:
-        return [0, *(self._place[name] for name in chosen)]
+    chosen = [0]  # columns: the constant, then the library's
+    rms = held_out_rms(chosen)
+    steps: list[Step] = []
+    while len(chosen) <= min(MAX_TERMS, len(means) - 2):
+        new = _best_addition(means, aim, chosen)
+        if new is None:
+            break
+        test, longer_rms = partial_f(means[:, chosen], means[:, [new]], aim), held_out_rms([*chosen, new])
+        if not test.p_value < p_enter or longer_rms >= rms:
+            break
+        chosen, rms = [*chosen, new], longer_rms
+        steps.append(Step("enter", library[new - 1], test, rms))
+        rest = {old: [other for other in chosen if other != old] for old in chosen[1:]}
+        tests = {old: partial_f(means[:, others], means[:, [old]], aim) for old, others in rest.items()}
+        weakest = max(tests, key=lambda old: tests[old].p_value)
+        if tests[weakest].p_value > P_LEAVE and weakest != new:
+            shorter_rms = held_out_rms(rest[weakest])
+            if shorter_rms <= rms:
+                chosen, rms = rest[weakest], shorter_rms
+                steps.append(Step("leave", library[weakest - 1], tests[weakest], rms))
+    return Selection(tuple(library[column - 1] for column in chosen[1:]), tuple(steps))
+
+
+def _best_addition(means: F64, aim: F64, chosen: list[int]) -> int | None:
+    """The column of means (r, p) whose addition leaves least of aim (r,); None where all depend on those chosen."""
+    basis = np.linalg.qr(means[:, chosen])[0]
+    rest = means - basis @ (basis.T @ means)
+    length = np.linalg.norm(rest, axis=0)
+    is_new = length > INDEPENDENT * np.linalg.norm(means, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gain = np.where(is_new, np.abs(rest.T @ aim) / length, -1.0)
+    best = int(np.argmax(gain))
+    return best if gain[best] > 0.0 else None
 
 
 def _rss(columns: F64, target: F64) -> tuple[float, int]:
     """Sum of squared residuals, and the rank of the columns."""
-    found, _, rank, _ = np.linalg.lstsq(columns, target, rcond=None)
-    rest = target - columns @ found
+    coefficients, _, rank, _ = np.linalg.lstsq(columns, target, rcond=None)
+    rest = target - columns @ coefficients
     return float(rest @ rest), int(rank)

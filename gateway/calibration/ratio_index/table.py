@@ -13,23 +13,19 @@ from gateway.records import F64, I64, Batch, Bool
 
 
 @dataclass(frozen=True, slots=True)
-class IndexTable:
-    """Spectra of all identification batches with what is known of each.
+class SpectrumTable:
+    """Spectra of identification batches with what was weighed. Pairs: acceleration and payload, pitch rate and share.
 
-    run (n,) tells drives apart, 0 for the first in the table; number (n,) is the campaign's and t_start_ns (n,)
-    the batch's own; payload_kg, front_share_pct (n,); freq_hz (m,);
-    acceleration and pitch_rate (n, m), absent (None) where the sensor is not mapped; n_segments (n,)
+    run (n,) tells drives apart, 0 for the first in the table, number (n,) is the campaign's; targets (n,) in kg
+    and percent; spectra (n, m) at freq_hz (m,), absent (None) where the sensor is not mapped; n_segments (n,)
     averaged in each.
     """
 
     run: I64
     number: I64
-    t_start_ns: I64
-    payload_kg: F64
-    front_share_pct: F64
+    targets: tuple[F64, F64]
     freq_hz: F64
-    acceleration: F64 | None
-    pitch_rate: F64 | None
+    spectra: tuple[F64 | None, F64 | None]
     n_segments: F64
     kind: SpectrumKind
     n_segment: int
@@ -42,29 +38,27 @@ class IndexTable:
     @property
     def n_loads(self) -> int:
         """Different payloads."""
-        return len(np.unique(self.payload_kg))
+        return len(np.unique(self.targets[0]))
 
     @property
     def n_shares(self) -> int:
         """Different front shares, to a hundredth of a percentage point."""
-        return len(np.unique(self.front_share_pct.round(2)))
+        return len(np.unique(self.targets[1].round(2)))
 
-    def rows(self, chosen: Bool) -> "IndexTable":
+    def rows(self, chosen: Bool) -> "SpectrumTable":
         """The chosen batches only; chosen (n,)."""
+        (payload_kg, share_pct), (of_a, of_g) = self.targets, self.spectra
         return replace(
             self,
             run=self.run[chosen],
             number=self.number[chosen],
-            t_start_ns=self.t_start_ns[chosen],
-            payload_kg=self.payload_kg[chosen],
-            front_share_pct=self.front_share_pct[chosen],
-            acceleration=None if self.acceleration is None else self.acceleration[chosen],
-            pitch_rate=None if self.pitch_rate is None else self.pitch_rate[chosen],
+            targets=(payload_kg[chosen], share_pct[chosen]),
+            spectra=(None if of_a is None else of_a[chosen], None if of_g is None else of_g[chosen]),
             n_segments=self.n_segments[chosen],
         )
 
 
-def index_table(runs: Sequence[KnownRun], kind: SpectrumKind, n_segment: int) -> IndexTable:
+def spectrum_table(runs: Sequence[KnownRun], kind: SpectrumKind, n_segment: int) -> SpectrumTable:
     """Every counted batch of which both mapped sensors give a spectrum; runs sorted by name, then by time.
 
     Raises CalibrationImpossibleError where there is none.
@@ -77,17 +71,20 @@ def index_table(runs: Sequence[KnownRun], kind: SpectrumKind, n_segment: int) ->
     whole = [row for row in rows if (row[2] is not None or not has_a) and (row[3] is not None or not has_g)]
     if not whole or not (has_a or has_g):
         raise CalibrationImpossibleError("no identification batch has enough unbroken driving for a spectrum")
-    place = {number: i for i, number in enumerate(dict.fromkeys(run.number for run, _, _, _ in whole))}
-    freq_hz = next(spectrum[0] for _, _, a, g in whole for spectrum in (a, g) if spectrum is not None)
-    return IndexTable(
-        run=np.array([place[run.number] for run, _, _, _ in whole]),
-        number=np.array([run.number for run, _, _, _ in whole]),
-        t_start_ns=np.array([batch.t_start_ns for _, batch, _, _ in whole]),
-        payload_kg=np.array([run.payload_kg for run, _, _, _ in whole]),
-        front_share_pct=np.array([run.front_share_pct for run, _, _, _ in whole]),
-        freq_hz=freq_hz,
-        acceleration=np.array([a[1] for _, _, a, _ in whole if a is not None]) if has_a else None,
-        pitch_rate=np.array([g[1] for _, _, _, g in whole if g is not None]) if has_g else None,
+    numbers = [run.number for run, _, _, _ in whole]
+    place = {number: i for i, number in enumerate(dict.fromkeys(numbers))}
+    return SpectrumTable(
+        run=np.array([place[number] for number in numbers]),
+        number=np.array(numbers),
+        targets=(
+            np.array([run.payload_kg for run, _, _, _ in whole]),
+            np.array([run.front_share_pct for run, _, _, _ in whole]),
+        ),
+        freq_hz=next(one[0] for one in whole[0][2:] if one is not None),
+        spectra=(
+            np.array([a[1] for _, _, a, _ in whole if a is not None]) if has_a else None,
+            np.array([g[1] for _, _, _, g in whole if g is not None]) if has_g else None,
+        ),
         n_segments=np.array([_n_segments(batch, n_segment) for _, batch, _, _ in whole]),
         kind=kind,
         n_segment=n_segment,

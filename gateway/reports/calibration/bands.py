@@ -5,24 +5,22 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.ratio_index.band_map import BandMap
-from gateway.calibration.ratio_index.choice import Tried
-from gateway.calibration.ratio_index.fit import FamilyTrial, RatioIndexFit
+from gateway.calibration.ratio_index import BandMap, FamilyTrial, FittedRegression, RatioIndexFit, Selection, band_maps
 from gateway.core.ratio_index.index import Band
-from gateway.records import F64
 from gateway.reports.calibration.text import NONE, shown
 from gateway.reports.charts.chart import Axis, Cells, Chart, Marker, Panel, Points, Table
 
-_NAMES: Final = {"acceleration": ("J_L", "kg"), "pitch_rate": ("J_D", "% front")}
+_NAMES: Final = (("J_L", "kg"), ("J_D", "% front"))  # of acceleration, of pitch rate
 _MARKERS: Final[tuple[tuple[str, Marker], ...]] = (("numerator of the index", "circle"), ("denominator", "diamond"))
 
 
 def band_chart(fit: RatioIndexFit) -> Chart | None:
     """(4) and (5) over the plane of centre and width; None where there is no map."""
-    if not fit.band_maps:
+    maps = band_maps(fit.table)
+    if not maps:
         return None
-    bands = {"acceleration": fit.calibration.acceleration_bands, "pitch_rate": fit.calibration.pitch_rate_bands}
-    panels = [panel for one in fit.band_maps for panel in _panels(one, bands[one.sensor])]
+    bands = (fit.calibration.acceleration_bands, fit.calibration.pitch_rate_bands)
+    panels = [panel for one in maps for panel in _panels(one, bands[one.sensor])]
     return Chart(
         "bands",
         "Left: the difference J of the spectra at the two ends of what was driven, (4) and (5), for every band centre "
@@ -30,7 +28,7 @@ def band_chart(fit: RatioIndexFit) -> Chart | None:
         "how the band's relative level follows the load (or the share) over all runs, the other taken out. Marks: the "
         "bands chosen; the wider a band the less it scatters, the narrower the more it may differ by chance.",
         "Maps of the significance of spectral differences and of their trend with the load over band centre and width. "
-        + " ".join(_in_words(one) for one in fit.band_maps),
+        + " ".join(_in_words(one) for one in maps),
         tuple(panels),
         row_height_px=300,
     )
@@ -53,12 +51,12 @@ def _panels(one: BandMap, chosen: tuple[Band, Band] | None) -> list[Panel]:
 
 def _chosen(one: BandMap, chosen: Sequence[Band] | None) -> list[Points]:
     """The two bands where their width stands on the map's axis."""
-    found = []
+    marks = []
     for band, (label, marker) in zip(chosen or (), _MARKERS, strict=False):
         place = np.interp(np.log(band.width_hz), np.log(one.widths_hz), np.arange(len(one.widths_hz)))
         note = (f"{band.centre_hz:g} Hz, {band.width_hz:g} Hz wide",)
-        found.append(Points(np.array([band.centre_hz]), np.array([place]), label, 4, marker, notes=note))
-    return found
+        marks.append(Points(np.array([band.centre_hz]), np.array([place]), label, 4, marker, notes=note))
+    return marks
 
 
 def _in_words(one: BandMap) -> str:
@@ -76,9 +74,9 @@ def trials_table(fit: RatioIndexFit) -> Table:
     """Every family of regressions with its errors on runs that took no part in any choice."""
     rows = tuple(
         (
-            trial.family + (" (chosen)" if trial is fit.chosen else ""),
+            trial.choice.family + (" (chosen)" if trial is fit.chosen else ""),
             _pairs(trial),
-            *(", ".join(tried.fitted.model.terms) if tried else NONE for tried in trial.choice.tried),
+            *(", ".join(one.model.terms) if one else NONE for one in trial.choice.regressions),
             *_rms(trial),
         )
         for trial in fit.trials
@@ -97,17 +95,15 @@ def _pairs(trial: FamilyTrial) -> str:
 
 
 def _rms(trial: FamilyTrial) -> tuple[str, str]:
-    payload_kg, share_pct = (None if np.isnan(rms) else rms for rms in trial.nested.rms)
+    payload_kg, share_pct = (None if np.isnan(rms) else rms for rms in trial.nested_rms)
     return shown(payload_kg, " kg", 1), shown(share_pct, " pp")
 
 
-def steps_table(target: str, tried: Tried) -> Table | None:
-    """How a stepwise choice came about; None where there was none."""
-    if tried.selection is None or not tried.selection.steps:
-        return None
+def steps_table(target: str, selection: Selection) -> Table:
+    """How a stepwise choice came about."""
     rows = tuple(
         (step.action, step.term, f"{step.test.statistic:.3g}", f"{step.test.p_value:.2g}", f"{step.held_out_rms:.3g}")
-        for step in tried.selection.steps
+        for step in selection.steps
     )
     caption = (
         f"Stepwise choice for {target}: partial F-tests over run means. The smallest of many p-values is small by "
@@ -116,9 +112,9 @@ def steps_table(target: str, tried: Tried) -> Table | None:
     return Table(caption, ("Step", "term", "F", "p", "error on runs left out"), rows)
 
 
-def model_table(target: str, tried: Tried, residual_std: float, dof: float) -> Table:
+def model_table(target: str, regression: FittedRegression, residual_std: float, dof: float) -> Table:
     """Coefficients with their jackknife standard deviations over runs."""
-    model, stds = tried.fitted.model, _stds(tried)
+    model, stds = regression.model, np.sqrt(np.diag(regression.covariance))
     rows = tuple(
         (term, f"{coefficient:.4g}", f"{std:.3g}", f"{coefficient / std:.1f}" if std > 0.0 else NONE)
         for term, coefficient, std in zip(("constant", *model.terms), model.coefficients, stds, strict=True)
@@ -129,7 +125,3 @@ def model_table(target: str, tried: Tried, residual_std: float, dof: float) -> T
         ("Term", "coefficient", "standard deviation", "ratio"),
         rows,
     )
-
-
-def _stds(tried: Tried) -> F64:
-    return np.sqrt(np.diag(tried.fitted.covariance))

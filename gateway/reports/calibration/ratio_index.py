@@ -5,9 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.judgement.left_out import IndexRows, index_rows
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.fit import RatioIndexFit
+from gateway.calibration.ratio_index import IndexRows, RatioIndexFit, index_rows
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64
@@ -119,10 +118,10 @@ def _band(band: Band) -> str:
 
 
 def _model_tables(fit: RatioIndexFit) -> Iterator[Table]:
-    models = (fit.calibration.payload, fit.calibration.front_share)
-    for target, tried, model in zip(("payload [kg]", "front share [%]"), fit.chosen.choice.tried, models, strict=True):
-        if tried is not None and model is not None:
-            yield model_table(target, tried, model.residual_std, model.dof)
-            steps = steps_table(target, tried)
-            if steps is not None:
-                yield steps
+    choice, models = fit.chosen.choice, (fit.calibration.payload, fit.calibration.front_share)
+    told = zip(("payload [kg]", "front share [%]"), choice.regressions, choice.selections, models, strict=True)
+    for target, regression, selection, model in told:
+        if regression is not None and model is not None:
+            yield model_table(target, regression, model.residual_std, model.dof)
+            if selection.steps:
+                yield steps_table(target, selection)

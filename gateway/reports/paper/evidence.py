@@ -6,21 +6,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.fit import N_SEGMENT
-from gateway.calibration.ratio_index.regression import fit_regression
+from gateway.calibration.ratio_index import N_SEGMENT, fit_regression, index_rows
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
+from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
 from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import calibrate, split_runs
-from gateway.records import F64
 from gateway.workbench.simulate import bench_of, write_campaign
 
 OnStep = Callable[[str, int, int], None]  # (what is being done, steps done, steps in all)
@@ -153,24 +149,12 @@ def with_paper_bands(calibrated: CalibratedVehicle, driven: Driven) -> Calibrate
         acceleration_bands=PAPER_BANDS["acceleration"],
         pitch_rate_bands=PAPER_BANDS["pitch_rate"],
     )
-    run, payload_kg, share_pct, ra, rg = index_table(driven.identification, bands)
+    rows = index_rows(driven.identification, bands)
     return replace(
         calibrated,
         ratio_index=replace(
             bands,
-            payload=fit_regression(MODEL_11_PAYLOAD, ra, rg, payload_kg, run.astype(np.int64)).model,
-            front_share=fit_regression(MODEL_11_FRONT_SHARE, ra, rg, share_pct, run.astype(np.int64)).model,
+            payload=fit_regression(MODEL_11_PAYLOAD, rows.ra, rows.rg, rows.payload_kg, rows.run).model,
+            front_share=fit_regression(MODEL_11_FRONT_SHARE, rows.ra, rows.rg, rows.front_share_pct, rows.run).model,
         ),
     )
-
-
-def index_table(runs: Sequence[KnownRun], calibration: RatioIndexCalibration) -> tuple[F64, F64, F64, F64, F64]:
-    """Run number, payload, front share, R_a and R_g (n,) of every batch that has both indexes."""
-    rows = [
-        (run.number, run.payload_kg, run.front_share_pct, *indexes_of(batch, calibration))
-        for run in runs
-        for batch in run.batches
-        if not batch.rejected
-    ]
-    table = np.array([row for row in rows if all(np.isfinite(row))], dtype=float).reshape(-1, 5)
-    return table[:, 0], table[:, 1], table[:, 2], table[:, 3], table[:, 4]

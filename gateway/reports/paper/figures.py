@@ -8,13 +8,12 @@ from matplotlib.figure import Figure
 
 from gateway.calibration.judgement.evaluation import Judged
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.fit import N_SEGMENT
-from gateway.calibration.ratio_index.regression import fit_regression
+from gateway.calibration.ratio_index import N_SEGMENT, IndexRows, fit_regression, index_rows
 from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64
 from gateway.reports.charts.figures import COLOURS, panels
-from gateway.reports.paper.evidence import Evidence, Method, index_table
+from gateway.reports.paper.evidence import Evidence, Method
 from gateway.units import NS_PER_S
 
 ACCELERATION = "acceleration"
@@ -88,21 +87,18 @@ def figure_2(evidence: Evidence) -> Figure:
 def figure_3_4(evidence: Evidence) -> Figure:
     """R_a against the load alone with (9), R_g against the share alone with (10)."""
     figure, (left, right) = panels(1, 2)
-    run, payload_kg, _, ra, rg = index_table(evidence.driven["load-sweep"].runs, evidence.ratio_index)
-    _index_and_fit(left, (ra, rg), payload_kg, run, MODEL_9_PAYLOAD, "R_a")
+    rows = index_rows(evidence.driven["load-sweep"].runs, evidence.ratio_index)
+    _index_and_fit(left, rows, rows.ra, rows.payload_kg, MODEL_9_PAYLOAD)
     _label(left, "R_a", LOAD)
-    run, _, share_pct, ra, rg = index_table(evidence.driven["share-sweep"].runs, evidence.ratio_index)
-    _index_and_fit(right, (ra, rg), share_pct, run, MODEL_10_FRONT_SHARE, "R_g")
+    rows = index_rows(evidence.driven["share-sweep"].runs, evidence.ratio_index)
+    _index_and_fit(right, rows, rows.rg, rows.front_share_pct, MODEL_10_FRONT_SHARE)
     _label(right, "R_g", SHARE)
     return figure
 
 
-def _index_and_fit(
-    axes: Axes, indexes: tuple[F64, F64], target: F64, run: F64, terms: tuple[str, ...], name: str
-) -> None:
-    index = indexes[0] if name == "R_a" else indexes[1]
+def _index_and_fit(axes: Axes, rows: IndexRows, index: F64, target: F64, terms: tuple[str, ...]) -> None:
     axes.plot(index, target, "o", color=COLOURS[0], label="batches")
-    model = fit_regression(terms, *indexes, target, run.astype(np.int64)).model
+    model = fit_regression(terms, rows.ra, rows.rg, target, rows.run).model
     along = np.linspace(np.min(index), np.max(index), 60)
     fitted = [model.predict(x, x)[0] for x in along]
     axes.plot(along, fitted, color=COLOURS[1], label=f"{' + '.join(terms)}, residual {model.residual_std:.2g}")
@@ -111,13 +107,13 @@ def _index_and_fit(
 def figure_5_6(evidence: Evidence) -> Figure:
     """The conditions explored, and the two indexes over them."""
     figure, (left, middle, right) = panels(1, 3)
-    _, payload_kg, share_pct, ra, rg = index_table(evidence.driven["ident"].runs, evidence.ratio_index)
-    left.plot(payload_kg, share_pct, "o", color=COLOURS[0])
+    rows = index_rows(evidence.driven["ident"].runs, evidence.ratio_index)
+    left.plot(rows.payload_kg, rows.front_share_pct, "o", color=COLOURS[0])
     _label(left, LOAD, SHARE)
-    by_share = middle.scatter(payload_kg, ra, c=share_pct, s=14, cmap="viridis")
+    by_share = middle.scatter(rows.payload_kg, rows.ra, c=rows.front_share_pct, s=14, cmap="viridis")
     _label(middle, LOAD, "R_a")
     figure.colorbar(by_share, ax=middle, label=SHARE)
-    by_load = right.scatter(share_pct, rg, c=payload_kg, s=14, cmap="plasma")
+    by_load = right.scatter(rows.front_share_pct, rows.rg, c=rows.payload_kg, s=14, cmap="plasma")
     _label(right, SHARE, "R_g")
     figure.colorbar(by_load, ax=right, label=LOAD)
     return figure
@@ -174,10 +170,12 @@ def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
     """Mean error of payload [kg] and share [points] over a run's batches, the ratio index's own gates lifted."""
     if method.estimator == "ratio_index" and method.calibrated.ratio_index is not None:
         calibration = method.calibrated.ratio_index
-        _, payload_kg, share_pct, ra, rg = index_table([run], calibration)
+        rows = index_rows([run], calibration)
         models = (calibration.payload, calibration.front_share)
-        estimated = [[m.predict(a, g)[0] if m else np.nan for m in models] for a, g in zip(ra, rg, strict=True)]
-        errors = np.array(estimated).reshape(-1, 2) - np.column_stack([payload_kg, share_pct])
+        estimated = [
+            [m.predict(a, g)[0] if m else np.nan for m in models] for a, g in zip(rows.ra, rows.rg, strict=True)
+        ]
+        errors = np.array(estimated).reshape(-1, 2) - np.column_stack([rows.payload_kg, rows.front_share_pct])
     else:
         errors = np.array(
             [
