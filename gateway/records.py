@@ -1,14 +1,13 @@
-"""All that crosses rooms: frames, motion, batches, estimates and the reasons why not.
+"""All that crosses rooms: frames, motion, batches and the reasons why not; gateway.estimate has the answer.
 
 Plain immutable values. Arrays are numpy, SI throughout, unknown is NaN. Time is the frame's own,
 integer nanoseconds since 1970-01-01 UTC.
 """
 
-import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import Any, Final
@@ -183,54 +182,6 @@ class Batch:
         return float(np.mean(speed)) if speed.size else math.nan
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """What a batch taught: payload and front share, or why nothing. Unknown is NaN (null in JSON).
-
-    payload_kg and its standard deviation; front_share_pct is the share of the sprung mass on the
-    front axle, standard deviation in percentage points; intervals are 95 %.
-    """
-
-    t_start_ns: int
-    t_end_ns: int
-    estimator: str
-    calibration_id: str | None = None
-    payload_kg: float = math.nan
-    payload_std_kg: float = math.nan
-    payload_interval95_kg: tuple[float, float] = (math.nan, math.nan)
-    front_share_pct: float = math.nan
-    front_share_std_pct: float = math.nan
-    front_share_interval95_pct: tuple[float, float] = (math.nan, math.nan)
-    ratio_index_acceleration: float = math.nan
-    ratio_index_pitch_rate: float = math.nan
-    mean_speed_mps: float = math.nan
-    gap_share: float = math.nan
-    usable_share: float = math.nan
-    roughness_mps2: float = math.nan  # of the road (core.spectrum)
-    shares: Mapping[str, float] = field(default_factory=dict)
-    rejected: tuple[Why, ...] = ()
-    is_provisional: bool = False
-    spectra: Spectra | None = None
-    diagnostics: Mapping[str, float] = field(default_factory=dict)
-    epoch: Mapping[str, float] = field(default_factory=dict)
-    tare: Mapping[str, float | str] = field(default_factory=dict)  # the zero taken off, and what was raw (core.tare)
-    vehicle_id: str | None = None
-    vin: str | None = None
-
-    @property
-    def counted(self) -> bool:
-        """True where the batch gave an answer."""
-        return not self.rejected
-
-    @property
-    def id(self) -> str:
-        """The same batch, vehicle, estimator, calibration and tare have the same id, whenever it is computed."""
-        parts: tuple[object, ...] = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator)
-        parts += (self.calibration_id, *((self.tare["tare_id"],) if self.tare else ()))
-        digest = hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()
-        return f"{self.t_end_ns}-{digest[:12]}"
-
-
 def iso_utc(t_ns: int) -> str:
     """2026-11-21T04:00:00.000000Z: microseconds, always UTC."""
     whole_us = t_ns // 1000
@@ -238,74 +189,6 @@ def iso_utc(t_ns: int) -> str:
     return f"{stamp:%Y-%m-%dT%H:%M:%S}.{whole_us % 1_000_000:06d}Z"
 
 
-def _number(x: float, digits: int) -> float | None:
-    return float(f"{x:.{digits}g}") if math.isfinite(x) else None
-
-
-def _numbers(x: F64, digits: int) -> list[float | None]:
-    return [_number(float(v), digits) for v in x]
-
-
-def estimate_to_json(estimate: Estimate) -> dict[str, Any]:
-    """The one JSON object of an estimate: command line, store and HTTP all show this."""
-    e = estimate
-    record: dict[str, Any] = {
-        "id": e.id,
-        "vehicle_id": e.vehicle_id,
-        "t_start": iso_utc(e.t_start_ns),
-        "t_end": iso_utc(e.t_end_ns),
-        "t_end_ns": e.t_end_ns,
-        "estimator": e.estimator,
-        "calibration_id": e.calibration_id,
-        "payload_kg": _number(e.payload_kg, 9),
-        "payload_std_kg": _number(e.payload_std_kg, 9),
-        "payload_interval95_kg": _interval(e.payload_interval95_kg),
-        "front_share_pct": _number(e.front_share_pct, 9),
-        "front_share_std_pct": _number(e.front_share_std_pct, 9),
-        "front_share_interval95_pct": _interval(e.front_share_interval95_pct),
-        "ratio_index_acceleration": _number(e.ratio_index_acceleration, 9),
-        "ratio_index_pitch_rate": _number(e.ratio_index_pitch_rate, 9),
-        "mean_speed_mps": _number(e.mean_speed_mps, 9),
-        "gap_share": _number(e.gap_share, 9),
-        "usable_share": _number(e.usable_share, 9),
-        "roughness_mps2": _number(e.roughness_mps2, 6),
-        "shares": {str(why): _number(share, 6) for why, share in e.shares.items()},
-        "rejected": [str(why) for why in e.rejected],
-        "diagnostics": {name: _number(x, 6) for name, x in e.diagnostics.items()},
-    }
-    record.update({f"epoch_{name}": _number(x, 9) for name, x in e.epoch.items()})
-    record.update({name: x if isinstance(x, str) else _number(x, 9) for name, x in e.tare.items()})
-    if e.vin is not None:
-        record["vin"] = e.vin
-    if e.is_provisional:
-        record["provisional"] = True
-    if e.spectra is not None:
-        record["spectra"] = spectra_to_json(e.spectra)
-    return record
-
-
-def spectra_to_json(spectra: Spectra) -> dict[str, list[float | None]]:
-    """The JSON object of spectra: names with units, unknown is None."""
-    return {
-        "freq_hz": _numbers(spectra.freq_hz, 6),
-        "vertical_acceleration_mps2_rthz": _numbers(spectra.vertical_acceleration, 5),
-        "pitch_rate_radps_rthz": _numbers(spectra.pitch_rate, 5),
-        "coherence": _numbers(spectra.coherence, 5),
-        "phase_rad": _numbers(spectra.phase_rad, 5),
-    }
-
-
-def spectra_from_json(told: Mapping[str, Sequence[float | None]]) -> Spectra:
-    """The inverse of :func:`spectra_to_json`, as exact as that rounds."""
-    names = spectra_to_json(Spectra(*[np.empty(0)] * 5))
-    return Spectra(*(np.array([math.nan if x is None else x for x in told[name]]) for name in names))
-
-
 def json_line(record: Mapping[str, Any]) -> str:
     """The record as compact JSON on one line: the text that is printed, stored and sent."""
     return json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-
-
-def _interval(bounds: tuple[float, float]) -> list[float] | None:
-    low, high = (_number(b, 9) for b in bounds)
-    return None if low is None or high is None else [low, high]

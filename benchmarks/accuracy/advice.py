@@ -19,7 +19,7 @@ from gateway.calibration.plan.design import Design, Spread
 from gateway.calibration.plan.loads import PlacedLoad, weighed_loads
 from gateway.calibration.plan.plan import usual_drive
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 

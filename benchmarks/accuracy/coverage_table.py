@@ -96,7 +96,7 @@ def coverage_table(batches: Sequence[JudgedBatch], seed: int, refused: Sequence[
 
 def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str) -> JudgedBatch:
     found = one.estimate
-    payload_kg, share_pct = found.payload_kg, found.front_share_pct
+    payload_kg, share_pct = found.payload.number, found.front_share.number
     rejected = tuple(str(why) for why in found.rejected)
     if not rejected and not (np.isfinite(payload_kg) and np.isfinite(share_pct)):
         rejected = (HALF_AN_ANSWER,)
@@ -108,8 +108,8 @@ def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str) -> JudgedB
         rejected=rejected,
         payload_error_pct=_percent(payload_kg, one.payload_kg, vehicle.payload_range_kg, bool(rejected)),
         front_share_error_pct=_percent(share_pct, one.front_share_pct, vehicle.front_share_range_pct, bool(rejected)),
-        is_payload_covered=_holds(found.payload_interval95_kg, one.payload_kg),
-        is_front_share_covered=_holds(found.front_share_interval95_pct, one.front_share_pct),
+        is_payload_covered=_holds(found.payload.interval95, one.payload_kg),
+        is_front_share_covered=_holds(found.front_share.interval95, one.front_share_pct),
     )
 
 

@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.half_car import frequency_response
 from gateway.core.cross_spectrum.ideal_drive import RATE_HZ, Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import EFFECTIVE_SHARE, Point, Whittle

@@ -33,7 +33,9 @@ from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.signal_map import load_signal_map
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
-from gateway.records import Estimate, Spectra, estimate_to_json
+from gateway.estimate import Estimate, Quantity
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Spectra
 from gateway.service.pipeline import Pipeline
 from gateway.status import BusStatus, State, Status
 from gateway.store import Store
@@ -56,8 +58,8 @@ def estimate(n: int) -> Estimate:
         t_start_ns=start_ns,
         t_end_ns=start_ns + 300 * NS_PER_S,
         estimator="ratio_index",
-        payload_kg=271.3,
-        front_share_pct=50.4,
+        payload=Quantity(271.3),
+        front_share=Quantity(50.4),
         spectra=spectra,
     )
 

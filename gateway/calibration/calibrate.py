@@ -24,7 +24,7 @@ from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index import BandChoice, RatioIndexFit, StructureChoice, fit_ratio_index
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch

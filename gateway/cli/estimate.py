@@ -10,8 +10,9 @@ from gateway.cli.text.estimate import sentence
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
+from gateway.estimate_json import estimate_to_json
 from gateway.offline.estimates import estimates_of_logs
-from gateway.records import estimate_to_json, json_line
+from gateway.records import json_line
 from gateway.setup import Setup, load_setup, setup_of
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
 

@@ -1,19 +1,17 @@
-"""The one interface of every estimator, (Batch, CalibratedVehicle) -> Estimate, and the list of them."""
+"""The one interface of every estimator, the list of them, and the gates they have in common."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Protocol
 
-import numpy as np
-
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum.estimator import CrossSpectrum
+from gateway.core.cross_spectrum.estimator import by_cross_spectrum
+from gateway.core.ratio_index.estimator import by_ratio_index
 from gateway.core.ratio_index.index import indexes_of
 from gateway.core.spectrum import roughness_mps2, spectra_of
-from gateway.records import Batch, Estimate, Why
-
-SPEED_MARGIN = 0.15  # how far a batch's mean speed may lie outside those calibrated, as a share
+from gateway.estimate import UNKNOWN, Estimate
+from gateway.records import Batch, Why
 
 
 class Estimator(Protocol):
@@ -46,77 +44,28 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
     if batch.rejected:
         return blank
     found = ESTIMATORS[estimator](batch, calibrated, blank)
-    if found.counted and calibrated.is_out_of_range(found.payload_interval95_kg, found.front_share_interval95_pct):
-        return _without_numbers(found, Why.OUT_OF_RANGE)
+    if found.counted and calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
+        return replace(found, payload=UNKNOWN, front_share=UNKNOWN, rejected=(Why.OUT_OF_RANGE,))
     return found
 
 
-def _without_numbers(found: Estimate, why: Why) -> Estimate:
-    nothing = (np.nan, np.nan)
-    return replace(
-        found,
-        payload_kg=np.nan,
-        payload_std_kg=np.nan,
-        payload_interval95_kg=nothing,
-        front_share_pct=np.nan,
-        front_share_std_pct=np.nan,
-        front_share_interval95_pct=nothing,
-        rejected=(why,),
-    )
-
-
-def by_ratio_index(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:
-    """The paper's estimator: R_a and R_g by (7), (8), then the static regression (9), (10) or (11).
-
-    Its gates are narrow, because the index moves with speed: the speed's spread within the batch and
-    its distance from the calibrated speeds are bounded.
-    """
-    calibration = calibrated.ratio_index
-    if calibration is None:
-        return replace(blank, rejected=(Why.NO_CALIBRATION,))
-    if float(np.std(batch.speed_mps[batch.usable])) > calibration.speed_std_max_mps:
-        return replace(blank, rejected=(Why.SPEED_SPREAD,))
-    slowest, fastest = calibration.speed_range_mps
-    if not slowest * (1.0 - SPEED_MARGIN) <= batch.mean_speed_mps <= fastest * (1.0 + SPEED_MARGIN):
-        return replace(blank, rejected=(Why.SPEED_UNCALIBRATED,))
-    ra, rg = indexes_of(batch, calibration)
-    found = replace(blank, ratio_index_acceleration=ra, ratio_index_pitch_rate=rg)
-    wanted = [ra] * (calibration.acceleration_bands is not None) + [rg] * (calibration.pitch_rate_bands is not None)
-    if not all(np.isfinite(wanted)):
-        return replace(found, rejected=(Why.NOT_ENOUGH_EXCITATION,))
-    if calibration.payload is not None:
-        centre, std, interval = calibration.payload.predict(ra, rg)
-        found = replace(found, payload_kg=centre, payload_std_kg=std, payload_interval95_kg=interval)
-    if calibration.front_share is not None:
-        centre, std, interval = calibration.front_share.predict(ra, rg)
-        found = replace(found, front_share_pct=centre, front_share_std_pct=std, front_share_interval95_pct=interval)
-    return found
-
-
-def by_cross_spectrum(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:
-    """The half-car held against both sensors' cross-spectra; see core.cross_spectrum.
-
-    The ratio indexes are shown beside it where the file holds their bands.
-    """
+def _by_cross_spectrum(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:
+    """The half-car held against both sensors' cross-spectra; the ratio indexes are shown beside it if calibrated."""
     if calibrated.cross_spectrum is None:
         return replace(blank, rejected=(Why.NO_CALIBRATION,))
-    found = CrossSpectrum().estimate(batch, calibrated.cross_spectrum)
-    ra, rg = indexes_of(batch, calibrated.ratio_index) if calibrated.ratio_index else (np.nan, np.nan)
-    return replace(
-        blank,
-        payload_kg=found.payload_kg,
-        payload_std_kg=found.payload_std_kg,
-        payload_interval95_kg=found.payload_interval95_kg,
-        front_share_pct=found.front_share_pct,
-        front_share_std_pct=found.front_share_std_pct,
-        front_share_interval95_pct=found.front_share_interval95_pct,
-        ratio_index_acceleration=ra,
-        ratio_index_pitch_rate=rg,
-        rejected=found.rejected,
-        diagnostics=found.diagnostics,
-    )
+    if calibrated.ratio_index is not None:
+        ra, rg = indexes_of(batch, calibrated.ratio_index)
+        blank = replace(blank, ratio_index_acceleration=ra, ratio_index_pitch_rate=rg)
+    return by_cross_spectrum(batch, calibrated.cross_spectrum, blank)
+
+
+def _by_ratio_index(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:
+    """The paper's estimator, kept for comparison."""
+    if calibrated.ratio_index is None:
+        return replace(blank, rejected=(Why.NO_CALIBRATION,))
+    return by_ratio_index(batch, calibrated.ratio_index, blank)
 
 
 ESTIMATORS: Mapping[str, Estimator] = MappingProxyType(
-    {"cross_spectrum": by_cross_spectrum, "ratio_index": by_ratio_index}  # the better first
+    {"cross_spectrum": _by_cross_spectrum, "ratio_index": _by_ratio_index}  # the better first
 )

@@ -1,16 +1,17 @@
 """Rows in, estimates out: the one path that the live service and the offline tools share."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from gateway.core.batch import Traits
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
-from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, fields_of, fused
+from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, fused, summary
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.core.tare import Tare, Weighed, remembered, tared
-from gateway.records import Batch, Estimate, Motion
+from gateway.estimate import Epoch, Estimate
+from gateway.records import Batch, Motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +75,10 @@ class Flow:
         self._is_epoch_over = self._epoch is None
         return shown
 
-    def _fused(self, batch: Batch, found: Estimate) -> Mapping[str, float]:
-        """Fields of the load epoch that this batch belongs to; a new drive or a long stop opens a new one."""
+    def _fused(self, batch: Batch, found: Estimate) -> Epoch | None:
+        """The load epoch that this batch belongs to; a new drive or a long stop opens a new one."""
         is_new_drive = batch.drive_start_ns != self._drive_start_ns
         self._drive_start_ns = batch.drive_start_ns
         could_have_changed = is_new_drive or batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
         self._epoch = fused(self._epoch, found, could_have_changed)
-        return fields_of(self._epoch) if self._epoch and found.counted else {}
+        return summary(self._epoch) if found.counted else None

@@ -1,7 +1,7 @@
 """Load epochs: what consecutive batches tell together while nobody can have changed the load.
 
     epoch = fused(epoch, estimate, could_have_changed)      # epoch is None at first
-    replace(estimate, epoch=fields_of(epoch))
+    replace(estimate, epoch=summary(epoch))
 
 Part of a batch's error is its own, part is shared by all batches of one vehicle and load (the model's
 error, and what the vehicle has changed since its calibration), and only the first averages out. What is
@@ -9,11 +9,10 @@ shared hides no change of load. A batch that does not fit opens a new epoch by i
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.records import Estimate
+from gateway.estimate import Epoch, Estimate, Quantity
 
 SHARED_VARIANCE: Final = 0.5  # of a batch's variance without drift: what the batches of an epoch have in common
 PAYLOAD_DRIFT_STD_KG: Final = "payload_drift_std_kg"
@@ -45,6 +44,11 @@ class Fused:
     def var(self) -> float:
         """Shared parts whole, own part divided by n."""
         return self.drift_var + self.n / self.precision * (SHARED_VARIANCE + (1.0 - SHARED_VARIANCE) / self.n)
+
+    @property
+    def quantity(self) -> Quantity:
+        """The mean and its standard deviation."""
+        return Quantity(self.mean, math.sqrt(self.var))
 
     def distance2(self, found: Found) -> float:
         """Squared distance of another estimate in standard deviations of the difference; shared errors cancel."""
@@ -79,8 +83,8 @@ def fused(epoch: LoadEpoch | None, estimate: Estimate, could_have_changed: bool 
     kept = None if could_have_changed else epoch
     if not _teaches(estimate):
         return kept
-    payload = _found(estimate, estimate.payload_kg, estimate.payload_std_kg, PAYLOAD_DRIFT_STD_KG)
-    share = _found(estimate, estimate.front_share_pct, estimate.front_share_std_pct, FRONT_SHARE_DRIFT_STD_PCT)
+    payload = _found(estimate, estimate.payload, PAYLOAD_DRIFT_STD_KG)
+    share = _found(estimate, estimate.front_share, FRONT_SHARE_DRIFT_STD_PCT)
     begun = LoadEpoch(estimate.t_start_ns, _begun(payload), _begun(share))
     if kept is None:
         return begun
@@ -91,31 +95,25 @@ def fused(epoch: LoadEpoch | None, estimate: Estimate, could_have_changed: bool 
     )
 
 
-def _found(estimate: Estimate, number: float, std: float, drift_name: str) -> Found:
+def _found(estimate: Estimate, quantity: Quantity, drift_name: str) -> Found:
     drift_var = estimate.diagnostics.get(drift_name, 0.0) ** 2
-    return Found(number, std**2 - drift_var, drift_var)
+    return Found(quantity.number, quantity.std**2 - drift_var, drift_var)
 
 
 def _begun(found: Found) -> Fused:
     return Fused(found.number, 1.0 / found.var, found.drift_var, 1)
 
 
-def fields_of(epoch: LoadEpoch | None) -> Mapping[str, float]:
-    """What ``Estimate.epoch`` holds; empty without an epoch."""
+def summary(epoch: LoadEpoch | None) -> Epoch | None:
+    """What ``Estimate.epoch`` holds; nothing without an epoch."""
     if epoch is None:
-        return {}
-    return {
-        "payload_kg": epoch.payload_kg.mean,
-        "payload_std_kg": math.sqrt(epoch.payload_kg.var),
-        "front_share_pct": epoch.front_share_pct.mean,
-        "front_share_std_pct": math.sqrt(epoch.front_share_pct.var),
-        "n_batches": float(epoch.payload_kg.n),
-    }
+        return None
+    return Epoch(epoch.payload_kg.quantity, epoch.front_share_pct.quantity, epoch.payload_kg.n)
 
 
 def _teaches(estimate: Estimate) -> bool:
-    stds = (estimate.payload_std_kg, estimate.front_share_std_pct)
-    numbers = (estimate.payload_kg, estimate.front_share_pct, *stds)
+    stds = (estimate.payload.std, estimate.front_share.std)
+    numbers = (estimate.payload.number, estimate.front_share.number, *stds)
     return (
         estimate.counted
         and not estimate.is_provisional

@@ -8,7 +8,6 @@ offset is the same at every load. Estimators and their gates see the raw numbers
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -16,13 +15,12 @@ from typing import Final
 from gateway.core.fusion import LoadEpoch
 from gateway.core.vehicle import Vehicle
 from gateway.errors import TareRefusedError
-from gateway.records import Estimate
+from gateway.estimate import Z95, Correction, Epoch, Estimate, Quantity
 
 MOST_PAYLOAD_SHARE: Final = 0.05  # of the empty sprung mass: a larger offset is a load, or asks for a calibration
 MOST_FRONT_SHARE_PCT: Final = 3.0  # percentage points
 MOST_STD_SHARE: Final = 0.5  # of these two bounds: a zero less sure than that corrects nothing
 BATCH_IDS: Final = 20  # the newest that a weighing names; it may rest on more
-Z95: Final = 1.959964
 
 
 class Refusal(StrEnum):
@@ -134,45 +132,21 @@ def tared(estimate: Estimate, tare: Tare | None) -> Estimate:
     """
     if tare is None or not estimate.counted or not tare.is_for(estimate):
         return estimate
-    zero, e = tare.zero, estimate
+    payload = Quantity(tare.zero.payload_kg, tare.zero.payload_std_kg)
+    front_share = Quantity(tare.zero.front_share_pct, tare.zero.front_share_std_pct)
+    e, epoch = estimate, estimate.epoch
     return replace(
         e,
-        payload_kg=e.payload_kg - zero.payload_kg,
-        payload_std_kg=math.hypot(e.payload_std_kg, zero.payload_std_kg),
-        payload_interval95_kg=_moved(e.payload_interval95_kg, e.payload_kg, zero.payload_kg, zero.payload_std_kg),
-        front_share_pct=e.front_share_pct - zero.front_share_pct,
-        front_share_std_pct=math.hypot(e.front_share_std_pct, zero.front_share_std_pct),
-        front_share_interval95_pct=_moved(
-            e.front_share_interval95_pct, e.front_share_pct, zero.front_share_pct, zero.front_share_std_pct
-        ),
-        epoch=_moved_epoch(e.epoch, zero),
-        tare={
-            "tare_id": tare.id,
-            "tare_payload_kg": zero.payload_kg,
-            "tare_payload_std_kg": zero.payload_std_kg,
-            "tare_front_share_pct": zero.front_share_pct,
-            "tare_front_share_std_pct": zero.front_share_std_pct,
-            "raw_payload_kg": e.payload_kg,
-            "raw_payload_std_kg": e.payload_std_kg,
-            "raw_front_share_pct": e.front_share_pct,
-            "raw_front_share_std_pct": e.front_share_std_pct,
-        },
+        payload=_less(e.payload, payload),
+        front_share=_less(e.front_share, front_share),
+        epoch=epoch and Epoch(_less(epoch.payload, payload), _less(epoch.front_share, front_share), epoch.n_batches),
+        tare=Correction(tare.id, payload, front_share, raw_payload=e.payload, raw_front_share=e.front_share),
     )
 
 
-def _moved(interval: tuple[float, float], centre: float, offset: float, std: float) -> tuple[float, float]:
-    """The interval of centre - offset; NaN stays NaN."""
-    below, above = centre - interval[0], interval[1] - centre
-    return centre - offset - math.hypot(below, Z95 * std), centre - offset + math.hypot(above, Z95 * std)
-
-
-def _moved_epoch(epoch: Mapping[str, float], zero: Zero) -> Mapping[str, float]:
-    if not epoch:
-        return epoch
-    return {
-        **epoch,
-        "payload_kg": epoch["payload_kg"] - zero.payload_kg,
-        "payload_std_kg": math.hypot(epoch["payload_std_kg"], zero.payload_std_kg),
-        "front_share_pct": epoch["front_share_pct"] - zero.front_share_pct,
-        "front_share_std_pct": math.hypot(epoch["front_share_std_pct"], zero.front_share_std_pct),
-    }
+def _less(raw: Quantity, zero: Quantity) -> Quantity:
+    """``raw`` less ``zero``; NaN stays NaN."""
+    below, above = raw.number - raw.interval95[0], raw.interval95[1] - raw.number
+    number = raw.number - zero.number
+    interval95 = (number - math.hypot(below, Z95 * zero.std), number + math.hypot(above, Z95 * zero.std))
+    return Quantity(number, math.hypot(raw.std, zero.std), interval95)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.core.vehicle import Vehicle
+from gateway.estimate import Z95
 
-Z95: Final = 1.959964
 RELEASE_SHARE: Final = 0.03  # of the limit: how far a load must fall below it before a warning ends
 
 

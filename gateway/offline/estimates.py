@@ -5,7 +5,7 @@ from pathlib import Path
 
 from gateway.bus.logs.open import motion_of_log
 from gateway.core.settings import BatchSettings
-from gateway.records import Estimate
+from gateway.estimate import Estimate
 from gateway.setup import Setup
 
 

@@ -5,8 +5,9 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from gateway.estimate import Estimate
 from gateway.log import Event, log_event
-from gateway.records import Estimate, Why
+from gateway.records import Why
 from gateway.status import State, Status
 from gateway.web import Board, LatestWeights
 

@@ -14,8 +14,10 @@ from gateway.bus.live.inbox import Inbox
 from gateway.bus.signals.decode import Decoder
 from gateway.core.flow import Flow
 from gateway.core.tare import Weighed
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
-from gateway.records import Estimate, Motion, Signal, estimate_to_json
+from gateway.records import Motion, Signal
 from gateway.store import Store
 from gateway.units import NS_PER_S
 from gateway.web import Board, boot_clock_s

@@ -1,11 +1,11 @@
 """The shapes of the answers, for the API's description; the bytes themselves come ready from board and store."""
 
+from types import GenericAlias
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
-_ID: Final = "1795233300000000000-0f3a9c2b11de"
-_INTERVAL: Final = "95 % interval [low, high]"
+from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, SPECTRA, EstimateField, Presence
 
 
 class Spectra(BaseModel):
@@ -20,65 +20,50 @@ class Spectra(BaseModel):
     )
 
 
-class Estimate(BaseModel):
-    """One batch: what it weighed, or why it could not. Unknown is null, never 0."""
-
-    model_config = ConfigDict(extra="allow")
-
-    id: str | None = Field(description="the same for the same batch, whenever it is computed", examples=[_ID])
-    vehicle_id: str | None = Field(examples=["van-17"])
-    vin: str | None = None
-    t_start: str | None = Field(json_schema_extra={"format": "date-time"}, examples=["2026-11-21T03:50:00.000000Z"])
-    t_end: str | None = Field(json_schema_extra={"format": "date-time"}, examples=["2026-11-21T03:55:00.000000Z"])
-    t_end_ns: int | None = Field(description="ns since 1970 UTC", examples=[1795233300000000000])
-    estimator: str | None = Field(examples=["ratio_index"])
-    calibration_id: str | None = Field(examples=["sha256:9f86d081"])
-    payload_kg: float | None = Field(examples=[271.3])
-    payload_std_kg: float | None = Field(examples=[6.1])
-    payload_interval95_kg: list[float] | None = Field(description=_INTERVAL, examples=[[259.3, 283.3]])
-    front_share_pct: float | None = Field(description="share of the sprung mass on the front axle", examples=[50.4])
-    front_share_std_pct: float | None = Field(description="percentage points", examples=[0.1])
-    front_share_interval95_pct: list[float] | None = Field(description=_INTERVAL, examples=[[50.2, 50.6]])
-    ratio_index_acceleration: float | None = Field(examples=[0.97])
-    ratio_index_pitch_rate: float | None = Field(examples=[1.21])
-    mean_speed_mps: float | None = Field(examples=[13.9])
-    gap_share: float | None = Field(description="share of the batch without samples", examples=[0.001])
-    usable_share: float | None = Field(description="share of the batch that every gate let through", examples=[0.93])
-    roughness_mps2: float | None = Field(
-        None, description="of the road: rms vertical acceleration, 1 to 15 Hz, brought to 80 km/h", examples=[1.1]
-    )
-    shares: dict[str, float | None] = Field(description="part of the batch that each cause masked", examples=[{}])
-    rejected: list[str] = Field(description="why there is no answer; empty: this batch counted", examples=[[]])
-    diagnostics: dict[str, float | None] = Field(default_factory=dict, examples=[{}])
-    tare_id: str | None = Field(None, description="the zero taken off this answer; absent: the factory zero")
-    tare_payload_kg: float | None = Field(None, description="taken off the raw payload", examples=[12.4])
-    tare_payload_std_kg: float | None = None
-    tare_front_share_pct: float | None = Field(None, description="percentage points taken off the raw front share")
-    tare_front_share_std_pct: float | None = None
-    raw_payload_kg: float | None = Field(None, description="as the calibration alone has it", examples=[283.7])
-    raw_payload_std_kg: float | None = None
-    raw_front_share_pct: float | None = None
-    raw_front_share_std_pct: float | None = None
-    provisional: bool | None = Field(None, description="true: an early look at a batch that is still growing")
-    spectra: Spectra | None = None
+def _described(one: EstimateField) -> Any:
+    """One row of the table of fields as a field of a pydantic model."""
+    described: dict[str, Any] = {"description": one.description}
+    if one.example is not None:
+        described["examples"] = [one.example]
+    if one.kind is INSTANT:
+        described["json_schema_extra"] = {"format": "date-time"}
+    if one.presence is not Presence.ALWAYS:
+        described |= {"default_factory": dict} if one.kind is BY_NAME else {"default": None}
+    return Spectra | None if one.kind is SPECTRA else one.kind.shape, Field(**described)
 
 
-class Latest(Estimate):
-    """The last good estimate, as old as ``age_s`` says; before any, nulls and ``no_estimate_yet``."""
+Estimate: Final = create_model(
+    "Estimate",
+    __config__=ConfigDict(extra="allow"),
+    __doc__="One batch: what it weighed, or why it could not. Unknown is null, never 0.",
+    **{one.name: _described(one) for one in FIELDS},
+)
 
-    age_s: float | None = Field(description="since its receipt, on a clock that never steps", examples=[42.0])
-    is_stale: bool = Field(description="older than the service's stale_after_s", examples=[False])
-    last_rejection: Estimate | None = Field(description="the last batch without an answer (spectra left out)")
+Latest: Final = create_model(
+    "Latest",
+    __base__=Estimate,
+    __doc__="The last good estimate, as old as ``age_s`` says; before any, nulls and ``no_estimate_yet``.",
+    age_s=(float | None, Field(description="since its receipt, on a clock that never steps", examples=[42.0])),
+    is_stale=(bool, Field(description="older than the service's stale_after_s", examples=[False])),
+    last_rejection=(Estimate | None, Field(description="the last batch without an answer (spectra left out)")),
+)
 
 
-class EstimatesPage(BaseModel):
-    """A piece of the history, rejections included."""
+_ESTIMATES: Final[Any] = GenericAlias(list, Estimate)  # list[Estimate], where Estimate is no name of a class
 
-    items: list[Estimate]
-    next_cursor: str | None = Field(description="send as cursor for more; null: no more now", examples=["3f2a9c1e-7"])
-    last_cursor: str | None = Field(
-        description="place of the newest item: cursor to wait here for what comes", examples=["3f2a9c1e-7"]
-    )
+EstimatesPage: Final = create_model(
+    "EstimatesPage",
+    __doc__="A piece of the history, rejections included.",
+    items=(_ESTIMATES, Field()),
+    next_cursor=(
+        str | None,
+        Field(description="send as cursor for more; null: no more now", examples=["3f2a9c1e-7"]),
+    ),
+    last_cursor=(
+        str | None,
+        Field(description="place of the newest item: cursor to wait here for what comes", examples=["3f2a9c1e-7"]),
+    ),
+)
 
 
 class Alive(BaseModel):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from support.web import Client, Gateway
 
-from gateway.web.routes.export import COLUMNS
+from gateway.estimate_json import COLUMNS
 from gateway.web.schemas import Estimate
 
 API = (Path(__file__).parents[2] / "docs" / "api.md").read_text()

@@ -15,7 +15,9 @@ from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.spectrum import spectra_of
-from gateway.records import Estimate, Spectra, Why, estimate_to_json, spectra_from_json
+from gateway.estimate import Correction, Estimate, Quantity
+from gateway.estimate_json import estimate_to_json, spectra_from_json
+from gateway.records import Spectra, Why
 from gateway.web import Board, create_app
 
 SPEED_MPS = 14.0
@@ -40,8 +42,8 @@ def weighed(calibrated: CalibratedVehicle, seen: Spectra) -> Estimate:
         t_end_ns=300 * 10**9,
         estimator="cross_spectrum",
         calibration_id=calibrated.id,
-        payload_kg=270.0,
-        front_share_pct=47.0,
+        payload=Quantity(270.0),
+        front_share=Quantity(47.0),
         mean_speed_mps=SPEED_MPS,
         spectra=seen,
         diagnostics={"damper_front_ratio": 1.02, "delay_s": 0.2, "delay_std_s": 0.004, "payload_mode_hz": 15.0},
@@ -86,7 +88,9 @@ def test_the_next_batch_has_a_model_of_its_own(client: Client, board: Board, wei
     first = told(client)
     assert told(client) == first
     board.publish(
-        estimate_to_json(replace(weighed, t_start_ns=weighed.t_end_ns, t_end_ns=2 * weighed.t_end_ns, payload_kg=100.0))
+        estimate_to_json(
+            replace(weighed, t_start_ns=weighed.t_end_ns, t_end_ns=2 * weighed.t_end_ns, payload=Quantity(100.0))
+        )
     )
     second = told(client)
     assert second["spectra"] == first["spectra"]
@@ -96,15 +100,15 @@ def test_the_next_batch_has_a_model_of_its_own(client: Client, board: Board, wei
 def test_the_model_carries_what_a_tare_took_off(client: Client, board: Board, weighed: Estimate) -> None:
     board.publish(estimate_to_json(weighed))
     untared = told(client)["model"]
-    raw = {"tare_id": "t1", "raw_payload_kg": 270.0, "raw_front_share_pct": 47.0}
-    board.publish(estimate_to_json(replace(weighed, payload_kg=255.0, front_share_pct=47.3, tare=raw)))
+    raw = Correction("t1", Quantity(15.0), Quantity(-0.3), raw_payload=Quantity(270.0), raw_front_share=Quantity(47.0))
+    board.publish(estimate_to_json(replace(weighed, payload=Quantity(255.0), front_share=Quantity(47.3), tare=raw)))
     answer = told(client)
     assert answer["payload_kg"] == 255.0
     assert answer["model"] == untared
 
 
 NO_MODEL = {
-    "rejected": {"payload_kg": float("nan"), "front_share_pct": float("nan"), "rejected": (Why.MODEL_MISFIT,)},
+    "rejected": {"payload": Quantity(), "front_share": Quantity(), "rejected": (Why.MODEL_MISFIT,)},
     "the other estimator": {"estimator": "ratio_index"},
     "an earlier calibration": {"calibration_id": "sha256:before"},
     "no spectra": {"spectra": None},

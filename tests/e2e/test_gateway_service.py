@@ -22,8 +22,9 @@ from gateway.bus.logs.candump_write import write_candump
 from gateway.bus.sink import replay
 from gateway.config import load_settings
 from gateway.errors import StoreError
+from gateway.estimate_json import estimate_to_json
 from gateway.offline.estimates import estimates_of_logs
-from gateway.records import Motion, estimate_to_json, json_line
+from gateway.records import Motion, json_line
 from gateway.service.gateway import Gateway, GatewayFailedError
 from gateway.setup import setup_of
 from gateway.store import Latest, Store

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.half_car_road import CAR, VAN, batch_over_road
+from support.half_car_road import CAR, VAN, batch_over_road, weighed
 
 from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.half_car.prior import prior_of
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.estimator import CrossSpectrum, CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.friction import LEAST_LEFT, LEVELS, MOST, at_levels, level_weights
 from gateway.core.cross_spectrum.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.measured import log_amplitude_of
@@ -123,10 +123,10 @@ def test_a_load_reads_the_same_on_smooth_and_on_rough_roads(
     shaken_mps2: float, calibration: CrossSpectrumCalibration
 ) -> None:
     batch = drive(300.0, 48.0, 77, shaken_mps2, with_friction(shaken_mps2))
-    found = CrossSpectrum().estimate(batch, calibration)
-    assert found.payload_kg == pytest.approx(300.0, abs=9.0)
-    assert found.front_share_pct == pytest.approx(48.0, abs=0.2)
+    found = weighed(batch, calibration)
+    assert found.payload.number == pytest.approx(300.0, abs=9.0)
+    assert found.front_share.number == pytest.approx(48.0, abs=0.2)
     blind = calibration.parameters.copy()
     blind[[i for i, name in enumerate(PARAMETERS) if "_friction_" in name]] = 0.0
-    without = CrossSpectrum().estimate(batch, replace(calibration, parameters=blind))
-    assert abs(without.payload_kg - 300.0) > 2.0 * abs(found.payload_kg - 300.0)
+    without = weighed(batch, replace(calibration, parameters=blind))
+    assert abs(without.payload.number - 300.0) > 2.0 * abs(found.payload.number - 300.0)

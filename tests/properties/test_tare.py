@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from gateway.core.fusion import LoadEpoch, fields_of, fused
+from gateway.core.fusion import LoadEpoch, fused, summary
 from gateway.core.tare import (
     MOST_FRONT_SHARE_PCT,
     MOST_PAYLOAD_SHARE,
@@ -23,7 +23,9 @@ from gateway.core.tare import (
 )
 from gateway.core.vehicle import Vehicle
 from gateway.errors import TareRefusedError
-from gateway.records import Estimate, Why, estimate_to_json
+from gateway.estimate import Estimate, Quantity
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Why
 
 VAN = Vehicle("van", empty_mass_kg=1240.0, wheelbase_m=2.8, empty_front_share_pct=52.0)
 MOST_KG = MOST_PAYLOAD_SHARE * VAN.empty_mass_kg
@@ -46,12 +48,8 @@ def batch(
         t_end_ns=n + 1,
         estimator="cross_spectrum",
         calibration_id="sha256:ab",
-        payload_kg=payload_kg,
-        payload_std_kg=std_kg,
-        payload_interval95_kg=(payload_kg - 1.9 * std_kg, payload_kg + 2.3 * std_kg),
-        front_share_pct=share_pct,
-        front_share_std_pct=share_std_pct,
-        front_share_interval95_pct=(share_pct - 1.0, share_pct + 1.0),
+        payload=Quantity(payload_kg, std_kg, (payload_kg - 1.9 * std_kg, payload_kg + 2.3 * std_kg)),
+        front_share=Quantity(share_pct, share_std_pct, (share_pct - 1.0, share_pct + 1.0)),
     )
 
 
@@ -71,10 +69,10 @@ batches = st.builds(
 @given(batches, zeros)
 def test_the_raw_numbers_ride_along_unchanged(found: Estimate, zero: Zero) -> None:
     shown = tared(found, tare_of(zero))
-    for name in ("payload_kg", "payload_std_kg", "front_share_pct", "front_share_std_pct"):
-        assert shown.tare[f"raw_{name}"] == getattr(found, name)
-        assert shown.tare[f"tare_{name}"] == getattr(zero, name)
-    assert shown.payload_kg + zero.payload_kg == pytest.approx(found.payload_kg, abs=1e-9)
+    assert (shown.tare.raw_payload, shown.tare.raw_front_share) == (found.payload, found.front_share)
+    assert shown.tare.payload == Quantity(zero.payload_kg, zero.payload_std_kg)
+    assert shown.tare.front_share == Quantity(zero.front_share_pct, zero.front_share_std_pct)
+    assert shown.payload.number + zero.payload_kg == pytest.approx(found.payload.number, abs=1e-9)
     record = estimate_to_json(shown)
     assert record["raw_payload_kg"] == pytest.approx(record["payload_kg"] + record["tare_payload_kg"], abs=1e-5)
     assert record["tare_id"] == "sha256:cd"
@@ -83,20 +81,20 @@ def test_the_raw_numbers_ride_along_unchanged(found: Estimate, zero: Zero) -> No
 @given(batches, zeros)
 def test_standard_deviations_add_in_quadrature(found: Estimate, zero: Zero) -> None:
     shown = tared(found, tare_of(zero))
-    assert shown.payload_std_kg**2 == pytest.approx(found.payload_std_kg**2 + zero.payload_std_kg**2)
-    assert shown.front_share_std_pct**2 == pytest.approx(found.front_share_std_pct**2 + zero.front_share_std_pct**2)
+    assert shown.payload.std**2 == pytest.approx(found.payload.std**2 + zero.payload_std_kg**2)
+    assert shown.front_share.std**2 == pytest.approx(found.front_share.std**2 + zero.front_share_std_pct**2)
 
 
 @given(batches, zeros)
 def test_intervals_move_with_the_number_and_never_narrow(found: Estimate, zero: Zero) -> None:
     shown = tared(found, tare_of(zero))
     for low_high, before, centre, was in (
-        (shown.payload_interval95_kg, found.payload_interval95_kg, shown.payload_kg, found.payload_kg),
+        (shown.payload.interval95, found.payload.interval95, shown.payload.number, found.payload.number),
         (
-            shown.front_share_interval95_pct,
-            found.front_share_interval95_pct,
-            shown.front_share_pct,
-            found.front_share_pct,
+            shown.front_share.interval95,
+            found.front_share.interval95,
+            shown.front_share.number,
+            found.front_share.number,
         ),
     ):
         assert centre - low_high[0] >= was - before[0] - 1e-9
@@ -106,10 +104,10 @@ def test_intervals_move_with_the_number_and_never_narrow(found: Estimate, zero: 
 @given(batches)
 def test_a_zero_known_to_be_nothing_moves_nothing(found: Estimate) -> None:
     shown = tared(found, tare_of(Zero(0.0, 0.0, 0.0, 0.0)))
-    assert replace(shown, tare={}, payload_interval95_kg=found.payload_interval95_kg) == replace(
-        found, front_share_interval95_pct=shown.front_share_interval95_pct
-    )
-    assert shown.payload_interval95_kg == pytest.approx(found.payload_interval95_kg)
+    assert replace(shown, tare=None, payload=found.payload, front_share=found.front_share) == found
+    for after, before in ((shown.payload, found.payload), (shown.front_share, found.front_share)):
+        assert (after.number, after.std) == (before.number, before.std)
+        assert after.interval95 == pytest.approx(before.interval95)
 
 
 @given(batches, zeros)
@@ -127,27 +125,25 @@ def test_another_tare_is_another_estimate_and_none_is_the_same_as_ever(found: Es
     shown = tared(found, tare_of(zero))
     assert shown.id != found.id
     assert tared(found, replace(tare_of(zero), id="sha256:other")).id != shown.id
-    assert replace(shown, tare={}).id == found.id
+    assert replace(shown, tare=None).id == found.id
 
 
 def test_unknown_stays_unknown() -> None:
-    half = replace(
-        batch(100.0, math.nan), front_share_std_pct=math.nan, front_share_interval95_pct=(math.nan, math.nan)
-    )
+    half = replace(batch(100.0, math.nan), front_share=Quantity(math.nan))
     shown = tared(half, tare_of(Zero(10.0, 1.0, 1.0, 0.1)))
-    assert shown.payload_kg == 90.0
+    assert shown.payload.number == 90.0
     record = estimate_to_json(shown)
     assert record["front_share_pct"] is record["front_share_std_pct"] is record["front_share_interval95_pct"] is None
 
 
 @given(batches, zeros)
 def test_the_epoch_is_corrected_as_its_batches_are(found: Estimate, zero: Zero) -> None:
-    fields = fields_of(fused(None, found))
+    fields = summary(fused(None, found))
     shown = tared(replace(found, epoch=fields), tare_of(zero))
-    assert shown.epoch["payload_kg"] == pytest.approx(shown.payload_kg, abs=1e-9)
-    assert shown.epoch["payload_std_kg"] == pytest.approx(shown.payload_std_kg)
-    assert shown.epoch["front_share_pct"] == pytest.approx(shown.front_share_pct)
-    assert shown.epoch["n_batches"] == 1.0
+    assert shown.epoch.payload.number == pytest.approx(shown.payload.number, abs=1e-9)
+    assert shown.epoch.payload.std == pytest.approx(shown.payload.std)
+    assert shown.epoch.front_share.number == pytest.approx(shown.front_share.number)
+    assert shown.epoch.n_batches == 1
 
 
 def weighed_from(*found: Estimate) -> Weighed:
@@ -175,10 +171,10 @@ def test_a_tare_on_an_epoch_of_an_empty_vehicle_moves_its_mean_to_zero(
     except TareRefusedError:
         assume(False)
         raise
-    corrected = tared(replace(found[-1], epoch=fields_of(weighed.epoch)), tare_of(zero))
-    assert corrected.epoch["payload_kg"] == pytest.approx(0.0, abs=1e-9)
-    assert corrected.epoch["front_share_pct"] == pytest.approx(VAN.empty_front_share_pct)
-    assert zero.payload_std_kg == pytest.approx(fields_of(weighed.epoch)["payload_std_kg"])
+    corrected = tared(replace(found[-1], epoch=summary(weighed.epoch)), tare_of(zero))
+    assert corrected.epoch.payload.number == pytest.approx(0.0, abs=1e-9)
+    assert corrected.epoch.front_share.number == pytest.approx(VAN.empty_front_share_pct)
+    assert zero.payload_std_kg == pytest.approx(summary(weighed.epoch).payload.std)
 
 
 def test_it_removes_a_bias_of_the_sensor_from_what_is_weighed_later() -> None:
@@ -188,7 +184,7 @@ def test_it_removes_a_bias_of_the_sensor_from_what_is_weighed_later() -> None:
     empty = [batch(bias_kg + float(e), 52.0, n=i) for i, e in enumerate(6.0 * rng.normal(size=12))]
     zero = zero_of(weighed_from(*empty), VAN)
     loaded = [tared(batch(load_kg + bias_kg + float(e), 50.0), tare_of(zero)) for e in 6.0 * rng.normal(size=2000)]
-    mean_kg = float(np.mean([one.payload_kg for one in loaded]))
+    mean_kg = float(np.mean([one.payload.number for one in loaded]))
     assert mean_kg == pytest.approx(load_kg, abs=2.0 * zero.payload_std_kg)
     assert abs(mean_kg - load_kg) < 0.2 * bias_kg
 

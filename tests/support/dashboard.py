@@ -9,7 +9,9 @@ from typing import Any
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.spectrum import spectra_of
-from gateway.records import Estimate, Why, estimate_to_json
+from gateway.estimate import Epoch, Estimate, Quantity
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Why
 from gateway.status import BusStatus, SignalHealth, State, Status, StoreStatus, UplinkStatus
 from gateway.web import KnownLoad
 from support.estimates import WINDOW_NS, make_estimate
@@ -49,12 +51,9 @@ def weighed(n: int, payload_kg: float, front_share_pct: float, calibrated: Calib
         make_estimate(n),
         estimator="cross_spectrum",
         calibration_id=calibrated.id,
-        payload_kg=payload_kg,
-        payload_interval95_kg=(payload_kg - 12.0, payload_kg + 12.0),
-        front_share_pct=front_share_pct,
-        front_share_std_pct=0.2,
-        front_share_interval95_pct=(front_share_pct - 0.4, front_share_pct + 0.4),
-        epoch={"payload_kg": payload_kg, "payload_std_kg": 4.0, "n_batches": 2.0},
+        payload=Quantity(payload_kg, interval95=(payload_kg - 12.0, payload_kg + 12.0)),
+        front_share=Quantity(front_share_pct, 0.2, (front_share_pct - 0.4, front_share_pct + 0.4)),
+        epoch=Epoch(Quantity(payload_kg, 4.0), Quantity(), 2),
     )
 
 

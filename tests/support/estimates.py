@@ -4,7 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from gateway.records import Estimate, Spectra, Why, estimate_to_json, json_line
+from gateway.estimate import Estimate, Quantity
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Spectra, Why, json_line
 from gateway.units import NS_PER_S
 
 WINDOW_NS = 300 * NS_PER_S
@@ -19,10 +21,8 @@ def make_estimate(n: int, *rejected: Why, with_spectra: bool = False, is_provisi
         t_end_ns=(n + 1) * WINDOW_NS,
         estimator="ratio_index",
         calibration_id="sha256:ab",
-        payload_kg=payload_kg,
-        payload_std_kg=6.0 if has_answer else float("nan"),
-        payload_interval95_kg=(payload_kg - 12.0, payload_kg + 12.0),
-        front_share_pct=50.5 if has_answer else float("nan"),
+        payload=Quantity(payload_kg, 6.0, (payload_kg - 12.0, payload_kg + 12.0)) if has_answer else Quantity(),
+        front_share=Quantity(50.5) if has_answer else Quantity(),
         mean_speed_mps=14.0,
         gap_share=0.0,
         rejected=rejected,

@@ -2,8 +2,12 @@
 
 import numpy as np
 
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.half_car import Axle, HalfCar, frequency_response
+from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle
+from gateway.estimate import Estimate
 from gateway.records import F64, Batch
 
 RATE_HZ = 50.0
@@ -80,3 +84,9 @@ def batch_of(acceleration_mps2: F64, pitch_rate_radps: F64, speed_mps: F64) -> B
 
 def _in_time(spectrum: F64, n: int) -> F64:
     return np.fft.irfft(np.r_[0.0, spectrum], n)
+
+
+def weighed(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
+    """What the cross spectrum tells of the batch, with no limit to the loads."""
+    calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 0.0), (0.0, 0.0), cross_spectrum=calibration)
+    return estimate(batch, calibrated, "cross_spectrum")

@@ -5,7 +5,7 @@ from typing import Any
 
 from gateway.core.fusion import fused
 from gateway.core.tare import Weighed
-from gateway.records import Estimate
+from gateway.estimate import Estimate, Quantity
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.units import NS_PER_S
 from support.calibrated import calibration_file
@@ -34,10 +34,8 @@ class FakePipeline:
             t_start_ns=0,
             t_end_ns=300 * NS_PER_S,
             estimator="ratio_index",
-            payload_kg=payload_kg,
-            payload_std_kg=std_kg,
-            front_share_pct=share_pct,
-            front_share_std_pct=0.4,
+            payload=Quantity(payload_kg, std_kg),
+            front_share=Quantity(share_pct, 0.4),
         )
         epoch = fused(None, found)
         assert epoch is not None

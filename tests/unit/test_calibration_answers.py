@@ -8,7 +8,8 @@ from scipy.special import ndtri, stdtrit
 
 from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
 from gateway.calibration.judgement.evaluation import Judged
-from gateway.records import Estimate, Why
+from gateway.estimate import Estimate, Quantity
+from gateway.records import Why
 
 DOF = st.one_of(st.none(), st.floats(2.0, 50.0))
 
@@ -44,7 +45,7 @@ def test_a_wider_level_never_covers_less(errors: list[float]) -> None:
 
 
 def test_batches_without_an_answer_are_left_out_and_the_rest_keeps_its_place() -> None:
-    good = Estimate(0, 1, "x", payload_kg=110.0, payload_interval95_kg=(90.0, 130.0), mean_speed_mps=13.0)
+    good = Estimate(0, 1, "x", payload=Quantity(110.0, interval95=(90.0, 130.0)), mean_speed_mps=13.0)
     bad = Estimate(0, 1, "x", rejected=(Why.GAP,))
     found = answers_of([Judged(1, "a", 100.0, 50.0, bad), Judged(2, "b", 100.0, 50.0, good)], "payload")
     assert found.run.tolist() == [2]

@@ -11,7 +11,7 @@ from support.calibrated import calibration_file
 
 from gateway.calibration.file.calibration_file import content_id, load_calibration
 from gateway.calibration.file.parts import CrossSpectrumPart
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.errors import CalibrationFileError
 
 Change = Callable[[dict[str, Any]], Any]
@@ -59,7 +59,9 @@ def test_round_trip(tmp_path: Path) -> None:
 
 
 def test_the_file_keeps_all_that_the_estimator_goes_by() -> None:
-    assert set(CrossSpectrumPart.model_fields) == {field.name for field in fields(CrossSpectrumCalibration)}
+    assert set(CrossSpectrumPart.model_fields) - {"version"} == {
+        field.name for field in fields(CrossSpectrumCalibration)
+    }
 
 
 def test_the_id_does_not_depend_on_how_the_file_is_laid_out(tmp_path: Path) -> None:

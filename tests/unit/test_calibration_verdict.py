@@ -15,7 +15,8 @@ from gateway.calibration.judgement.evaluation import Judged, error_table
 from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
 from gateway.calibration.plan.plan import Expected
 from gateway.core.vehicle import Vehicle
-from gateway.records import Estimate, Why
+from gateway.estimate import Estimate, Quantity
+from gateway.records import Why
 
 VAN = Vehicle("van", 1240.0, 2.8)  # ranges of 450 kg and of 20 points
 
@@ -23,9 +24,9 @@ VAN = Vehicle("van", 1240.0, 2.8)  # ranges of 450 kg and of 20 points
 def judged(run: int, error_kg: float = 0.0, half_kg: float = 20.0, error_pp: float = 0.0) -> Judged:
     payload_kg, share_pct = 200.0 + error_kg, 50.0 + error_pp
     estimate = Estimate(
-        0, 1, "cross_spectrum", payload_kg=payload_kg, front_share_pct=share_pct,
-        payload_interval95_kg=(payload_kg - half_kg, payload_kg + half_kg),
-        front_share_interval95_pct=(share_pct - 5.0, share_pct + 5.0),
+        0, 1, "cross_spectrum",
+        payload=Quantity(payload_kg, interval95=(payload_kg - half_kg, payload_kg + half_kg)),
+        front_share=Quantity(share_pct, interval95=(share_pct - 5.0, share_pct + 5.0)),
     )  # fmt: skip
     return Judged(run, f"{run}.log", 200.0, 50.0, estimate)
 
@@ -156,7 +157,7 @@ def test_larger_errors_never_make_it_fitter(errors_kg: list[float], factor: floa
 
 
 def test_a_missing_front_share_is_a_reservation_and_no_miss_of_its_interval() -> None:
-    nothing = {"front_share_pct": float("nan"), "front_share_interval95_pct": (float("nan"), float("nan"))}
+    nothing = {"front_share": Quantity()}
     rows = [replace(one, estimate=replace(one.estimate, **nothing)) for one in (judged(1), judged(2), judged(3))]
     found = verdict(rows)
     assert found.grade is Grade.RESERVED

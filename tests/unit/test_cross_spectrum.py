@@ -5,21 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.half_car_road import CAR, VAN, batch_of, batch_over_road
+from support.half_car_road import CAR, VAN, batch_of, batch_over_road, weighed
 
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import (
     UNSEEN_ROUGHNESS_SCALE,
     UNSEEN_SPEED_SCALE,
-    CrossSpectrum,
-    CrossSpectrumCalibration,
 )
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
 from gateway.errors import CalibrationImpossibleError
-from gateway.records import F64, Batch, Estimate, Why
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
+from gateway.records import F64, Batch, Why
 
 KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
 
@@ -32,10 +33,6 @@ def known_run(number: int, payload_kg: float, share_pct: float) -> KnownRun:
 @pytest.fixture(scope="module")
 def calibration() -> CrossSpectrumCalibration:
     return calibrate_cross_spectrum([known_run(i, *load) for i, load in enumerate(KNOWN)], VAN)
-
-
-def weigh(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
-    return CrossSpectrum().estimate(batch, calibration)
 
 
 def test_calibration_finds_the_vehicle(calibration: CrossSpectrumCalibration) -> None:
@@ -54,10 +51,10 @@ def test_calibration_finds_the_vehicle(calibration: CrossSpectrumCalibration) ->
 def test_it_weighs_at_any_speed_loads_it_never_saw(
     calibration: CrossSpectrumCalibration, payload_kg: float, share_pct: float, speed_mps: float
 ) -> None:
-    found = weigh(batch_over_road(payload_kg, share_pct, seed=99, speed_mps=speed_mps), calibration)
+    found = weighed(batch_over_road(payload_kg, share_pct, seed=99, speed_mps=speed_mps), calibration)
     assert found.counted
-    assert found.payload_kg == pytest.approx(payload_kg, abs=20.0)
-    assert found.front_share_pct == pytest.approx(share_pct, abs=0.5)
+    assert found.payload.number == pytest.approx(payload_kg, abs=20.0)
+    assert found.front_share.number == pytest.approx(share_pct, abs=0.5)
 
 
 @pytest.mark.parametrize(("payload_kg", "share_pct"), [(250.0, 55.0), (400.0, 44.0)])
@@ -67,54 +64,54 @@ def test_a_payload_on_pallets_is_weighed_and_its_mode_found(
 ) -> None:
     """Calibration saw it ring at 28 Hz; at 8 Hz one that rings at 13 Hz weighs half as much again."""
     on_pallets = replace(CAR, payload_mode_hz=mode_hz)
-    found = weigh(batch_over_road(payload_kg, share_pct, seed=31, car=on_pallets), calibration)
-    assert found.payload_kg == pytest.approx(payload_kg, abs=25.0)
-    assert found.front_share_pct == pytest.approx(share_pct, abs=0.6)
+    found = weighed(batch_over_road(payload_kg, share_pct, seed=31, car=on_pallets), calibration)
+    assert found.payload.number == pytest.approx(payload_kg, abs=25.0)
+    assert found.front_share.number == pytest.approx(share_pct, abs=0.6)
     assert found.diagnostics["payload_mode_hz"] == pytest.approx(mode_hz, rel=0.1)
 
 
 @pytest.mark.parametrize("firmer", [0.96, 1.04])
 def test_tyres_of_another_day_stay_within_the_interval(calibration: CrossSpectrumCalibration, firmer: float) -> None:
     today = replace(CAR, rear=replace(CAR.rear, tyre_npm=firmer * CAR.rear.tyre_npm))
-    found = weigh(batch_over_road(200.0, 50.0, seed=3, car=today), calibration)
-    assert found.payload_interval95_kg[0] <= 200.0 <= found.payload_interval95_kg[1]
-    assert found.front_share_interval95_pct[0] <= 50.0 <= found.front_share_interval95_pct[1]
+    found = weighed(batch_over_road(200.0, 50.0, seed=3, car=today), calibration)
+    assert found.payload.interval95[0] <= 200.0 <= found.payload.interval95[1]
+    assert found.front_share.interval95[0] <= 50.0 <= found.front_share.interval95[1]
 
 
 @pytest.mark.parametrize("waviness", [1.6, 2.4])
 def test_the_road_drops_out(calibration: CrossSpectrumCalibration, waviness: float) -> None:
-    found = weigh(batch_over_road(300.0, 48.0, seed=5, waviness=waviness), calibration)
-    assert found.payload_kg == pytest.approx(300.0, abs=20.0)
-    assert found.front_share_pct == pytest.approx(48.0, abs=0.5)
+    found = weighed(batch_over_road(300.0, 48.0, seed=5, waviness=waviness), calibration)
+    assert found.payload.number == pytest.approx(300.0, abs=20.0)
+    assert found.front_share.number == pytest.approx(48.0, abs=0.5)
 
 
 def test_intervals_hold_the_truth(calibration: CrossSpectrumCalibration) -> None:
     """Twenty batches of 95 % intervals: fewer than 16 hits have a chance of 1 in 400."""
-    found = [weigh(batch_over_road(200.0, 50.0, seed=seed), calibration) for seed in range(200, 220)]
-    assert sum(e.payload_interval95_kg[0] <= 200.0 <= e.payload_interval95_kg[1] for e in found) >= 16
-    assert sum(e.front_share_interval95_pct[0] <= 50.0 <= e.front_share_interval95_pct[1] for e in found) >= 16
+    found = [weighed(batch_over_road(200.0, 50.0, seed=seed), calibration) for seed in range(200, 220)]
+    assert sum(e.payload.interval95[0] <= 200.0 <= e.payload.interval95[1] for e in found) >= 16
+    assert sum(e.front_share.interval95[0] <= 50.0 <= e.front_share.interval95[1] for e in found) >= 16
 
 
 def test_more_driving_makes_it_surer(calibration: CrossSpectrumCalibration) -> None:
-    short = weigh(batch_over_road(200.0, 50.0, seed=3, duration_s=60.0), calibration)
-    long = weigh(batch_over_road(200.0, 50.0, seed=3, duration_s=300.0), calibration)
+    short = weighed(batch_over_road(200.0, 50.0, seed=3, duration_s=60.0), calibration)
+    long = weighed(batch_over_road(200.0, 50.0, seed=3, duration_s=300.0), calibration)
     assert short.counted
-    assert long.payload_std_kg < short.payload_std_kg
-    assert long.front_share_std_pct < short.front_share_std_pct
+    assert long.payload.std < short.payload.std
+    assert long.front_share.std < short.front_share.std
 
 
 def own_variances(found: Estimate) -> F64:
     """Of payload (kg) and front share (%), without what a change of the vehicle adds: that is the same anywhere."""
     drift = np.array([found.diagnostics[PAYLOAD_DRIFT_STD_KG], found.diagnostics[FRONT_SHARE_DRIFT_STD_PCT]])
-    return np.array([found.payload_std_kg, found.front_share_std_pct]) ** 2 - drift**2
+    return np.array([found.payload.std, found.front_share.std]) ** 2 - drift**2
 
 
 def test_an_unseen_speed_widens_the_interval(calibration: CrossSpectrumCalibration) -> None:
     """Twice the variance for a speed a factor of e^0.5 below the slowest of calibration."""
-    seen = weigh(batch_over_road(200.0, 50.0, seed=3), calibration)
+    seen = weighed(batch_over_road(200.0, 50.0, seed=3), calibration)
     slowest_mps = seen.mean_speed_mps * np.exp(UNSEEN_SPEED_SCALE)
-    unseen = weigh(batch_over_road(200.0, 50.0, seed=3), replace(calibration, speed_seen_mps=(slowest_mps, 99.0)))
-    assert unseen.payload_kg == seen.payload_kg
+    unseen = weighed(batch_over_road(200.0, 50.0, seed=3), replace(calibration, speed_seen_mps=(slowest_mps, 99.0)))
+    assert unseen.payload.number == seen.payload.number
     roughness = roughness_ratio(calibration)
     factor = (2.0 + roughness) / (1.0 + roughness)
     assert own_variances(unseen) == pytest.approx(factor * own_variances(seen), rel=1e-6)
@@ -123,10 +120,10 @@ def test_an_unseen_speed_widens_the_interval(calibration: CrossSpectrumCalibrati
 @pytest.mark.parametrize("rougher", [0.5, 2.0])
 def test_another_roughness_widens_the_interval(calibration: CrossSpectrumCalibration, rougher: float) -> None:
     """Friction is known on roads like those of calibration; far from them it is an extrapolation."""
-    seen = weigh(batch_over_road(200.0, 50.0, seed=3), calibration)
+    seen = weighed(batch_over_road(200.0, 50.0, seed=3), calibration)
     on_other_roads = replace(calibration, acceleration_rms_mps2=calibration.acceleration_rms_mps2 / rougher)
-    unseen = weigh(batch_over_road(200.0, 50.0, seed=3), on_other_roads)
-    assert unseen.payload_kg == seen.payload_kg
+    unseen = weighed(batch_over_road(200.0, 50.0, seed=3), on_other_roads)
+    assert unseen.payload.number == seen.payload.number
     factor = (1.0 + roughness_ratio(on_other_roads)) / (1.0 + roughness_ratio(calibration))
     assert factor > 1.5
     assert own_variances(unseen) == pytest.approx(factor * own_variances(seen), rel=1e-6)
@@ -143,18 +140,21 @@ def roughness_ratio(calibration: CrossSpectrumCalibration) -> float:
 def test_one_empty_run_is_enough_and_says_so() -> None:
     calibration = calibrate_cross_spectrum([known_run(1, 0.0, 52.0)], VAN)
     assert calibration.warnings == (SPRINGS_FROM_PRIORS, UNTESTED)
-    found = weigh(batch_over_road(0.0, 52.0, seed=77), calibration)
-    assert found.payload_kg == pytest.approx(0.0, abs=20.0)
+    found = weighed(batch_over_road(0.0, 52.0, seed=77), calibration)
+    assert found.payload.number == pytest.approx(0.0, abs=20.0)
 
 
 def test_a_zero_point_is_not_believed_at_other_speeds() -> None:
     calibration = calibrate_cross_spectrum([known_run(1, 0.0, 52.0)], VAN)
-    assert weigh(batch_over_road(0.0, 52.0, seed=77, speed_mps=20.0), calibration).rejected == (Why.SPEED_UNCALIBRATED,)
+    assert weighed(batch_over_road(0.0, 52.0, seed=77, speed_mps=20.0), calibration).rejected == (
+        Why.SPEED_UNCALIBRATED,
+    )
 
 
 def test_the_same_batch_gives_the_same_numbers(calibration: CrossSpectrumCalibration) -> None:
     batch = batch_over_road(120.0, 51.0, seed=8)
-    assert weigh(batch, calibration) == weigh(batch, calibration)
+    once, again = (estimate_to_json(weighed(batch, calibration)) for _ in range(2))
+    assert once == again
 
 
 def _silent(batch: Batch) -> Batch:
@@ -207,10 +207,10 @@ def _gyro_on_another_axis(batch: Batch) -> Batch:
 def test_it_refuses_with_the_reason(
     spoil: Callable[[Batch], Batch], why: Why, calibration: CrossSpectrumCalibration
 ) -> None:
-    found = weigh(spoil(batch_over_road(200.0, 50.0, seed=4)), calibration)
+    found = weighed(spoil(batch_over_road(200.0, 50.0, seed=4)), calibration)
     assert found.rejected == (why,)
-    assert np.isnan(found.payload_kg)
-    assert np.isnan(found.front_share_pct)
+    assert np.isnan(found.payload.number)
+    assert np.isnan(found.front_share.number)
 
 
 def test_calibration_without_driving_says_what_to_do() -> None:

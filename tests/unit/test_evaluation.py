@@ -16,7 +16,9 @@ from gateway.core.estimator import estimate
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
-from gateway.records import Batch, Estimate, Why, estimate_to_json
+from gateway.estimate import Estimate, Quantity
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Batch, Why
 
 VAN = Vehicle("van", 1240.0, 2.8, payload_range_kg=(0.0, 400.0), unsprung_front_kg=60.0, unsprung_rear_kg=100.0)
 BATCH = build_batch(drive(100.0), Window(T0_NS, T0_NS + 100_000_000_000, T0_NS), BatchSettings(window_s=100.0), {})
@@ -28,10 +30,8 @@ def judged(true_kg: float, found_kg: float | None, true_pct: float = 50.0, found
         return Judged(1, "a.log", true_kg, true_pct, replace(blank, rejected=(Why.TOO_SLOW,)))
     answer = replace(
         blank,
-        payload_kg=found_kg,
-        payload_interval95_kg=(found_kg - 10.0, found_kg + 10.0),
-        front_share_pct=found_pct,
-        front_share_interval95_pct=(found_pct - 1.0, found_pct + 1.0),
+        payload=Quantity(found_kg, interval95=(found_kg - 10.0, found_kg + 10.0)),
+        front_share=Quantity(found_pct, interval95=(found_pct - 1.0, found_pct + 1.0)),
     )
     return Judged(1, "a.log", true_kg, true_pct, answer)
 
@@ -101,9 +101,9 @@ def answer(payload_kg: float = 200.0, front_share_pct: float = 48.0, batch: Batc
 def test_a_sound_batch_is_answered_with_spread_and_origin() -> None:
     found = answer()
     assert found.rejected == ()
-    assert (found.payload_kg, found.payload_std_kg) == pytest.approx((200.0, 10.0))
-    assert found.payload_interval95_kg == pytest.approx((200.0 - 22.6216, 200.0 + 22.6216), abs=1e-3)  # t(9) = 2.26216
-    assert found.front_share_pct == pytest.approx(48.0)
+    assert (found.payload.number, found.payload.std) == pytest.approx((200.0, 10.0))
+    assert found.payload.interval95 == pytest.approx((200.0 - 22.6216, 200.0 + 22.6216), abs=1e-3)  # t(9) = 2.26216
+    assert found.front_share.number == pytest.approx(48.0)
     assert found.ratio_index_acceleration > 0.0
     assert found.calibration_id == calibration_file().id
 
@@ -128,7 +128,7 @@ def test_out_of_range_is_an_interval_wholly_beyond_what_was_seen(
 ) -> None:
     found = answer(payload_kg, front_share_pct)
     assert found.rejected == ((Why.OUT_OF_RANGE,) if is_outside else ())
-    assert np.isnan(found.payload_kg) == is_outside
+    assert np.isnan(found.payload.number) == is_outside
     assert (estimate_to_json(found)["front_share_interval95_pct"] is None) == is_outside
 
 

@@ -12,7 +12,9 @@ from support.drives import drive, joined, later
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.tare import Tare, Zero
-from gateway.records import F64, Estimate, Motion, estimate_to_json
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
+from gateway.records import F64, Motion
 
 SETTINGS = BatchSettings(window_s=20.0, provisional_every_s=10.0)
 LONG = BatchSettings(window_s=100.0, provisional_every_s=60.0)  # an early look long enough to count
@@ -37,8 +39,8 @@ def standing_between(begin_s: float, end_s: float) -> Callable[[F64], F64]:
 def test_what_is_weighed_is_raw_and_names_the_batches_as_they_were_sent() -> None:
     tared = flow(TARE)
     shown = [found for found in fed(tared, drive(45.0)) if not found.is_provisional]
-    assert [found.payload_kg for found in shown] == [2.0, 2.0]
-    assert shown[0].payload_std_kg == pytest.approx(109.0**0.5)
+    assert [found.payload.number for found in shown] == [2.0, 2.0]
+    assert shown[0].payload.std == pytest.approx(109.0**0.5)
     assert tared.weighed is not None
     assert tared.weighed.epoch.payload_kg.mean == 12.0
     assert tared.weighed.batch_ids == tuple(found.id for found in shown)
@@ -48,7 +50,7 @@ def test_what_is_weighed_is_raw_and_names_the_batches_as_they_were_sent() -> Non
 def test_early_looks_are_tared_too() -> None:
     early = [found for found in fed(flow(TARE, LONG), drive(105.0)) if found.is_provisional]
     assert early
-    assert {found.payload_kg for found in early} == {2.0}
+    assert {found.payload.number for found in early} == {2.0}
 
 
 def test_a_tare_set_between_two_batches_counts_from_the_next() -> None:
@@ -58,8 +60,8 @@ def test_a_tare_set_between_two_batches_counts_from_the_next() -> None:
     before = fed(one, motion.part(0, cut))
     one.tare = TARE
     after = fed(one, motion.part(cut, len(motion)))
-    assert {found.payload_kg for found in before if found.counted} == {12.0}
-    assert {found.payload_kg for found in after if found.counted} == {2.0}
+    assert {found.payload.number for found in before if found.counted} == {12.0}
+    assert {found.payload.number for found in after if found.counted} == {2.0}
 
 
 def test_undone_the_numbers_are_the_very_same() -> None:

@@ -25,7 +25,7 @@ def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
 
 def errors_kg(outcome: Outcome) -> np.ndarray:
     judged = judged_left_out(outcome, "ratio_index")
-    return np.array([one.estimate.payload_kg - one.payload_kg for one in judged if one.estimate.counted])
+    return np.array([one.estimate.payload.number - one.payload_kg for one in judged if one.estimate.counted])
 
 
 def test_errors_are_those_the_file_expects(outcome: Outcome) -> None:
@@ -37,8 +37,8 @@ def test_every_run_is_judged_once_a_batch_with_an_interval_about_its_answer(outc
     judged = [one for one in judged_left_out(outcome, "ratio_index") if one.estimate.counted]
     assert [one.run for one in judged] == [1, 2, 3, 4, 5, 6]
     for one in judged:
-        low, high = one.estimate.payload_interval95_kg
-        assert (low + high) / 2.0 == pytest.approx(one.estimate.payload_kg)
+        low, high = one.estimate.payload.interval95
+        assert (low + high) / 2.0 == pytest.approx(one.estimate.payload.number)
         assert high - low > 0.0
 
 

@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.records import Estimate, Motion, Signal, Why, estimate_to_json, iso_utc, json_line
+from gateway.estimate import Epoch, Estimate, Quantity
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Motion, Signal, Why, iso_utc, json_line
 
 FULL = Estimate(
     t_start_ns=1_790_000_000_000_000_000,
     t_end_ns=1_790_000_300_000_000_000,
     estimator="ratio_index",
     calibration_id="sha256:1",
-    payload_kg=271.3,
-    payload_std_kg=6.1,
-    payload_interval95_kg=(259.3, 283.3),
+    payload=Quantity(271.3, 6.1, (259.3, 283.3)),
     vehicle_id="van-17",
 )
 
@@ -41,19 +41,19 @@ def test_unknown_is_null_and_known_is_a_number() -> None:
     assert "vin" not in shown
     assert "provisional" not in shown
     assert estimate_to_json(replace(FULL, is_provisional=True))["provisional"] is True
-    assert estimate_to_json(replace(FULL, epoch={"payload_kg": 270.0}))["epoch_payload_kg"] == 270.0
+    assert estimate_to_json(replace(FULL, epoch=Epoch(Quantity(270.0), Quantity(), 1)))["epoch_payload_kg"] == 270.0
 
 
 @given(payload_kg=st.floats())
 def test_any_number_is_json(payload_kg: float) -> None:
-    line = json_line(estimate_to_json(replace(FULL, payload_kg=payload_kg)))
+    line = json_line(estimate_to_json(replace(FULL, payload=Quantity(payload_kg))))
     assert "\n" not in line
     again = json.loads(line)["payload_kg"]
     assert again == pytest.approx(payload_kg, rel=1e-8) if np.isfinite(payload_kg) else again is None
 
 
 def test_the_id_tells_what_was_estimated_not_what_came_out() -> None:
-    assert replace(FULL, payload_kg=0.0, rejected=(Why.TOO_SLOW,)).id == FULL.id
+    assert replace(FULL, payload=Quantity(0.0), rejected=(Why.TOO_SLOW,)).id == FULL.id
     changes = [
         {"vehicle_id": "van-18"},
         {"estimator": "x"},

@@ -12,7 +12,8 @@ from gateway.core.estimator import estimate
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.core.spectrum import REFERENCE_SPEED_MPS, roughness_mps2
-from gateway.records import Spectra, estimate_to_json
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Spectra
 
 
 def spectra(amplitude: float, step_hz: float = 0.2) -> Spectra:

@@ -8,8 +8,10 @@ from support.estimates import make_estimate
 from support.log import fields_of, logged, names
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
 from gateway.log import Event
-from gateway.records import Estimate, Why, estimate_to_json
+from gateway.records import Why
 from gateway.service.changes import BatchLog, StateLog
 from gateway.status import State, Status
 from gateway.web import Board, Scales, weigh_latest

@@ -1,11 +1,12 @@
 """The parts of the calibration file: what each table of the JSON holds, and the same in the core's terms."""
 
+from dataclasses import fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
 
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.parameters import PARAMETERS
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import TERMS, RegressionModel
@@ -134,7 +135,7 @@ class CrossSpectrumPart(Part):
     front_share_seen_pct: tuple[float, float]
     speed_seen_mps: tuple[float, float]
     warnings: tuple[str, ...] = ()
-    version: int = 1
+    version: int = 1  # of this part; there has been one
     known_loads: tuple[tuple[float, float], ...] = ()
     payload_inflation_per_reach: float = Field(0.0, ge=0.0)
     front_share_inflation_per_reach: float = Field(0.0, ge=0.0)
@@ -143,7 +144,7 @@ class CrossSpectrumPart(Part):
     @classmethod
     def of(cls, calibration: CrossSpectrumCalibration) -> "CrossSpectrumPart":
         """The core's calibration as the file holds it."""
-        return cls(**{name: getattr(calibration, name) for name in cls.model_fields})
+        return cls(**{one.name: getattr(calibration, one.name) for one in fields(calibration)})
 
     def for_core(self) -> CrossSpectrumCalibration:
         """The same in the core's terms. Raises CalibrationFileError where the model has other parameters today."""
@@ -152,7 +153,9 @@ class CrossSpectrumPart(Part):
                 "the cross_spectrum part was fitted with another vehicle model than this springscale has: "
                 "calibrate again"
             )
-        return CrossSpectrumCalibration(**dict(self))
+        return CrossSpectrumCalibration(
+            **{one.name: getattr(self, one.name) for one in fields(CrossSpectrumCalibration)}
+        )
 
 
 class VehiclePart(Part):

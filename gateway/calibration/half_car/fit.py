@@ -19,7 +19,8 @@ from gateway.calibration.half_car.inflation import inflation_of
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
 from gateway.calibration.half_car.prior import Prior, prior_of
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration, locate
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.estimator import locate
 from gateway.core.cross_spectrum.likelihood import Curvature
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.parameters import PARAMETERS

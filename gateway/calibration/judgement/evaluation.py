@@ -10,7 +10,9 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle
-from gateway.records import F64, Estimate, Why, estimate_to_json
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
+from gateway.records import F64, Why
 
 Target = Literal["payload", "front_share"]
 TARGETS: Final[tuple[Target, ...]] = get_args(Target)
@@ -44,8 +46,8 @@ class Judged:
         """One of the two quantities, truth and estimate."""
         told = self.estimate
         if target == "payload":
-            return Comparison(self.payload_kg, told.payload_kg, *told.payload_interval95_kg)
-        return Comparison(self.front_share_pct, told.front_share_pct, *told.front_share_interval95_pct)
+            return Comparison(self.payload_kg, told.payload.number, *told.payload.interval95)
+        return Comparison(self.front_share_pct, told.front_share.number, *told.front_share.interval95)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """The cross-spectral estimator: payload and front share from both sensors together, phase included.
 
-    CrossSpectrum().estimate(batch, calibration) -> Estimate
+    by_cross_spectrum(batch, calibration, blank) -> Estimate
 
 Both sensors ride on one vehicle over one road, so their ratio at each frequency and speed does not
 depend on the road. The half-car calibrated by known-load drives is held against the batch's
@@ -16,14 +16,16 @@ from typing import Final
 
 import numpy as np
 
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY, drift_covariance
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
-from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
-from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, Ground
+from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
+from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
-from gateway.records import F64, Batch, Estimate, Why
+from gateway.estimate import Estimate, Quantity
+from gateway.records import F64, Batch, Why
 
 START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
 LEAST_START_SHARE: Final = 0.33
@@ -37,52 +39,6 @@ MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
 UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
-Z95: Final = 1.959964
-
-
-@dataclass(frozen=True, slots=True)
-class CrossSpectrumCalibration:
-    """What known-load drives taught, as plain numbers and arrays.
-
-    parameters (p,) and covariance (p, p) follow ``names`` (parameters.PARAMETERS; logarithms where
-    these are positive quantities). The inflations widen standard deviations, by so much more per_reach
-    as a load lies beyond ``known_loads`` (payload kg, front share %; core.reach); misfit_limit is the
-    largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
-    root mean squares within the band. usual_log_amplitude: see core.cross_spectra.Reading.
-    """
-
-    empty_mass_kg: float
-    empty_front_share_pct: float
-    wheelbase_m: float
-    band_hz: tuple[float, float]
-    n_segment: int
-    names: tuple[str, ...]
-    parameters: F64
-    covariance: F64
-    payload_inflation: float
-    front_share_inflation: float
-    misfit_limit: float
-    acceleration_rms_mps2: float
-    pitch_rate_rms_radps: float
-    payload_seen_kg: tuple[float, float]
-    front_share_seen_pct: tuple[float, float]
-    speed_seen_mps: tuple[float, float]
-    warnings: tuple[str, ...] = ()
-    version: int = 1
-    known_loads: tuple[tuple[float, float], ...] = ()
-    payload_inflation_per_reach: float = 0.0
-    front_share_inflation_per_reach: float = 0.0
-    usual_log_amplitude: float | None = None
-
-    @property
-    def ground(self) -> Ground:
-        """The vehicle as stated, in the core's terms."""
-        return Ground(self.empty_mass_kg, self.empty_front_share_pct / 100.0, self.wheelbase_m)
-
-    @property
-    def reading(self) -> Reading:
-        """How spectra of this vehicle are taken."""
-        return Reading(self.wheelbase_m, self.band_hz, self.n_segment, self.usual_log_amplitude)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,21 +55,15 @@ class Located:
     is_reversed: bool
 
 
-class CrossSpectrum:
-    """The estimator behind the common interface."""
-
-    name = "cross_spectrum"
-
-    def estimate(self, batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
-        """Payload and front share of one batch with 95 % intervals, or the reasons why not."""
-        if batch.rejected:
-            return replace(_answer(batch), rejected=batch.rejected)
-        spectra = cross_spectra_of([batch], calibration.reading)
-        why = _unfit(batch, spectra, calibration) or _off_its_speeds(batch, calibration)
-        if spectra is None or why is not None:
-            return replace(_answer(batch), rejected=(why or Why.TOO_SHORT,))
-        located = locate(spectra, calibration)
-        return _judged(_answer(batch), spectra, located, calibration)
+def by_cross_spectrum(batch: Batch, calibration: CrossSpectrumCalibration, blank: Estimate) -> Estimate:
+    """``blank`` with payload, front share and diagnostics of the batch, or with the reason why not."""
+    spectra = cross_spectra_of([batch], calibration.reading)
+    why = _unfit(batch, spectra, calibration) or _off_its_speeds(batch, calibration)
+    if spectra is None or why is not None:
+        return replace(blank, rejected=(why or Why.TOO_SHORT,))
+    located = locate(spectra, calibration)
+    inflation = _unseen_inflation(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
+    return _judged(blank, spectra, located, inflation, calibration)
 
 
 def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Located:
@@ -222,12 +172,12 @@ def _off_its_speeds(batch: Batch, calibration: CrossSpectrumCalibration) -> Why 
 
 
 def _judged(
-    blank: Estimate, spectra: CrossSpectra, located: Located, calibration: CrossSpectrumCalibration
+    blank: Estimate, spectra: CrossSpectra, located: Located, unseen: float, calibration: CrossSpectrumCalibration
 ) -> Estimate:
+    """``unseen`` widens what is away from the calibration's speeds and roads."""
     payload_kg, share_pct = located.point.payload_kg, 100.0 * located.point.front_share
     payload_var, share_var = np.diag(located.load_covariance)
     payload_drift_var, share_drift_var = np.diag(located.drift_covariance)
-    unseen = _unseen_inflation(blank.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
     reach = beyond((payload_kg, share_pct), calibration.known_loads, calibration.empty_mass_kg)
     of_payload = calibration.payload_inflation * (1.0 + calibration.payload_inflation_per_reach * reach)
     of_share = calibration.front_share_inflation * (1.0 + calibration.front_share_inflation_per_reach * reach)
@@ -252,12 +202,8 @@ def _judged(
         return replace(blank, rejected=(why,), diagnostics=diagnostics)
     return replace(
         blank,
-        payload_kg=payload_kg,
-        payload_std_kg=payload_std_kg,
-        payload_interval95_kg=_interval(payload_kg, payload_std_kg),
-        front_share_pct=share_pct,
-        front_share_std_pct=share_std_pct,
-        front_share_interval95_pct=_interval(share_pct, share_std_pct),
+        payload=Quantity.normal(payload_kg, payload_std_kg),
+        front_share=Quantity.normal(share_pct, share_std_pct),
         diagnostics=diagnostics,
     )
 
@@ -285,21 +231,3 @@ def _unseen_inflation(speed_mps: float, shaken_mps2: float, calibration: CrossSp
 
 def _ratio(located: Located, calibration: CrossSpectrumCalibration, name: str) -> float:
     return math.exp(located.point.theta[INDEX[name]] - calibration.parameters[INDEX[name]])
-
-
-def _interval(centre: float, std: float) -> tuple[float, float]:
-    return centre - Z95 * std, centre + Z95 * std
-
-
-def _answer(batch: Batch) -> Estimate:
-    """An estimate of this batch that says nothing yet."""
-    return Estimate(
-        t_start_ns=batch.t_start_ns,
-        t_end_ns=batch.t_end_ns,
-        estimator=CrossSpectrum.name,
-        mean_speed_mps=batch.mean_speed_mps,
-        gap_share=batch.gap_share,
-        usable_share=batch.usable_share,
-        shares={str(why): share for why, share in batch.shares.items()},
-        is_provisional=batch.is_provisional,
-    )

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.spectrum import spectra_of

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.half_car.prior import prior_of
-from gateway.core.cross_spectrum.estimator import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, is_positive
 from gateway.core.vehicle import Vehicle
 from gateway.reports.charts.chart import Axis, Chart, Panel, Points, Rule, Table

@@ -179,7 +179,7 @@ def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
     else:
         errors = np.array(
             [
-                (one.estimate.payload_kg - one.payload_kg, one.estimate.front_share_pct - one.front_share_pct)
+                (one.estimate.payload.number - one.payload_kg, one.estimate.front_share.number - one.front_share_pct)
                 for one in method.judge([run])
                 if one.estimate.counted
             ]
@@ -218,12 +218,11 @@ def figure_drive(evidence: Evidence, kind: str, method: Method) -> Figure:
             axes.plot(edges, [truth] * 2, color="black", linewidth=2.5, label="truth" if n == 0 else None)
             for k, e in enumerate(counted):
                 when = [(t - start_ns) / NS_PER_S / 60.0 for t in (e.t_start_ns, e.t_end_ns)]
-                low, high = e.payload_interval95_kg if is_payload else e.front_share_interval95_pct
-                centre = e.payload_kg if is_payload else e.front_share_pct
+                found = e.payload if is_payload else e.front_share
                 shown = n == 0 and k == 0
-                axes.fill_between(when, low, high, color=COLOURS[0], alpha=0.25, linewidth=0.0,
+                axes.fill_between(when, *found.interval95, color=COLOURS[0], alpha=0.25, linewidth=0.0,
                                   label="estimate, 95 % interval" if shown else None)  # fmt: skip
-                axes.plot(when, [centre] * 2, color=COLOURS[0], linewidth=1.5)
+                axes.plot(when, [found.number] * 2, color=COLOURS[0], linewidth=1.5)
     _label(top, "", LOAD)
     _label(bottom, "time [min]", SHARE)
     return figure
@@ -253,8 +252,8 @@ def _estimated_over_true(series: Sequence[tuple[str, list[Judged], str]]) -> Fig
     for n, (label, judged, marker) in enumerate(series):
         counted = [one for one in judged if one.estimate.counted]
         pairs = (
-            (left, [(one.payload_kg, one.estimate.payload_kg) for one in counted]),
-            (right, [(one.front_share_pct, one.estimate.front_share_pct) for one in counted]),
+            (left, [(one.payload_kg, one.estimate.payload.number) for one in counted]),
+            (right, [(one.front_share_pct, one.estimate.front_share.number) for one in counted]),
         )
         for axes, points in pairs:
             axes.plot(*np.array(points).reshape(-1, 2).T, marker, color=COLOURS[n % len(COLOURS)],
@@ -271,9 +270,9 @@ def _with_intervals(
 ) -> None:
     estimates = [one.estimate for one in counted]
     middle_min = [((e.t_start_ns + e.t_end_ns) / 2.0 - start_ns) / NS_PER_S / 60.0 for e in estimates]
-    centre = np.array([e.payload_kg if is_payload else e.front_share_pct for e in estimates])
-    bounds = [e.payload_interval95_kg if is_payload else e.front_share_interval95_pct for e in estimates]
-    reach = np.abs(np.array(bounds).reshape(-1, 2) - centre[:, None]).T
+    found = [e.payload if is_payload else e.front_share for e in estimates]
+    centre = np.array([one.number for one in found])
+    reach = np.abs(np.array([one.interval95 for one in found]).reshape(-1, 2) - centre[:, None]).T
     axes.errorbar(middle_min, centre, yerr=reach, fmt="o", color=colour, label=label, markersize=3.5, linewidth=0.8)
 
 

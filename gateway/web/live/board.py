@@ -8,7 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from gateway.records import Estimate, Why, estimate_to_json, json_line
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Why, json_line
 from gateway.web.live.fanout import Fanout, StreamEvent
 
 Record = Mapping[str, Any]

@@ -12,38 +12,12 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
 from starlette.responses import Response, StreamingResponse
 
+from gateway.estimate_json import COLUMNS, csv_cells
 from gateway.history import Page
 from gateway.web.instant import Instant
 from gateway.web.reader import Reader
 from gateway.web.schemas import problem_responses
 
-COLUMNS: Final = [
-    "id",
-    "vehicle_id",
-    "t_start",
-    "t_end",
-    "t_end_ns",
-    "estimator",
-    "calibration_id",
-    "payload_kg",
-    "payload_std_kg",
-    "payload_low95_kg",
-    "payload_high95_kg",
-    "front_share_pct",
-    "front_share_std_pct",
-    "front_share_low95_pct",
-    "front_share_high95_pct",
-    "ratio_index_acceleration",
-    "ratio_index_pitch_rate",
-    "mean_speed_mps",
-    "gap_share",
-    "usable_share",
-    "rejected",
-    "tare_id",
-    "tare_payload_kg",
-    "tare_front_share_pct",
-]
-_INTERVALS: Final = {"payload_interval95_kg": "payload_{}95_kg", "front_share_interval95_pct": "front_share_{}95_pct"}
 _PAGE: Final = 500
 
 Encoder = Callable[[Sequence[str]], str]
@@ -89,25 +63,17 @@ def json_lines(items: Sequence[str]) -> str:
 def csv_lines() -> Encoder:
     """An encoder of its own for one file: the first call begins with the head line."""
     pending = io.StringIO()
-    writer = csv.DictWriter(pending, COLUMNS, extrasaction="ignore", restval="")
+    writer = csv.DictWriter(pending, COLUMNS, restval="")
     writer.writeheader()
 
     def encode(items: Sequence[str]) -> str:
-        writer.writerows(_flat(json.loads(item)) for item in items)
+        writer.writerows(csv_cells(json.loads(item)) for item in items)
         lines = pending.getvalue()
         pending.seek(0)
         pending.truncate()
         return lines
 
     return encode
-
-
-def _flat(record: dict[str, Any]) -> dict[str, Any]:
-    flat = {**record, "rejected": " ".join(record["rejected"])}
-    for name, column in _INTERVALS.items():
-        bounds = record[name] or (None, None)
-        flat |= {column.format("low"): bounds[0], column.format("high"): bounds[1]}
-    return flat
 
 
 async def _sent(

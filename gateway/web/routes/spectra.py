@@ -12,8 +12,9 @@ from starlette.responses import Response
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.ratio_index.index import Band
+from gateway.estimate_json import spectra_from_json, spectra_to_json
 from gateway.records import Spectra as SpectraSeen
-from gateway.records import json_line, spectra_from_json, spectra_to_json
+from gateway.records import json_line
 from gateway.web.live.board import Board, Record
 from gateway.web.schemas import Spectra
 

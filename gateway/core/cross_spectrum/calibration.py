@@ -1,0 +1,51 @@
+"""What the cross-spectral estimator knows of a vehicle: the half-car that its known-load drives taught."""
+
+from dataclasses import dataclass
+
+from gateway.core.cross_spectrum.measured import Reading
+from gateway.core.cross_spectrum.parameters import Ground
+from gateway.records import F64
+
+
+@dataclass(frozen=True, slots=True)
+class CrossSpectrumCalibration:
+    """What known-load drives taught, as plain numbers and arrays.
+
+    parameters (p,) and covariance (p, p) follow ``names`` (parameters.PARAMETERS; logarithms where
+    these are positive quantities). The inflations widen standard deviations, by so much more per_reach
+    as a load lies beyond ``known_loads`` (payload kg, front share %; core.reach); misfit_limit is the
+    largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
+    root mean squares within the band. usual_log_amplitude: see core.cross_spectra.Reading.
+    """
+
+    empty_mass_kg: float
+    empty_front_share_pct: float
+    wheelbase_m: float
+    band_hz: tuple[float, float]
+    n_segment: int
+    names: tuple[str, ...]
+    parameters: F64
+    covariance: F64
+    payload_inflation: float
+    front_share_inflation: float
+    misfit_limit: float
+    acceleration_rms_mps2: float
+    pitch_rate_rms_radps: float
+    payload_seen_kg: tuple[float, float]
+    front_share_seen_pct: tuple[float, float]
+    speed_seen_mps: tuple[float, float]
+    warnings: tuple[str, ...] = ()
+    known_loads: tuple[tuple[float, float], ...] = ()
+    payload_inflation_per_reach: float = 0.0
+    front_share_inflation_per_reach: float = 0.0
+    usual_log_amplitude: float | None = None
+
+    @property
+    def ground(self) -> Ground:
+        """The vehicle as stated, in the core's terms."""
+        return Ground(self.empty_mass_kg, self.empty_front_share_pct / 100.0, self.wheelbase_m)
+
+    @property
+    def reading(self) -> Reading:
+        """How spectra of this vehicle are taken."""
+        return Reading(self.wheelbase_m, self.band_hz, self.n_segment, self.usual_log_amplitude)

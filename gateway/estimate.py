@@ -1,0 +1,96 @@
+"""What a batch taught: payload and front share with how sure they are, or why nothing.
+
+Inside, a front share is in percent wherever it is a :class:`Quantity`, as everybody outside reads it.
+"""
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from gateway.records import Spectra, Why
+
+Z95: Final = 1.959964  # standard deviations to either side of a normal distribution's middle 95 %
+UNKNOWN_INTERVAL: Final = (math.nan, math.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number, its standard deviation and its 95 % interval (low, high), all in one unit. NaN where unknown.
+
+    A payload is in kg. A front share, of the sprung mass on the front axle, is in percent, its standard
+    deviation in percentage points.
+    """
+
+    number: float = math.nan
+    std: float = math.nan
+    interval95: tuple[float, float] = UNKNOWN_INTERVAL
+
+    @classmethod
+    def normal(cls, number: float, std: float) -> "Quantity":
+        """With the interval of a normal distribution."""
+        return cls(number, std, (number - Z95 * std, number + Z95 * std))
+
+
+UNKNOWN: Final = Quantity()
+
+
+@dataclass(frozen=True, slots=True)
+class Epoch:
+    """What the batches since the load last changed tell together (core.fusion); no intervals."""
+
+    payload: Quantity
+    front_share: Quantity
+    n_batches: int
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """The tare that an estimate was corrected by (core.tare): what was taken off, and what was raw; no intervals."""
+
+    tare_id: str
+    payload: Quantity
+    front_share: Quantity
+    raw_payload: Quantity
+    raw_front_share: Quantity
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What a batch taught: payload (kg) and front share (%), or why nothing. Unknown is NaN (null in JSON)."""
+
+    t_start_ns: int
+    t_end_ns: int
+    estimator: str
+    calibration_id: str | None = None
+    payload: Quantity = UNKNOWN
+    front_share: Quantity = UNKNOWN
+    ratio_index_acceleration: float = math.nan
+    ratio_index_pitch_rate: float = math.nan
+    mean_speed_mps: float = math.nan
+    gap_share: float = math.nan
+    usable_share: float = math.nan
+    roughness_mps2: float = math.nan  # of the road (core.spectrum)
+    shares: Mapping[str, float] = field(default_factory=dict)
+    rejected: tuple[Why, ...] = ()
+    is_provisional: bool = False
+    spectra: Spectra | None = None
+    diagnostics: Mapping[str, float] = field(default_factory=dict)
+    epoch: Epoch | None = None
+    tare: Correction | None = None
+    vehicle_id: str | None = None
+    vin: str | None = None
+
+    @property
+    def counted(self) -> bool:
+        """True where the batch gave an answer."""
+        return not self.rejected
+
+    @property
+    def id(self) -> str:
+        """The same batch, vehicle, estimator, calibration and tare have the same id, whenever it is computed."""
+        parts: tuple[object, ...] = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator)
+        parts += (self.calibration_id, *((self.tare.tare_id,) if self.tare else ()))
+        digest = hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()
+        return f"{self.t_end_ns}-{digest[:12]}"

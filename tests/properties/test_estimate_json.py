@@ -1,0 +1,84 @@
+"""An estimate and its JSON object say the same, in both directions."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.estimate import Correction, Epoch, Estimate, Quantity
+from gateway.estimate_json import COLUMNS, FIELDS, csv_cells, estimate_from_json, estimate_to_json
+from gateway.records import Spectra, Why, json_line
+
+numbers = st.floats(allow_infinity=False)
+whole_ns = st.integers(0, 4_000_000_000_000_000_000)
+names = st.text(min_size=1, max_size=8)
+quantities = st.builds(Quantity, numbers, numbers, st.tuples(numbers, numbers))
+by_name = st.dictionaries(names, numbers, max_size=3)
+spectra = st.integers(0, 4).map(lambda n: Spectra(*(np.linspace(0.1 * k, np.pi, n) for k in range(5))))
+estimates = st.builds(
+    Estimate,
+    whole_ns,
+    whole_ns,
+    names,
+    st.none() | names,
+    quantities,
+    quantities,
+    *[numbers] * 6,
+    by_name,
+    st.lists(st.sampled_from(Why), max_size=3).map(tuple),
+    st.booleans(),
+    st.none() | spectra,
+    by_name,
+    st.none() | st.builds(Epoch, quantities, quantities, st.integers(1, 10**6)),
+    st.none() | st.builds(Correction, names, *[quantities] * 4),
+    st.none() | names,
+    st.none() | names,
+)
+
+
+def read_back(told: dict[str, Any]) -> Estimate:
+    return estimate_from_json(json.loads(json_line(told)))
+
+
+@given(estimates)
+def test_what_is_read_back_is_told_in_the_same_words(estimate: Estimate) -> None:
+    told = json_line(estimate_to_json(estimate))
+    assert json_line(estimate_to_json(read_back(json.loads(told)))) == told
+
+
+@given(estimates)
+def test_instants_and_identity_are_exact(estimate: Estimate) -> None:
+    again = read_back(estimate_to_json(estimate))
+    assert (again.t_start_ns, again.t_end_ns, again.id) == (estimate.t_start_ns, estimate.t_end_ns, estimate.id)
+
+
+@given(estimates)
+def test_what_an_early_version_stored_is_read_too(estimate: Estimate) -> None:
+    told = estimate_to_json(estimate)
+    early = {name: x for name, x in told.items() if name not in ("roughness_mps2", "diagnostics")}
+    again = estimate_to_json(read_back(early))
+    assert {**again, "roughness_mps2": told["roughness_mps2"], "diagnostics": told["diagnostics"]} == told
+
+
+@given(estimates, st.integers(0, 999))
+def test_an_object_with_an_id_of_elsewhere_keeps_whole_microseconds(estimate: Estimate, ns: int) -> None:
+    told = estimate_to_json(replace(estimate, t_start_ns=1_790_000_000_000_000_000 + ns)) | {"id": "of elsewhere"}
+    assert read_back(told).t_start_ns == 1_790_000_000_000_000_000
+
+
+@given(estimates)
+def test_a_line_of_csv_has_the_columns_and_no_other(estimate: Estimate) -> None:
+    told = estimate_to_json(estimate)
+    cells = csv_cells(told)
+    assert set(cells) <= set(COLUMNS)
+    assert cells["rejected"] == " ".join(estimate.rejected)
+    if (interval := told["payload_interval95_kg"]) is not None:
+        assert [cells["payload_low95_kg"], cells["payload_high95_kg"]] == interval
+
+
+def test_no_name_is_given_twice() -> None:
+    assert len({one.name for one in FIELDS}) == len(FIELDS)
+    assert len(set(COLUMNS)) == len(COLUMNS)
