@@ -30,9 +30,9 @@ class BatchLog:
             event,
             level=logging.INFO if is_answer else logging.DEBUG,
             batch=found.id,
-            payload_kg=_or_none(found.payload_kg),
-            payload_std_kg=_or_none(found.payload_std_kg),
-            front_share_pct=_or_none(found.front_share_pct),
+            payload_kg=_or_none(found.payload.number),
+            payload_std_kg=_or_none(found.payload.std),
+            front_share_pct=_or_none(found.front_share.number),
             rejected=found.rejected,
         )
         if not found.is_provisional:
