@@ -15,9 +15,7 @@ import numpy as np
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.judgement.evaluation import errors_of
 from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all, triples_at_different_positions
-from gateway.calibration.plan.design import Design, Spread
-from gateway.calibration.plan.loads import PlacedLoad, weighed_loads
-from gateway.calibration.plan.plan import usual_drive
+from gateway.calibration.plan import Design, PlacedLoad, Spread, usual_drive, weighed_loads
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.vehicle import Vehicle

@@ -13,7 +13,7 @@ from gateway.calibration.campaign import Campaign, load_campaign, load_draft
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
-from gateway.calibration.plan.plan import Plan, plan_first, plan_next
+from gateway.calibration.plan import LoadPlan, plan_first, plan_next
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
 from gateway.cli.progress import bar, counted
@@ -153,7 +153,7 @@ def _report(directory: Path, campaign: Campaign, outcome: Outcome, curve: Learni
     click.echo(str(written), err=True)
 
 
-def _summary(found: CalibrationFile, output: Path | None, plan: Plan | None) -> dict[str, object]:
+def _summary(found: CalibrationFile, output: Path | None, plan: LoadPlan | None) -> dict[str, object]:
     return {
         "calibration_id": found.id,
         "output": str(output) if output else None,
@@ -165,7 +165,7 @@ def _summary(found: CalibrationFile, output: Path | None, plan: Plan | None) -> 
     }
 
 
-def _sentences(found: CalibrationFile, output: Path | None, plan: Plan | None, said: Sequence[str]) -> str:
+def _sentences(found: CalibrationFile, output: Path | None, plan: LoadPlan | None, said: Sequence[str]) -> str:
     """What was calibrated, with the warnings that are not ``said`` above it."""
     low, high = found.seen.payload_kg
     lines = [

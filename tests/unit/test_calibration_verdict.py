@@ -13,7 +13,7 @@ from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.judgement.assessment import Assessment, Judgement, Part
 from gateway.calibration.judgement.evaluation import Judged, error_table
 from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
-from gateway.calibration.plan.plan import Expected
+from gateway.calibration.plan import Expected
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity
 from gateway.records import Why

@@ -12,7 +12,8 @@ from support.known_runs import split_run
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.half_car.fit import calibrate_cross_spectrum
-from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST, Expected, Plan, plan_first, plan_next, usual_drive
+from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, usual_drive
+from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
 from gateway.cli import springscale
 from gateway.cli.text.plan import plan_sentences
 from gateway.core.weights import weights_of
@@ -28,7 +29,7 @@ sensor_position_m = 3.1
 """
 
 
-def improves(plan: Plan) -> bool:
+def improves(plan: LoadPlan) -> bool:
     """Whether each run of the plan lowers what is expected of payload and share together."""
     steps: list[Expected] = [*([plan.now] if plan.now else []), *(advice.expected for advice in plan.advice)]
     loss = [(step.payload_std_kg / 450.0) ** 2 + (step.front_share_std_pct / 20.0) ** 2 for step in steps]

@@ -14,7 +14,7 @@ from gateway.calibration.inspection.finding import RunVerdict, Severity
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement, Part
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Target, TargetErrors
-from gateway.calibration.plan.plan import Expected
+from gateway.calibration.plan import Expected
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.vehicle import Vehicle
 from gateway.words import counted

@@ -82,8 +82,8 @@ class Design:
     def _variances(self, covariance: F64) -> F64:
         """Variances (t, 2) of payload (kg) and front share (0..1) at each target."""
         left_open = np.einsum("tij,jk,tik->ti", self._moves, covariance, self._moves)
-        found: F64 = self._own + left_open
-        return found
+        variances: F64 = self._own + left_open
+        return variances
 
     def _weighed(self, load: PlacedLoad) -> tuple[F64, F64]:
         """A batch's own variances (2,), and how (payload, share) move with each parameter (2, p).

@@ -54,7 +54,7 @@ class Advice:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class LoadPlan:
     """Runs to drive, in order. ``now`` is None where nothing was driven yet.
 
     ``least`` is the run that would help least, for comparison with the first of ``advice``.
@@ -85,14 +85,14 @@ class Plan:
         return asdict(self) | {"is_enough_driven": self.is_enough_driven}
 
 
-def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST) -> Plan:
+def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST) -> LoadPlan:
     """A first campaign: empty, then what the priors of any vehicle let expect the most of."""
     prior = prior_of(vehicle)
     planner = _Planner(vehicle, prior.mean, FIRST_DRIVE)
     unloaded = empty(vehicle)
     known = planner.after(np.diag(prior.std**2), unloaded)
     first = Advice(unloaded, planner.expected(known, (unloaded,)))
-    return Plan(
+    return LoadPlan(
         vehicle=vehicle.name,
         n_driven=0,
         drive=FIRST_DRIVE,
@@ -102,28 +102,28 @@ def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST) -> Plan:
     )
 
 
-def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> Plan:
+def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadPlan:
     """The next runs after a calibration.
 
     Raises CalibrationImpossibleError where it holds no cross-spectral part: the advice is of the half-car.
     """
-    found = outcome.cross_spectrum
-    if found is None:
+    known = outcome.cross_spectrum
+    if known is None:
         raise CalibrationImpossibleError(
             "a plan needs the cross-spectral calibration: leave out --estimator, and see its warning if it has one"
         )
     runs = [one.identification for one in outcome.split]
     drive = usual_drive(runs)
-    inflation = found.payload_inflation, found.front_share_inflation
-    planner = _Planner(vehicle, found.parameters, drive, inflation)
+    inflation = known.payload_inflation, known.front_share_inflation
+    planner = _Planner(vehicle, known.parameters, drive, inflation)
     driven = tuple(PlacedLoad(run.payload_kg, None, run.front_share_pct) for run in runs)
-    return Plan(
+    return LoadPlan(
         vehicle=vehicle.name,
         n_driven=len(runs),
         drive=drive,
-        now=planner.expected(found.covariance, driven),
-        advice=planner.advice(found.covariance, driven, n_runs),
-        least=planner.least(found.covariance, driven),
+        now=planner.expected(known.covariance, driven),
+        advice=planner.advice(known.covariance, driven, n_runs),
+        least=planner.least(known.covariance, driven),
     )
 
 

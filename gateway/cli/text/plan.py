@@ -1,10 +1,9 @@
 """A plan as sentences a fitter understands."""
 
-from gateway.calibration.plan.loads import PlacedLoad
-from gateway.calibration.plan.plan import Expected, Plan
+from gateway.calibration.plan import Expected, LoadPlan, PlacedLoad
 
 
-def plan_sentences(plan: Plan) -> str:
+def plan_sentences(plan: LoadPlan) -> str:
     """What is expected now, the runs to drive in order, and what each would bring."""
     is_enough = plan.is_enough_driven
     what = "most would bring" if is_enough else "drive next"
@@ -20,7 +19,7 @@ def plan_sentences(plan: Plan) -> str:
     return "\n".join(lines)
 
 
-def _now(plan: Plan) -> str:
+def _now(plan: LoadPlan) -> str:
     if plan.now is None:
         return f"{plan.vehicle}: nothing driven yet; expected from what is usual for road vehicles"
     return f"{plan.vehicle}, {plan.n_driven} runs driven: expected {_expected(plan.now)}"

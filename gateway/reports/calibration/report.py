@@ -17,7 +17,7 @@ from gateway.calibration.campaign import Campaign
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, assess_calibration
 from gateway.calibration.judgement.learning_curve import LearningCurve
 from gateway.calibration.judgement.verdict import Verdict, verdicts_of
-from gateway.calibration.plan.plan import Plan, plan_next
+from gateway.calibration.plan import LoadPlan, plan_next
 from gateway.errors import ConfigurationError
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import half_car_section
@@ -56,7 +56,7 @@ def write_evaluation_report(directory: Path, assessment: Assessment, on_chart: O
     return _write(directory, assessment, _evaluation_sections(assessment), None, on_chart)
 
 
-def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: Plan | None) -> Iterator[Section]:
+def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: LoadPlan | None) -> Iterator[Section]:
     identification = [one.identification for one in outcome.split]
     yield runs_section(outcome)
     if plan is not None:
@@ -79,7 +79,7 @@ def _write(
     directory: Path,
     assessment: Assessment,
     sections: list[Section],
-    plan: Plan | None,
+    plan: LoadPlan | None,
     on_chart: OnChart,
     curve: LearningCurve | None = None,
 ) -> Path:
@@ -145,7 +145,7 @@ def _in_short(assessment: Assessment, best: Verdict) -> str:
     )
 
 
-def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: Plan | None) -> dict[str, Any]:
+def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: LoadPlan | None) -> dict[str, Any]:
     """The report's numbers: verdicts with reasons, error tables (12) by estimator and set, run verdicts, the plan."""
     return {
         "calibration_id": assessment.file.id,

@@ -4,7 +4,7 @@ from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection.finding import Finding, RunVerdict
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.judgement.assessment import Assessment
-from gateway.calibration.plan.plan import Advice, Expected, Plan
+from gateway.calibration.plan import Advice, Expected, LoadPlan
 from gateway.records import Why
 from gateway.reports.calibration.text import NONE, percent, shown, span
 from gateway.reports.charts.chart import Section, Table
@@ -55,7 +55,7 @@ def _findings_table(outcome: Outcome) -> Table | None:
     return Table("What was found of the runs", columns, rows) if rows else None
 
 
-def plan_section(plan: Plan) -> Section:
+def plan_section(plan: LoadPlan) -> Section:
     """The runs that would teach most, in order."""
     minutes, kmh = plan.drive.duration_s / 60.0, 3.6 * plan.drive.speed_mps
     rows = [("now", *_expected(plan.now))] if plan.now else []
@@ -70,7 +70,7 @@ def plan_section(plan: Plan) -> Section:
     return Section("next", "What to drive next", (text,), (), (Table(caption, columns, tuple(rows)),))
 
 
-def best_next(plan: Plan) -> str | None:
+def best_next(plan: LoadPlan) -> str | None:
     """The first advice in a sentence; None where there is none."""
     if not plan.advice:
         return None
