@@ -12,12 +12,17 @@ import sys
 from pathlib import Path
 from typing import Final
 
+from latex2mathml.converter import convert
+
 ROOT: Final = Path(__file__).parents[1]
 DOCS: Final = ROOT / "docs"
 PAGES: Final = ROOT / "build/site-pages"  # docs_dir of mkdocs.yml
 TOP_PAGES: Final = ("CHANGELOG.md", "CONTRIBUTING.md")
 STATIC: Final = ("*.md", "*.svg", "*.png", "calibration.schema.json")
 LINK: Final = re.compile(r"(?P<mark>!?)\[(?P<words>(?:`[^`]*`|[^\[\]`])*)\]\((?P<target>[^)\s]+)\)")
+
+VERBATIM: Final = re.compile(r"^```.*?^```$|^ {4}.*?$|`[^`\n]+`", re.MULTILINE | re.DOTALL)
+FORMULA: Final = re.compile(r"^\$\$(?P<block>.+?)\$\$$|\$(?P<inline>[^$\n]+)\$", re.MULTILINE)
 
 
 def main() -> None:
@@ -34,6 +39,7 @@ def gather() -> None:
     shutil.rmtree(PAGES, ignore_errors=True)
     places = {file: file.relative_to(DOCS) for pattern in STATIC for file in DOCS.rglob(pattern)}
     places |= {ROOT / name: Path(name) for name in TOP_PAGES}
+    places[ROOT / "benchmarks/accuracy/trials.md"] = Path("trials.md")
     places |= {ROOT / "README.md": Path("index.md"), DOCS / "adr": Path("adr/index.md")}
     for source, place in places.items():
         target = PAGES / place
@@ -58,7 +64,23 @@ def fitted(source: Path, places: dict[Path, Path]) -> str:
             return link["words"]
         return f"{link['mark']}[{link['words']}]({os.path.relpath(place, places[source].parent)}{hash_sign}{anchor})"
 
-    return LINK.sub(fit, source.read_text(encoding="utf-8"))
+    return with_formulas(LINK.sub(fit, source.read_text(encoding="utf-8")))
+
+
+def with_formulas(text: str) -> str:
+    """Markdown with what stands between dollar signs as MathML, but not in code."""
+    parts: list[str] = []
+    end = 0
+    for code in VERBATIM.finditer(text):
+        parts += [FORMULA.sub(_as_mathml, text[end : code.start()]), code[0]]
+        end = code.end()
+    return "".join([*parts, FORMULA.sub(_as_mathml, text[end:])])
+
+
+def _as_mathml(formula: re.Match[str]) -> str:
+    if formula["block"]:
+        return f"<p>{convert(formula['block'], display='block')}</p>"
+    return convert(formula["inline"])
 
 
 def list_of(decisions: Path) -> str:

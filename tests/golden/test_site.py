@@ -45,3 +45,16 @@ def test_links_to_what_is_no_page_keep_their_words(tmp_path: Path) -> None:
     (tmp_path / "a.md").write_text("[b](docs/b.md#c), [`a [test]`](tests/x.py), [web](https://example.org), [a](#d)")
     said = "[b](b.md#c), `a [test]`, [web](https://example.org), [a](#d)"
     assert make_site.fitted(tmp_path / "a.md", places) == said
+
+
+def test_every_formula_is_one_that_a_browser_shows(site: Path) -> None:
+    for page in ("method.html", "campaign.html"):
+        text = (site / page).read_text(encoding="utf-8")
+        assert text.count("<math") > 10
+        assert re.findall(r"\$[^<\n]*\\[a-z]+", text) == []
+
+
+def test_dollar_signs_in_code_are_no_formulas() -> None:
+    code = "```console\n$ springscale run $HOME\n```\n\n    echo $A $B\n\n`$A` and `$B`\n"
+    assert make_site.with_formulas(code) == code
+    assert "<math" in make_site.with_formulas("a $x_f$ b")
