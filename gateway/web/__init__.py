@@ -1,12 +1,22 @@
-"""The HTTP side: latest estimate, history, stream, status, health, metrics, dashboard."""
+"""The HTTP side: latest estimate, history, stream, status, health, metrics, dashboard.
+
+Estimates come in through the board, the history through a reader, the service's status through a call; answers go out
+to whoever has a token. The application is made by ``create_app``, from the door, the live board and the routes.
+"""
 
 from gateway.web.app import create_app
-from gateway.web.door.serving import Tls, refuse_open_address, renew_certificate, server_config
-from gateway.web.door.tokens import Scope, Token, TokenFile
-from gateway.web.live.board import Board, boot_clock_s
+from gateway.web.door import (
+    Scope,
+    Tls,
+    Token,
+    TokenFile,
+    refuse_open_address,
+    renew_certificate,
+    server_config,
+)
+from gateway.web.live import Board, boot_clock_s
 from gateway.web.reader import Reader
-from gateway.web.routes.known_loads import KnownLoad, KnownLoads
-from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
+from gateway.web.routes import KnownLoad, KnownLoads, LatestWeights, Scales, weigh_latest
 from gateway.web.settings import WebSettings
 
 __all__ = [

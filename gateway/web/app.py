@@ -11,26 +11,29 @@ from starlette.types import ASGIApp
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.status import Status
 from gateway.web import pages
-from gateway.web.door import problems
-from gateway.web.door.guard import Failures, Guard, describe_guard
-from gateway.web.door.headers import AnswersHead, SecurityHeaders
-from gateway.web.door.tokens import TokenFile
-from gateway.web.live.board import Board
-from gateway.web.live.latest import LatestFirst
+from gateway.web.door import AnswersHead, Failures, Guard, SecurityHeaders, TokenFile, describe_guard, problems
+from gateway.web.live import Board, LatestFirst
 from gateway.web.reader import Reader
-from gateway.web.routes.estimates import api_router
-from gateway.web.routes.export import export_router
-from gateway.web.routes.health import health_router
-from gateway.web.routes.j1939 import j1939_router
-from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
-from gateway.web.routes.metrics import metrics_registry
-from gateway.web.routes.reasons import reasons_router
-from gateway.web.routes.rfms import rfms_router
-from gateway.web.routes.spectra import spectra_router
-from gateway.web.routes.tare import NoTareDesk, TareDesk, tare_router
-from gateway.web.routes.vehicle import vehicle_router
-from gateway.web.routes.vss import vss_router
-from gateway.web.routes.weights import Scales, weights_router
+from gateway.web.routes import (
+    KNOWN_LOADS_PATH,
+    KnownLoads,
+    NoTareDesk,
+    Scales,
+    TareDesk,
+    api_router,
+    export_router,
+    health_router,
+    j1939_router,
+    known_loads_router,
+    metrics_registry,
+    reasons_router,
+    rfms_router,
+    spectra_router,
+    tare_router,
+    vehicle_router,
+    vss_router,
+    weights_router,
+)
 from gateway.web.settings import WebSettings
 
 API_VERSION: Final = "1.0.0"

@@ -1,1 +1,28 @@
-"""TODO-ROOM."""
+"""The door: who may ask, how much, and under which conditions an answer leaves.
+
+Connections and requests come in; those with a good token and of fair size go on to the routes, the others go out as
+problem details. It knows tokens, TLS, limits and headers, and nothing of what is asked.
+"""
+
+from gateway.web.door.guard import Failures, Guard, describe_guard
+from gateway.web.door.headers import AnswersHead, SecurityHeaders, content_security_policy
+from gateway.web.door.problems import problem_response
+from gateway.web.door.serving import Tls, refuse_open_address, renew_certificate, server_config
+from gateway.web.door.tokens import Scope, Token, TokenFile
+
+__all__ = [
+    "AnswersHead",
+    "Failures",
+    "Guard",
+    "Scope",
+    "SecurityHeaders",
+    "Tls",
+    "Token",
+    "TokenFile",
+    "content_security_policy",
+    "describe_guard",
+    "problem_response",
+    "refuse_open_address",
+    "renew_certificate",
+    "server_config",
+]

@@ -1,1 +1,11 @@
-"""TODO-ROOM."""
+"""What is known right now: the board that shows the latest estimate, and the streams that hear of each new one.
+
+Estimates come in from the pipeline's thread; the latest with its age goes out, thousands of times a second if need be,
+and each new one as an event to every stream, after what a client missed meanwhile.
+"""
+
+from gateway.web.live.board import Board, boot_clock_s
+from gateway.web.live.latest import LatestFirst, LatestResponse
+from gateway.web.live.stream import EVENT_SCHEMA, EventStream
+
+__all__ = ["EVENT_SCHEMA", "Board", "EventStream", "LatestFirst", "LatestResponse", "boot_clock_s"]

@@ -1,1 +1,43 @@
-"""TODO-ROOM."""
+"""What can be asked: one module a subject, each with its addresses and the shapes of its answers.
+
+The live board, the store's reader and the service's status come in; a router a subject goes out, which the application
+puts together. Here an estimate becomes weights, metrics, and the words of rFMS, VSS and J1939.
+"""
+
+from gateway.web.routes.estimates import api_router
+from gateway.web.routes.export import export_router
+from gateway.web.routes.health import health_router
+from gateway.web.routes.j1939 import j1939_router
+from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoad, KnownLoads, known_loads_router
+from gateway.web.routes.metrics import metrics_registry
+from gateway.web.routes.reasons import reasons_router
+from gateway.web.routes.rfms import rfms_router
+from gateway.web.routes.spectra import spectra_router
+from gateway.web.routes.tare import NoTareDesk, TareDesk, tare_router
+from gateway.web.routes.vehicle import vehicle_router
+from gateway.web.routes.vss import vss_router
+from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest, weights_router
+
+__all__ = [
+    "KNOWN_LOADS_PATH",
+    "KnownLoad",
+    "KnownLoads",
+    "LatestWeights",
+    "NoTareDesk",
+    "Scales",
+    "TareDesk",
+    "api_router",
+    "export_router",
+    "health_router",
+    "j1939_router",
+    "known_loads_router",
+    "metrics_registry",
+    "reasons_router",
+    "rfms_router",
+    "spectra_router",
+    "tare_router",
+    "vehicle_router",
+    "vss_router",
+    "weigh_latest",
+    "weights_router",
+]
