@@ -123,6 +123,12 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "the mean vertical acceleration is far from 9.81 m/s2",
             "wrong axis, sign or unit in the signal map, or the device has removed gravity",
         ),
+        Why.TIME_STAMPS: Explanation(
+            Cause.SENSORS,
+            "time stamps are so uneven, or so many frames are lost, that nobody can tell when samples were taken",
+            "stamp frames in the kernel (socketcan), lighten the computer's load, or name the message `counter` in the "
+            "signal map",
+        ),
         Why.SENSOR_RATE_LOW: Explanation(Cause.SENSORS, "the sensor sends too seldom for `rate_hz`", "raise its rate"),
         Why.SENSOR_DISAGREEMENT: Explanation(
             Cause.SENSORS,

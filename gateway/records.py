@@ -62,6 +62,7 @@ class Why(StrEnum):
     PITCH_RATE_SATURATED = "pitch_rate_saturated"
     GRAVITY_MISSING = "gravity_missing"
     SENSOR_RATE_LOW = "sensor_rate_low"
+    TIME_STAMPS = "time_stamps"
     OUT_OF_RANGE = "out_of_range"
     NOT_ENOUGH_EXCITATION = "not_enough_excitation"
     TOO_UNCERTAIN = "too_uncertain"

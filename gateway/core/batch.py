@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gateway.core.sample_clock import retimed
 from gateway.core.settings import BatchSettings
 from gateway.core.timeline import onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
 from gateway.records import F64, I64, Batch, Bool, Motion, SensorTraits, Signal, Why
@@ -34,29 +35,29 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
     n = round((window.t_end_ns - window.t_start_ns) * settings.rate_hz / NS_PER_S)
     inside = (rows.t_ns >= window.t_start_ns) & (rows.t_ns < window.t_end_ns)
     rows = Motion(rows.signals, rows.t_ns[inside], rows.columns[inside])
-    acceleration, acceleration_causes = _sensor(rows, Signal.VERTICAL_ACCELERATION, window, n, settings, traits)
-    pitch_rate, pitch_rate_causes = _sensor(rows, Signal.PITCH_RATE, window, n, settings, traits)
+    acceleration = _sensed(rows, Signal.VERTICAL_ACCELERATION, window, n, settings, traits)
+    pitch_rate = _sensed(rows, Signal.PITCH_RATE, window, n, settings, traits)
     speed, frozen = _speed(rows, window, n, settings, traits)
-    causes = _merge_missing(acceleration_causes | pitch_rate_causes) | _speed_causes(speed, frozen, settings)
+    causes = _merge_missing(_either(acceleration.causes, pitch_rate.causes)) | _speed_causes(speed, frozen, settings)
     usable = np.ones(n, bool)
     for masked in causes.values():
         usable &= ~masked
-    gravity = _mean(acceleration, usable)
+    gravity = _mean(acceleration.on_grid, usable)
     shares = {why: float(np.mean(masked)) for why, masked in causes.items() if masked.any()}
     return Batch(
         t_start_ns=window.t_start_ns,
         t_end_ns=window.t_end_ns,
         drive_start_ns=window.drive_start_ns,
         rate_hz=settings.rate_hz,
-        vertical_acceleration_mps2=acceleration - gravity,
-        pitch_rate_radps=pitch_rate,
+        vertical_acceleration_mps2=acceleration.on_grid - gravity,
+        pitch_rate_radps=pitch_rate.on_grid,
         speed_mps=speed,
         usable=usable,
         gravity_mps2=gravity,
         gap_share=_gap_share(shares),
         shares=shares,
         longest_stop_s=_longest_run(speed < settings.standstill_speed_mps) / settings.rate_hz,
-        rejected=_reasons(rows, window, n, usable, gravity, shares, settings),
+        rejected=_reasons((acceleration, pitch_rate), window, n, usable, gravity, shares, settings),
         is_provisional=window.is_provisional,
         longitudinal_acceleration_mps2=_optional(rows, window, n, settings),
     )
@@ -69,23 +70,32 @@ _NAMES = {
 _MISSING = (Why.GAP, Why.ACCELERATION_MISSING, Why.PITCH_RATE_MISSING)
 
 
-def _sensor(
-    rows: Motion, signal: Signal, window: Window, n: int, settings: BatchSettings, traits: Traits
-) -> tuple[F64, dict[Why, Bool]]:
-    """One inertial sensor on the grid, and where each cause says it cannot be used."""
+@dataclass(frozen=True, slots=True)
+class _Sensed:
+    """One inertial sensor on the grid (n,), where each cause says it cannot be used, and how often it sends."""
+
+    on_grid: F64
+    causes: dict[Why, Bool]
+    rate_hz: float
+
+
+def _sensed(rows: Motion, signal: Signal, window: Window, n: int, settings: BatchSettings, traits: Traits) -> _Sensed:
     if signal not in rows.signals:
-        return np.full(n, np.nan), {}
+        return _Sensed(np.full(n, np.nan), {}, 0.0)
     missing, stuck, saturated = _NAMES[signal]
     trait = traits.get(signal, SensorTraits())
-    t_ns, x = sort_by_time(*rows.of(signal))
-    t_ns = t_ns - round(trait.latency_s * NS_PER_S)
-    on_grid = onto_grid(t_ns, x, window.t_start_ns, n, settings.rate_hz, settings.gap_s)
+    stamps_ns, x = sort_by_time(*rows.of(signal))
+    t_ns, is_believed = retimed(stamps_ns - round(trait.latency_s * NS_PER_S), x)
+    on_grid = onto_grid(t_ns[is_believed], x[is_believed], window.t_start_ns, n, settings.rate_hz, settings.gap_s)
     stuck_ns = settings.stuck_s * NS_PER_S
-    return on_grid, {
-        missing: np.isnan(on_grid),
+    untimed = _spans_onto_grid(_spans_of(t_ns, ~is_believed), window, n, settings.rate_hz)
+    causes = {
+        missing: np.isnan(on_grid) & ~untimed,
+        Why.TIME_STAMPS: untimed,
         stuck: _spans_onto_grid(_constant_runs(t_ns, x, stuck_ns), window, n, settings.rate_hz),
         saturated: _spans_onto_grid(_saturated_spans(t_ns, x, trait), window, n, settings.rate_hz),
     }
+    return _Sensed(on_grid, causes, sample_rate_hz(t_ns[is_believed]))
 
 
 def _constant_runs(t_ns: I64, x: F64, at_least_ns: float) -> I64:
@@ -104,6 +114,12 @@ def _saturated_spans(t_ns: I64, x: F64, trait: SensorTraits) -> I64:
     at_end = (x >= trait.maximum - 0.5 * step) | (x <= trait.minimum + 0.5 * step)  # False where NaN
     halo_ns = round(SATURATION_HALO_S * NS_PER_S)
     return np.column_stack([t_ns[at_end] - halo_ns, t_ns[at_end] + halo_ns])
+
+
+def _spans_of(t_ns: I64, chosen: Bool) -> I64:
+    """(k, 2) first and last time of every run of chosen samples."""
+    edges = np.flatnonzero(np.diff(np.r_[False, chosen, False].astype(np.int8)))
+    return np.column_stack([t_ns[edges[::2]], t_ns[edges[1::2] - 1]])
 
 
 def _spans_onto_grid(spans_ns: I64, window: Window, n: int, rate_hz: float) -> Bool:
@@ -141,6 +157,11 @@ def _speed_causes(speed: F64, frozen: Bool, settings: BatchSettings) -> dict[Why
     }
 
 
+def _either(one: dict[Why, Bool], other: dict[Why, Bool]) -> dict[Why, Bool]:
+    """Causes of both sensors; what both can have is there where either has it."""
+    return one | {why: masked | one[why] if why in one else masked for why, masked in other.items()}
+
+
 def _merge_missing(causes: dict[Why, Bool]) -> dict[Why, Bool]:
     """Both sensors silent at once is a gap; one alone is that sensor's fault."""
     a, g = causes.get(Why.ACCELERATION_MISSING), causes.get(Why.PITCH_RATE_MISSING)
@@ -171,7 +192,7 @@ def _optional(rows: Motion, window: Window, n: int, settings: BatchSettings) -> 
 
 
 def _reasons(
-    rows: Motion,
+    sensors: tuple[_Sensed, ...],
     window: Window,
     n: int,
     usable: Bool,
@@ -190,10 +211,8 @@ def _reasons(
         found.extend(why for why, share in shares.items() if share >= min(REASON_SHARE_MIN, largest))
     elif _gap_share(shares) > settings.gap_share_max:
         found.extend(why for why in _MISSING if shares.get(why, 0.0) > settings.gap_share_max / len(_MISSING))
-    for signal in _NAMES:
-        rate_hz = sample_rate_hz(np.unique(rows.of(signal)[0]))
-        if 0.0 < rate_hz < RATE_MIN_SHARE * settings.rate_hz:
-            found.append(Why.SENSOR_RATE_LOW)
+    if any(0.0 < sensor.rate_hz < RATE_MIN_SHARE * settings.rate_hz for sensor in sensors):
+        found.append(Why.SENSOR_RATE_LOW)
     if abs(gravity - STANDARD_GRAVITY_MPS2) > GRAVITY_TOLERANCE_MPS2:
         found.append(Why.GRAVITY_MISSING)
     return tuple(dict.fromkeys(found))

@@ -13,9 +13,9 @@ STOPBAND_DB = 70.0
 
 
 def sort_by_time(t_ns: I64, x: F64) -> tuple[I64, F64]:
-    """Samples in order of time, the first of equal stamps kept."""
-    times, first = np.unique(t_ns, return_index=True)
-    return times, x[first]
+    """Samples in order of time, those of equal stamps in order of arrival."""
+    order = np.argsort(t_ns, kind="stable")
+    return t_ns[order], x[order]
 
 
 def sample_rate_hz(t_ns: I64) -> float:
@@ -35,7 +35,8 @@ def onto_grid(t_ns: I64, x: F64, t_start_ns: int, n: int, rate_hz: float, gap_s:
     Where neighbouring samples lie further apart than ``gap_s`` (and than two and a half of their
     usual intervals), the time between them is unknown.
     """
-    t_ns, x = sort_by_time(t_ns, x)
+    t_ns, first = np.unique(t_ns, return_index=True)
+    x = x[first]
     if len(t_ns) < 4:
         return np.full(n, np.nan)
     raw_rate_hz = sample_rate_hz(t_ns)

@@ -107,7 +107,7 @@ def test_rate_is_the_median_rate() -> None:
     assert sample_rate_hz(t_ns[:1]) == 0.0
 
 
-def test_the_first_of_equal_stamps_is_kept() -> None:
+def test_samples_of_one_stamp_stay_in_the_order_they_came_in() -> None:
     times, x = sort_by_time(np.array([3, 1, 3, 2]), np.array([30.0, 10.0, 31.0, 20.0]))
-    assert times.tolist() == [1, 2, 3]
-    assert x.tolist() == [10.0, 20.0, 30.0]
+    assert times.tolist() == [1, 2, 3, 3]
+    assert x.tolist() == [10.0, 20.0, 30.0, 31.0]

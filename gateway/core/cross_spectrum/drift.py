@@ -14,7 +14,13 @@ from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.records import F64
 
 DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
-    {"damper_front_nspm": 0.01, "damper_rear_nspm": 0.01, "delay_scale": 0.003, "payload_mode_hz": 0.3}
+    {
+        "damper_front_nspm": 0.01,
+        "damper_rear_nspm": 0.01,
+        "delay_scale": 0.003,
+        "payload_mode_hz": 0.3,
+        "gyro_lag_s": 0.001,
+    }
 )
 """What the search leaves free, and how far off, each by itself: standard deviations, of logarithms of what is positive.
 

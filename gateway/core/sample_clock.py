@@ -1,0 +1,197 @@
+"""When samples were taken, told from when their frames came: the steady clock of the sensor behind late stamps.
+
+    sample_times(t_ns)  -> Timing, or None where no steady clock can be believed
+    retimed(t_ns, x)    -> times of samples x, by the clock where that shows them smoother, and which can be believed
+
+A sensor samples at a steady rate. A stamp is later than its sample by what bus, driver and computer took, and
+that is never less than a certain least: delays come and go, but a lost frame shifts all that follow by one period
+for good. So the number of a sample is its place in the row, plus as many periods as the least delay of the samples
+that follow has grown (the lower envelope: V. Paxson, "On calibrating measurements of packet transit times",
+SIGMETRICS 1998). That least delay, but for whole periods, is how the two clocks run against one another, and
+moves slowly. A line through stamps over numbers, piece by piece, is then the sensor's clock.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from scipy.ndimage import minimum_filter1d, uniform_filter1d
+
+from gateway.records import F64, I64, Bool
+from gateway.units import NS_PER_S
+
+LEAST_SAMPLES: Final = 200  # fewer fill no segment of a spectrum
+SILENCE_S: Final = 1.0  # longer than a computer stalls
+AHEAD: Final = 101  # samples of which one is taken to come without delay: a second at 100 Hz
+SLOWLY: Final = 400  # samples over which the two clocks are taken to run alike
+LAG: Final = 512  # a mean interval over so many samples hardly knows of heaps
+ROUNDS: Final = 3  # each makes the period about as much more accurate as there are samples in SLOWLY
+FEW_LOST_SHARE: Final = 0.01  # a mean interval is the period only where hardly a frame is lost
+STEADY_SHARE: Final = 0.2  # of a period: stamps that scatter less about a clock tell every lost frame
+MOST_LOST_SHARE: Final = 0.5
+UNSURE_SHARE: Final = 0.3  # of a period: a least delay so far from whole periods tells no number
+MOST_UNSURE_SHARE: Final = 0.15  # of the samples; by chance it would be two fifths
+FEW_SHORT_SHARE: Final = 0.01
+CLEARLY: Final = 1.05  # as much as a mean distance from the neighbours may differ and change no estimate
+OUTLYING: Final = 10.0  # of the median distance: more counts no more
+SHORT_PIECE: Final = 200
+MOST_SHORT_PIECES: Final = 16
+USUAL_WITHIN: Final = 0.1  # of the median interval: jitter moves it no further
+PIECE: Final = 1000  # samples of one piece of the line
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Times of samples (n,) in ns, rising; period_s is the clock's, delay_s (n,) by how much each stamp came late.
+
+    delay_s is about its own median: the least delay there is cannot be seen.
+    """
+
+    t_ns: I64
+    period_s: float
+    delay_s: F64
+    n_lost: int
+
+
+def retimed(t_ns: I64, x: F64, counter: I64 | None = None, modulus: int = 0) -> tuple[I64, Bool]:
+    """Stamps and samples (n,), in order of arrival -> times (n,), and whether each can be believed (n,).
+
+    Stretches that silence parts have each a clock of their own. A stamp was measured, a clock is inferred: stamps
+    stay unless the samples are clearly smoother over the clock's times. Without a clock they are believed where
+    they are even; a stretch too short to tell is left as it is.
+    """
+    edges = np.r_[0, np.flatnonzero(np.diff(t_ns) > SILENCE_S * NS_PER_S) + 1, len(t_ns)]
+    times_ns, is_believed = t_ns.copy(), np.ones(len(t_ns), np.bool_)
+    for begin, end in pairwise(edges.tolist()):
+        if end - begin < LEAST_SAMPLES:
+            continue
+        here = slice(begin, end)
+        timing = sample_times(t_ns[here], None if counter is None else counter[here], modulus)
+        if timing is None:
+            is_believed[here] = _is_even(t_ns[here])
+        elif _is_smoother(timing.t_ns, t_ns[here], x[here]):
+            times_ns[here] = timing.t_ns
+    return times_ns, is_believed
+
+
+def _is_even(t_ns: I64) -> bool:
+    """Whether hardly an interval is so short that what is drawn through its two samples swings out beyond them."""
+    intervals_ns = np.diff(t_ns)
+    return float(np.mean(intervals_ns < 0.5 * np.median(intervals_ns))) < FEW_SHORT_SHARE
+
+
+def _is_smoother(clock_ns: I64, stamps_ns: I64, x: F64) -> bool:
+    """Whether each sample follows clearly better from its neighbours over the clock's times than over the stamps."""
+    by_clock, by_stamps = _off_neighbours(clock_ns, x), _off_neighbours(stamps_ns, x)
+    most = OUTLYING * float(np.median(by_clock)) + np.finfo(float).tiny
+    return float(np.mean(np.minimum(by_stamps, most))) > CLEARLY * float(np.mean(np.minimum(by_clock, most)))
+
+
+def _off_neighbours(t_ns: I64, x: F64) -> F64:
+    """(n - 4,) distance of each sample from the cubic through the two before and the two after it (Lagrange)."""
+    t_s = (t_ns - t_ns[0]) / NS_PER_S
+    at = t_s[2:-2]
+    nodes = [t_s[k : len(t_s) - 4 + k] for k in (0, 1, 3, 4)]
+    drawn = np.zeros(len(at))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for k, node in zip((0, 1, 3, 4), nodes, strict=True):
+            others = [other for other in nodes if other is not node]
+            drawn += x[k : len(x) - 4 + k] * np.prod([(at - other) / (node - other) for other in others], axis=0)
+    off = np.abs(x[2:-2] - drawn)
+    return np.where(np.isfinite(off), off, np.inf)  # two samples at one time: nothing can be drawn through them
+
+
+def sample_times(t_ns: I64, counter: I64 | None = None, modulus: int = 0) -> Timing | None:
+    """When samples were taken whose frames were stamped t_ns (n,), in order of arrival and never falling.
+
+    ``counter`` (n,) counts messages modulo ``modulus``. None where no steady clock is behind the stamps, and
+    where lost and late frames cannot be told apart.
+    """
+    if len(t_ns) < LEAST_SAMPLES:
+        return None
+    t_s = (t_ns - t_ns[0]) / NS_PER_S
+    lag = min(LAG, len(t_s) // 2)
+    mean_s = float(np.median(t_s[lag:] - t_s[:-lag])) / lag
+    if counter is not None:
+        return _timing(t_ns, _counted(t_s, mean_s, counter, modulus)) if mean_s > 0.0 else None
+    heaped = _numbered(t_s, mean_s) if mean_s > 0.0 else None
+    if heaped is not None and _lost_share(heaped) < FEW_LOST_SHARE:
+        return _timing(t_ns, heaped)
+    usual_s = _usual_period_s(t_s)
+    steady = _numbered(t_s, usual_s) if usual_s > 0.0 else None
+    if steady is None or _lost_share(steady) > MOST_LOST_SHARE:
+        return None
+    timing = _timing(t_ns, steady)
+    return timing if float(np.median(np.abs(timing.delay_s))) < STEADY_SHARE * timing.period_s else None
+
+
+def _lost_share(numbers: I64) -> float:
+    return 1.0 - len(numbers) / float(numbers[-1] + 1)
+
+
+def _timing(t_ns: I64, numbers: I64) -> Timing:
+    t_s = (t_ns - t_ns[0]) / NS_PER_S
+    clock_s, period_s = _clock(t_s, numbers)
+    taken_ns = t_ns[0] + np.rint(clock_s * NS_PER_S).astype(np.int64)
+    return Timing(taken_ns, period_s, t_s - clock_s, int(numbers[-1]) + 1 - len(numbers))
+
+
+def _usual_period_s(t_s: F64) -> float:
+    """The period near the usual interval to which most stamps keep, whatever was lost; 0 where there is none.
+
+    The period of largest |sum exp(j 2 pi t / T)| over short pieces (the periodogram of a point process: M. S.
+    Bartlett, "The spectral analysis of point processes", J. R. Stat. Soc. B 25, 1963).
+    """
+    usual_s = float(np.median(np.diff(t_s)))
+    if not usual_s > 0.0:
+        return 0.0
+    n_pieces = min(MOST_SHORT_PIECES, len(t_s) // SHORT_PIECE)
+    begins = np.linspace(0, len(t_s) - SHORT_PIECE, n_pieces).astype(int)
+    pieces_s = np.stack([t_s[begin : begin + SHORT_PIECE] for begin in begins])
+    tried_s = usual_s * (1.0 + np.arange(-USUAL_WITHIN, USUAL_WITHIN, 0.25 / SHORT_PIECE))
+    score = [np.sum(np.abs(np.exp(2j * np.pi / period_s * pieces_s).sum(axis=1)) ** 2) for period_s in tried_s]
+    return float(tried_s[int(np.argmax(score))])
+
+
+def _numbered(t_s: F64, period_s: float) -> I64 | None:
+    """Numbers (n,) of the samples, rising from 0, by how the least delay grows; None where it tells too few."""
+    place = np.arange(len(t_s))
+    for _ in range(ROUNDS):
+        least_s = _least_ahead(t_s - place * period_s)
+        turn = np.exp(2j * np.pi / period_s * least_s)  # whole periods do not turn it
+        slow = uniform_filter1d(turn.real, SLOWLY) + 1j * uniform_filter1d(turn.imag, SLOWLY)
+        drift_s = np.unwrap(np.angle(slow)) * (period_s / (2.0 * np.pi))
+        lost = (least_s - drift_s) / period_s
+        whole = np.rint(lost)
+        period_s += float(np.polyfit(place, drift_s, 1)[0])
+    if float(np.mean(np.abs(lost - whole) > UNSURE_SHARE)) > MOST_UNSURE_SHARE:
+        return None
+    numbers = place + np.maximum.accumulate(whole - whole[0]).astype(np.int64)
+    return np.asarray(numbers, np.int64)
+
+
+def _least_ahead(late_s: F64) -> F64:
+    """(n,) the least of each sample and those that follow it, AHEAD in all."""
+    return np.asarray(minimum_filter1d(late_s, AHEAD, mode="nearest", origin=-(AHEAD // 2)), float)
+
+
+def _counted(t_s: F64, period_s: float, counter: I64, modulus: int) -> I64:
+    """Numbers (n,) by the message counter; stamps tell only how often it went round meanwhile."""
+    ahead = np.diff(counter) % modulus
+    ahead[ahead == 0] = modulus
+    rounds = np.maximum(0, np.rint((np.diff(t_s) / period_s - ahead) / modulus))
+    numbers: I64 = np.r_[0, np.cumsum(ahead + modulus * rounds)].astype(np.int64)
+    return numbers
+
+
+def _clock(t_s: F64, numbers: I64) -> tuple[F64, float]:
+    """Times (n,) by a line through stamps over numbers that bends from piece to piece, and its mean period."""
+    slope_s, begin_s = np.polyfit(numbers, t_s, 1)
+    line_s = begin_s + slope_s * numbers
+    off_s = t_s - line_s
+    edges = np.linspace(0, len(t_s), max(1, round(len(t_s) / PIECE)) + 1).astype(int)
+    pieces = [slice(a, b) for a, b in pairwise(edges.tolist())]
+    middles = [float(np.mean(numbers[piece])) for piece in pieces]
+    bends_s = np.interp(numbers, middles, [float(np.median(off_s[piece])) for piece in pieces])
+    return line_s + bends_s, float(slope_s)
