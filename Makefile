@@ -46,6 +46,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_calibration_schema.py --check
 	$(BIN)/python docs/make_readme_table.py --check
 	$(BIN)/python docs/make_site.py
+	$(BIN)/python docs/make_drawings.py --check
 
 bench: .venv/.development
 	for what in day decode live simulator web; do echo "== $$what"; $(BIN)/python -m benchmarks.speed.$$what || exit 1; done
@@ -97,6 +98,7 @@ docs: .venv/.development
 	$(BIN)/python docs/make_findings.py
 	$(BIN)/python docs/make_calibration_schema.py
 	$(BIN)/python docs/make_readme_table.py
+	$(BIN)/python docs/make_drawings.py
 
 # The documents as a site, in build/site.
 site: .venv/.development

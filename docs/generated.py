@@ -1,6 +1,8 @@
 """What every made page has in common: it is written, or with --check compared with what it should say."""
 
+import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +13,26 @@ from pydantic_core import PydanticUndefined
 ROOT = Path(__file__).parents[1]
 
 
-def keep_up_to_date(page: Path, text: str, source: str) -> None:
-    """Write ``page``; with --check end with a clear line where it does not say what ``source`` does."""
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
+
+
+def keep_up_to_date(page: Path, text: str, source: str, *, tolerance: float = 0.0) -> None:
+    """Write ``page``; with --check end with a clear line where it does not say what ``source`` does.
+
+    What is computed from a simulation may differ by ``tolerance`` in each number: machines round differently.
+    """
     if "--check" not in sys.argv[1:]:
         page.write_text(text, encoding="utf-8")
-    elif not page.is_file() or page.read_text(encoding="utf-8") != text:
+    elif not page.is_file() or not agrees(page.read_text(encoding="utf-8"), text, lambda number: tolerance):
         sys.exit(f"{page.relative_to(ROOT)} does not say what {source} does: run `make docs`")
+
+
+def agrees(one: str, other: str, tolerance: Callable[[str], float]) -> bool:
+    """True where only numbers differ, each by no more than what ``tolerance`` gives for the number as printed."""
+    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
+        return False
+    pairs = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
+    return all(here == there or abs(float(here) - float(there)) <= tolerance(here) for here, there in pairs)
 
 
 def key_table(model: type[BaseModel], *without: str) -> str:

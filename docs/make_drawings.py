@@ -1,0 +1,33 @@
+"""Writes the drawings in docs/images (`make docs`); with --check only tells whether they are up to date.
+
+Each is drawn by a module of docs/drawings: the rooms from the code's imports, the spectra from a simulated drive.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final
+
+from drawings.half_car import half_car
+from drawings.rooms import rooms
+from drawings.service import service
+from drawings.spectra import spectra
+from generated import keep_up_to_date
+
+TOLERANCE_PX: Final = 1.0  # of the spectra, which machines round differently
+IMAGES: Final = Path(__file__).with_name("images")
+DRAWINGS: Final[Mapping[str, Callable[[], str]]] = {
+    "half-car.svg": half_car,
+    "rooms.svg": rooms,
+    "service.svg": service,
+    "spectra.svg": spectra,
+}
+
+
+def main() -> None:
+    """Write the drawings, or compare them."""
+    for name, draw in DRAWINGS.items():
+        keep_up_to_date(IMAGES / name, draw(), "docs/drawings", tolerance=TOLERANCE_PX)
+
+
+if __name__ == "__main__":
+    main()
