@@ -100,7 +100,7 @@ def rooms() -> str:
         sheet.text(MIDDLES[room], top + 26, room, style="bold")
         sheet.lines_of_text(MIDDLES[room], top + 42, parts[room])
     sheet.box(20, y, WIDTH - 40, BOX[1])
-    sheet.text(WIDTH / 2, y + 26, "any room may import: " + ", ".join(COMMON), ink="soft")
+    sheet.text(WIDTH / 2, y + 26, "small modules that rooms share: " + ", ".join(COMMON), ink="soft")
     return sheet.svg()
 
 
