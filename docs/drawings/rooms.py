@@ -10,15 +10,7 @@ from drawings.canvas import Canvas, Point
 
 PYPROJECT: Final = Path(__file__).parents[2] / "pyproject.toml"
 PACKAGE: Final = "gateway"
-COMMON: Final = (
-    "records",
-    "reasons",
-    "units",
-    "words",
-    "toml_file",
-    "log",
-    "errors",
-)  # small; any room may import them
+MODULES: Final = ("setup", "config")  # single files that are drawn like rooms; others are small and shared
 WIDTH: Final = 840
 MIDDLES: Final = {
     **{"cli": 420.0, "service": 220.0, "reports": 620.0, "offline": 560.0, "workbench": 750.0, "setup": 390.0},
@@ -37,7 +29,8 @@ def _room_of(module: str) -> str:
 
 def _imports(graph: grimp.ImportGraph) -> dict[str, set[str]]:
     """What each room imports of the others."""
-    rooms = {_room_of(child) for child in graph.find_children(PACKAGE)} - {"__main__", *COMMON}
+    children = graph.find_children(PACKAGE)
+    rooms = {_room_of(child) for child in children if graph.find_children(child)} | set(MODULES)
     unplaced = rooms ^ MIDDLES.keys()
     if unplaced:
         raise ValueError(f"docs/drawings/rooms.py has no place for, or too many of: {', '.join(sorted(unplaced))}")
@@ -60,11 +53,10 @@ def _without_detours(arrows: dict[str, set[str]]) -> dict[str, set[str]]:
     return {room: others - implied[room] for room, others in arrows.items()}
 
 
-def _rows() -> list[list[str]]:
-    """The layers of the first import contract that hold rooms, uppermost first."""
+def _layers() -> list[list[str]]:
+    """The layers of the first import contract, uppermost first."""
     contracts = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
-    layers = [[_room_of(one.strip()) for one in layer.split("|")] for layer in contracts[0]["layers"]]
-    return [rooms for layer in layers if (rooms := [room for room in layer if room not in COMMON])]
+    return [[_room_of(one.strip()) for one in layer.split("|")] for layer in contracts[0]["layers"]]
 
 
 def _parts(graph: grimp.ImportGraph, room: str) -> list[str]:
@@ -80,7 +72,9 @@ def _parts(graph: grimp.ImportGraph, room: str) -> list[str]:
 def rooms() -> str:
     """The drawing as SVG."""
     graph = grimp.build_graph(PACKAGE, cache_dir=None)
-    rows = _rows()
+    layers = _layers()
+    rows = [placed for layer in layers if (placed := [room for room in layer if room in MIDDLES])]
+    shared = ", ".join(room for layer in layers for room in layer if room not in MIDDLES)
     parts = {room: _parts(graph, room) for row in rows for room in row}
     heights = {room: BOX[1] + 14.0 * len(lines) for room, lines in parts.items()}
     tops: dict[str, float] = {}
@@ -100,7 +94,7 @@ def rooms() -> str:
         sheet.text(MIDDLES[room], top + 26, room, style="bold")
         sheet.lines_of_text(MIDDLES[room], top + 42, parts[room])
     sheet.box(20, y, WIDTH - 40, BOX[1])
-    sheet.text(WIDTH / 2, y + 26, "small modules that rooms share: " + ", ".join(COMMON), ink="soft")
+    sheet.text(WIDTH / 2, y + 26, f"small modules that rooms share: {shared}", ink="soft", style="small")
     return sheet.svg()
 
 
