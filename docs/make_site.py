@@ -80,7 +80,7 @@ def with_formulas(text: str) -> str:
 def _as_mathml(formula: re.Match[str]) -> str:
     if formula["block"]:
         return f"<p>{convert(formula['block'], display='block')}</p>"
-    return convert(formula["inline"])
+    return f"<span>{convert(formula['inline'])}</span>"  # within a span, or a line that begins with it would be a block
 
 
 def list_of(decisions: Path) -> str:
