@@ -1,17 +1,17 @@
-"""Writes docs/findings.md from gateway/calibration/inspection/kinds.py; with --check only tells if it is up to date."""
+"""Writes docs/findings.md from the words of every finding; with --check only tells if it is up to date."""
 
 from pathlib import Path
 
 from generated import keep_up_to_date
 
-from gateway.calibration.inspection.kinds import EXPLAINED, Topic
+from gateway.calibration.inspection.explained import EXPLAINED, Topic
 
 PAGE = Path(__file__).with_name("findings.md")
 
 INTRODUCTION = """\
 # What inspection finds in a campaign
 
-Generated from `gateway/calibration/inspection/kinds.py` by `python docs/make_findings.py`; do not edit by hand.
+Generated from `gateway/calibration/inspection/explained.py` by `python docs/make_findings.py`; do not edit by hand.
 
 `springscale calibrate` looks at every drive before it fits anything, and says what it finds and what to do about it
 ([calibration](calibration.md)). A fault keeps a run out of the calibration, a warning wants a look and goes into the
@@ -36,7 +36,7 @@ def _table(topic: Topic) -> str:
 
 def main() -> None:
     """Write the page, or compare it."""
-    keep_up_to_date(PAGE, findings_page(), "gateway/calibration/inspection/kinds.py")
+    keep_up_to_date(PAGE, findings_page(), "gateway/calibration/inspection/explained.py")
 
 
 if __name__ == "__main__":

@@ -29,7 +29,13 @@ def read_toml(path: Path, error: type[ConfigurationError] = ConfigurationError) 
 
 def load_toml(path: Path, model: type[Model], error: type[ConfigurationError] = ConfigurationError) -> Model:
     """``path`` as a ``model``. Raises ``error`` with one line for every fault."""
-    tables = read_toml(path, error)
+    return checked(read_toml(path, error), path, model, error)
+
+
+def checked(
+    tables: dict[str, Any], path: Path, model: type[Model], error: type[ConfigurationError] = ConfigurationError
+) -> Model:
+    """The tables read from ``path`` as a ``model``. Raises ``error`` with one line for every fault."""
     try:
         return model.model_validate(tables)
     except ValidationError as fault:

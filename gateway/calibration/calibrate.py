@@ -1,8 +1,8 @@
 """From inspected drives to a calibration file."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 
 import numpy as np
@@ -19,12 +19,11 @@ from gateway.calibration.file.calibration_file import (
     VehiclePart,
 )
 from gateway.calibration.half_car.fit import CrossSpectrumFit, fit_cross_spectrum
-from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
+from gateway.calibration.inspection.finding import Severity
 from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index import BandChoice, RatioIndexFit, StructureChoice, fit_ratio_index
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch
@@ -32,19 +31,17 @@ from gateway.records import F64, Batch
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A calibration file with all that stands behind it. What no estimator gave is None.
-
-    verdicts are of every run, split holds those without a fault, which calibrated; campaign_findings are of
-    all together. cross_spectrum_without holds, by run number, what the other runs teach without that run.
-    """
+    """A calibration file with all that stands behind it. What an estimator did not give is None."""
 
     file: CalibrationFile
-    verdicts: tuple[RunVerdict, ...]
-    split: tuple[SplitRun, ...]
-    ratio_index: RatioIndexFit | None
-    cross_spectrum: CrossSpectrumCalibration | None
-    cross_spectrum_without: Mapping[int, CrossSpectrumCalibration] = field(default_factory=dict)
-    campaign_findings: tuple[Finding, ...] = ()
+    inspection: Inspection
+    ratio_index: RatioIndexFit | None = None
+    cross_spectrum: CrossSpectrumFit | None = None
+
+    @property
+    def split(self) -> tuple[SplitRun, ...]:
+        """The runs without a fault, which calibrated."""
+        return self.inspection.usable
 
 
 def calibrate_inspected(
@@ -85,15 +82,7 @@ def calibrate_inspected(
         warnings=(*inspection.warnings, *warnings),
         provenance=_provenance(campaign, split, command),
     )
-    return Outcome(
-        file,
-        inspection.verdicts,
-        split,
-        ratio_index,
-        cross_spectrum.calibration if cross_spectrum else None,
-        cross_spectrum.without if cross_spectrum else {},
-        inspection.findings,
-    )
+    return Outcome(file, inspection, ratio_index, cross_spectrum)
 
 
 def _fit(
@@ -132,14 +121,14 @@ def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
     return "\n".join([f"{campaign.path}: {why}", *dict.fromkeys(faults)])
 
 
-def _span(found: Sequence[float]) -> tuple[float, float]:
-    return min(found), max(found)
+def _span(numbers: Sequence[float]) -> tuple[float, float]:
+    return min(numbers), max(numbers)
 
 
 def _roughness_span(batches: Sequence[Batch]) -> tuple[float, float] | None:
     """None where no batch holds an unbroken stretch for a spectrum."""
-    found = [roughness_mps2(spectra_of(batch), batch.mean_speed_mps) for batch in batches]
-    known = [one for one in found if math.isfinite(one)]
+    roughness = [roughness_mps2(spectra_of(batch), batch.mean_speed_mps) for batch in batches]
+    known = [one for one in roughness if math.isfinite(one)]
     return _span(known) if known else None
 
 
@@ -166,7 +155,7 @@ def _provenance(campaign: Campaign, split: Sequence[SplitRun], command: str) -> 
             RunPart(
                 number=one.identification.number,
                 log=one.identification.name,
-                sha256=one.sha256,
+                sha256=one.log.sha256,
                 payload_kg=one.identification.payload_kg,
                 front_share_pct=one.identification.front_share_pct,
                 n_batches=len([batch for batch in one.identification.batches if not batch.rejected]),

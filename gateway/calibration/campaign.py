@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CampaignError
-from gateway.toml_file import load_toml
+from gateway.toml_file import checked, read_toml
 
 OnRun = Callable[[int, int], None]  # (runs done, runs in all)
 
@@ -110,6 +110,13 @@ class CampaignTable(_Table):
     runs: tuple[RunTable, ...] = Field(min_length=1, description="the drives, numbered from 1 in this order")
 
 
+class DraftTable(CampaignTable):
+    """A campaign file in which signals and runs may still be missing."""
+
+    signals: str = ""
+    runs: tuple[RunTable, ...] = ()
+
+
 class Campaign:
     """A campaign file with its paths resolved and its vehicle in the core's terms."""
 
@@ -136,9 +143,14 @@ class Campaign:
         return front_share_pct(self.vehicle, run.payload_kg, run.payload_position_m)
 
 
-def load_campaign(path: Path) -> Campaign:
-    """Raises CampaignError naming every fault of the file, logs that are not there and loads that cannot be."""
-    campaign = Campaign(path, load_toml(path, CampaignTable, CampaignError))
+def load_campaign(path: Path, *, may_lack_runs: bool = False) -> Campaign:
+    """Raises CampaignError naming every fault of the file, logs that are not there and loads that cannot be.
+
+    ``may_lack_runs`` takes a file whose runs, and signals, are still to be written.
+    """
+    tables = read_toml(path, CampaignError)
+    model = DraftTable if may_lack_runs and not tables.get("runs") else CampaignTable
+    campaign = Campaign(path, checked(tables, path, model, CampaignError))
     faults = [
         f"{path}: runs[{i}].{fault}" for i, run in enumerate(campaign.runs, 1) for fault in _faults(campaign, run)
     ]
@@ -156,19 +168,6 @@ def _faults(campaign: Campaign, run: RunTable) -> Iterator[str]:
             f"payload_position_m: {run.payload_kg:g} kg at {run.payload_position_m:g} m would put {share_pct:.0f} % of "
             "the weight on the front axle and lift the other; it is measured from the front axle rearwards"
         )
-
-
-class DraftTable(CampaignTable):
-    """A campaign file in which signals and runs may still be missing."""
-
-    signals: str = ""
-    runs: tuple[RunTable, ...] = ()
-
-
-def load_draft(path: Path) -> Campaign:
-    """A campaign, complete or still without runs. Raises CampaignError as load_campaign does."""
-    draft = load_toml(path, DraftTable, CampaignError)
-    return load_campaign(path) if draft.runs else Campaign(path, draft)
 
 
 def chosen_runs(campaign: Campaign, numbers: Sequence[int] | None) -> list[tuple[int, RunTable]]:

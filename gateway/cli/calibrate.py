@@ -9,17 +9,19 @@ from typing import get_args
 import click
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
-from gateway.calibration.campaign import Campaign, load_campaign, load_draft
+from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
 from gateway.calibration.plan import LoadPlan, plan_first, plan_next
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
-from gateway.cli.progress import bar, counted
+from gateway.cli.progress import counted
 from gateway.cli.text.inspection import inspection_json, inspection_sentences
 from gateway.cli.text.plan import plan_sentences
 from gateway.config import ESTIMATOR_NAMES
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError, ConfigurationError
 from gateway.offline.campaigns import inspect
 from gateway.records import json_line
@@ -72,38 +74,47 @@ def calibrate(
     if wants_curve and report is None:
         raise click.UsageError("--learning-curve is part of a report: name its directory with --report")
     _require_places(output, report)
-    if wants_plan and not (draft := load_draft(campaign)).runs:
-        plan = plan_first(draft.vehicle)
-        click.echo(json_line({"plan": plan.to_json()}) if as_json else plan_sentences(plan))
+    loaded = load_campaign(campaign, may_lack_runs=wants_plan)
+    if not loaded.runs:
+        _plan_first(loaded.vehicle, as_json=as_json)
         return
-    loaded = load_campaign(campaign)
-    inspection = _inspect(loaded, numbers, window_s)
-    if only_checks or inspection.refusal is not None or not as_json:
-        click.echo(json_line(inspection_json(inspection)) if as_json else inspection_sentences(inspection))
+    inspection = _inspect(loaded, numbers, batch_settings(window_s))
+    _tell_inspection(inspection, as_json=as_json, is_all=only_checks)
     if inspection.refusal is not None:
         raise CalibrationImpossibleError(f"{campaign}: {inspection.refusal}; the findings say what to mend")
     if only_checks:
         return
-    command = shlex.join(["springscale", *sys.argv[1:]])
     outcome = calibrate_inspected(
         loaded,
         inspection,
         estimators=estimators or ESTIMATOR_NAMES,
         bands=bands,
         structure=structure,
-        command=command,
+        command=shlex.join(["springscale", *sys.argv[1:]]),
     )
-    found = outcome.file
     if output is not None:
-        _write(output, found)
+        _write(output, outcome.file)
     if report is not None:
         _report(report, loaded, outcome, _curve(loaded, outcome) if wants_curve else None)
-    next_runs = plan_next(outcome, loaded.vehicle) if wants_plan else None
+    plan = plan_next(outcome, loaded.vehicle) if wants_plan else None
     if as_json:
-        summary = _summary(found, output, next_runs) | {"inspection": inspection_json(inspection)}
-        click.echo(json_line(summary))
+        click.echo(json_line(_record(outcome.file, output, plan) | {"inspection": inspection_json(inspection)}))
     else:
-        click.echo(_sentences(found, output, next_runs, said=inspection.warnings))
+        click.echo(_sentences(outcome.file, output, plan, said=inspection.warnings))
+
+
+def _plan_first(vehicle: Vehicle, *, as_json: bool) -> None:
+    """--plan before any drive."""
+    plan = plan_first(vehicle)
+    click.echo(json_line({"plan": plan.to_json()}) if as_json else plan_sentences(plan))
+
+
+def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> None:
+    """For people always; as JSON where no calibration follows whose object would hold it."""
+    if not as_json:
+        click.echo(inspection_sentences(inspection))
+    elif is_all or inspection.refusal is not None:
+        click.echo(json_line(inspection_json(inspection)))
 
 
 def _require_places(output: Path | None, report: Path | None) -> None:
@@ -116,22 +127,17 @@ def _require_places(output: Path | None, report: Path | None) -> None:
         raise click.UsageError(f"--report {report}: is a file, a directory is wanted")
 
 
-def _write(output: Path, found: CalibrationFile) -> None:
+def _write(output: Path, file: CalibrationFile) -> None:
     try:
-        output.write_text(found.to_json(), encoding="utf-8")
+        output.write_text(file.to_json(), encoding="utf-8")
     except OSError as fault:
         raise ConfigurationError(f"{output}: cannot be written: {fault.strerror}") from None
 
 
-def _inspect(campaign: Campaign, numbers: Sequence[int] | None, window_s: float | None) -> Inspection:
+def _inspect(campaign: Campaign, numbers: Sequence[int] | None, settings: BatchSettings) -> Inspection:
     """The chosen drives read and inspected, a bar telling how far."""
-    with bar(len(campaign.runs) if numbers is None else len(numbers), "reading drives") as progress:
-        return inspect(
-            campaign,
-            batch_settings(window_s),
-            numbers=numbers,
-            on_run=lambda done, of: progress.update(done - progress.pos),
-        )
+    with counted("reading drives") as on_run:
+        return inspect(campaign, settings, numbers=numbers, on_run=on_run)
 
 
 def _curve(campaign: Campaign, outcome: Outcome) -> LearningCurve:
@@ -153,26 +159,26 @@ def _report(directory: Path, campaign: Campaign, outcome: Outcome, curve: Learni
     click.echo(str(written), err=True)
 
 
-def _summary(found: CalibrationFile, output: Path | None, plan: LoadPlan | None) -> dict[str, object]:
+def _record(file: CalibrationFile, output: Path | None, plan: LoadPlan | None) -> dict[str, object]:
     return {
-        "calibration_id": found.id,
+        "calibration_id": file.id,
         "output": str(output) if output else None,
-        "estimators": list(found.estimators),
-        "seen": found.seen.model_dump(mode="json"),
-        "expected_errors": {name: errors.model_dump(mode="json") for name, errors in found.expected_errors.items()},
-        "warnings": list(found.warnings),
+        "estimators": list(file.estimators),
+        "seen": file.seen.model_dump(mode="json"),
+        "expected_errors": {name: errors.model_dump(mode="json") for name, errors in file.expected_errors.items()},
+        "warnings": list(file.warnings),
         **({"plan": plan.to_json()} if plan else {}),
     }
 
 
-def _sentences(found: CalibrationFile, output: Path | None, plan: LoadPlan | None, said: Sequence[str]) -> str:
+def _sentences(file: CalibrationFile, output: Path | None, plan: LoadPlan | None, said: Sequence[str]) -> str:
     """What was calibrated, with the warnings that are not ``said`` above it."""
-    low, high = found.seen.payload_kg
+    low, high = file.seen.payload_kg
     lines = [
-        f"{output or 'no file written'}: {', '.join(found.estimators)}; payloads {low:g} to {high:g} kg, "
-        f"{len(found.provenance.runs)} runs, {sum(run.n_batches for run in found.provenance.runs)} batches",
-        f"id {found.id}",
-        *(f"warning: {warning}" for warning in found.warnings if warning not in said),
+        f"{output or 'no file written'}: {', '.join(file.estimators)}; payloads {low:g} to {high:g} kg, "
+        f"{len(file.provenance.runs)} runs, {sum(run.n_batches for run in file.provenance.runs)} batches",
+        f"id {file.id}",
+        *(f"warning: {warning}" for warning in file.warnings if warning not in said),
         *([plan_sentences(plan)] if plan else []),
     ]
     return "\n".join(lines)

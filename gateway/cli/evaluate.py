@@ -9,7 +9,7 @@ from gateway.calibration.file.calibration_file import CalibrationFile, load_cali
 from gateway.calibration.judgement.assessment import Part, assess_evaluation
 from gateway.calibration.judgement.evaluation import Errors, ErrorTable, Judged, TargetErrors, error_table
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
-from gateway.cli.progress import bar, counted
+from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import Split, judge_campaign
 from gateway.records import json_line
@@ -37,14 +37,14 @@ def evaluate(
     chosen = estimator or held.estimators[0]
     if chosen not in held.estimators:
         raise ConfigurationError(f"{calibration}: holds no calibration for {chosen}, only {', '.join(held.estimators)}")
-    with bar(len(loaded.runs), "reading drives") as progress:
+    with counted("reading drives") as on_run:
         judged = judge_campaign(
             loaded,
             held.for_core(),
             batch_settings(window_s),
             estimator=chosen,
             split=split,
-            on_run=lambda done, of: progress.update(done - progress.pos),
+            on_run=on_run,
         )
     table = error_table(judged, loaded.vehicle, chosen)
     click.echo(json_line(table.to_json()) if as_json else _text(table))

@@ -2,19 +2,14 @@
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
-from typing import Any, Final
+from typing import Final, Protocol
 
 import click
 
 SHOWN_EVERY_S: Final = 0.2
-
-
-def bar(length: int, label: str) -> AbstractContextManager[Any]:
-    """click's bar over ``length`` steps; ``.update(n)`` moves it on by n, ``.pos`` tells where it stands."""
-    return click.progressbar(length=length, label=label, file=sys.stderr, hidden=not sys.stderr.isatty())
 
 
 class StatusLine(AbstractContextManager["StatusLine"]):
@@ -38,13 +33,20 @@ class StatusLine(AbstractContextManager["StatusLine"]):
             click.echo("\r\x1b[K", err=True, nl=False)
 
 
-@contextmanager
-def counted(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar for work that tells its own length: call it with (steps done, steps in all)."""
-    with bar(1, label) as progress:
+class Steps(Protocol):
+    """Moves a bar: steps done, steps in all, and what is done next where it has a name."""
 
-        def on_step(done: int, of: int) -> None:
+    def __call__(self, done: int, of: int, label: str | None = None) -> None: ...
+
+
+@contextmanager
+def counted(label: str) -> Iterator[Steps]:
+    """click's bar for work that tells its own length."""
+    with click.progressbar(length=1, label=label, file=sys.stderr, hidden=not sys.stderr.isatty()) as progress:
+
+        def on_step(done: int, of: int, label: str | None = None) -> None:
             progress.length = of
+            progress.label = label or progress.label
             progress.update(done - progress.pos)
 
         yield on_step

@@ -6,7 +6,7 @@ from typing import Final
 import click
 
 from gateway.cli.options import FILE, as_json
-from gateway.cli.progress import bar
+from gateway.cli.progress import counted
 from gateway.records import json_line
 from gateway.reports.paper.evidence import N_STEPS, Scope
 from gateway.reports.paper.reproduce import reproduce as write_report
@@ -27,14 +27,11 @@ QUICK_LONGEST_S: Final = 155.0  # two thirds of it, which identify, hold one bat
 @as_json
 def reproduce(output: Path, seed: int, quick: bool, workers: int, as_json: bool) -> None:
     """The paper's figures and tables, its numbers beside ours, as report.html with all it is made of."""
-    with bar(N_STEPS, "starting") as progress:
-
-        def show(what: str, done: int, of: int) -> None:
-            progress.label = what
-            progress.update(done - progress.pos)
-
-        report = write_report(output, scope_of(seed, workers, quick=quick), show)
-        progress.update(N_STEPS - progress.pos)
+    with counted("starting") as on_step:
+        report = write_report(
+            output, scope_of(seed, workers, quick=quick), lambda what, done, of: on_step(done, of, what)
+        )
+        on_step(N_STEPS, N_STEPS)
     written = {"report": report, "results": output / "results.json", "accuracy": output / "accuracy.md"}
     click.echo(json_line({name: str(path) for name, path in written.items()}) if as_json else str(report))
 

@@ -10,7 +10,7 @@ import click
 from gateway.bus.sink import ReplayProgress, Speed
 from gateway.cli import options
 from gateway.cli.options import FILE, as_json
-from gateway.cli.progress import StatusLine, bar
+from gateway.cli.progress import StatusLine, counted
 from gateway.records import json_line
 from gateway.sim.vans import VANS
 from gateway.workbench.campaigns import PLANS
@@ -66,11 +66,9 @@ def simulate() -> None:
 def campaign(directory: Path, workers: int, as_json: bool, **bench_options: Any) -> None:
     """Write a campaign of this KIND to DIRECTORY: campaign.toml, signal map, one log a drive, truth.csv."""
     bench = bench_of(**bench_options)
-    with bar(len(bench.plan().drives), "driving") as progress:
-        path = write_campaign(
-            bench, directory, workers=workers, on_drive=lambda done, of: progress.update(done - progress.pos)
-        )
-        n_drives = progress.pos
+    with counted("driving") as on_drive:
+        path = write_campaign(bench, directory, workers=workers, on_drive=on_drive)
+    n_drives = len(bench.plan().drives)
     click.echo(json_line({"campaign": str(path), "n_drives": n_drives}) if as_json else str(path))
 
 

@@ -13,7 +13,6 @@ from gateway.calibration.inspection.campaign import inspect_campaign
 from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.inspection.log import LogFacts
 from gateway.calibration.inspection.rows import row_facts
-from gateway.calibration.inspection.run import Inspected
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
@@ -40,22 +39,22 @@ def split_runs(
 ) -> list[SplitRun]:
     """Reads the logs of the chosen runs. Batches begin anew at the cut between the two parts.
 
-    Raises LogUnreadableError for a log that cannot be read, or keeps it as a run without rows whose ``read`` says why.
+    Raises LogUnreadableError for a log that cannot be read, or keeps it as a run without rows whose ``log`` says why.
     """
     signal_map = load_signal_map(campaign.signals)
     runs = chosen_runs(campaign, numbers)
-    found = []
+    drives = []
     for done, (number, run) in enumerate(runs):
         on_run(done, len(runs))
         try:
-            found.append(_split_run(campaign, number, run, signal_map, settings))
+            drives.append(_split_run(campaign, number, run, signal_map, settings))
         except LogUnreadableError as fault:
             if not keeps_unreadable:
                 raise
             blank = KnownRun(number, str(run.log), run.payload_kg, campaign.front_share_pct(run), ())
-            found.append(SplitRun(campaign.log_of(run), "", blank, blank, read=LogFacts(unreadable=str(fault))))
+            drives.append(SplitRun(blank, blank, log=LogFacts(unreadable=str(fault))))
     on_run(len(runs), len(runs))
-    return found
+    return drives
 
 
 def _split_run(
@@ -70,16 +69,15 @@ def _split_run(
         rows = rows_within(motion, stretch) if stretch and len(motion) else motion.part(0, 0)
         batches = batches_of_motion(rows, signal_map, settings)
         parts.append(KnownRun(number, str(run.log), run.payload_kg, campaign.front_share_pct(run), batches))
-    sha256 = file_sha256(log)
-    read = LogFacts(
-        sha256=sha256,
+    log_facts = LogFacts(
+        sha256=file_sha256(log),
         duration_s=float(np.ptp(whole.t_ns)) / NS_PER_S,
         start_s=run.start_s,
         span_ns=(int(motion.t_ns.min()), int(motion.t_ns.max())) if len(motion) else None,
         damage=_damage(report),
     )
     facts = row_facts(motion, signal_map.traits)
-    return SplitRun(log, sha256, parts[0], parts[1], facts, stretches[0] is not None, read)
+    return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)
 
 
 def _damage(report: LogReport) -> str | None:
@@ -113,10 +111,7 @@ def inspect(
 ) -> Inspection:
     """Reads the logs of the chosen runs and tells of each what is wrong with it, if anything."""
     split = split_runs(campaign, settings, numbers=numbers, on_run=on_run, keeps_unreadable=True)
-    inspected = [
-        Inspected(one.identification, one.validation, one.facts, one.has_identification, one.read) for one in split
-    ]
-    verdicts, findings = inspect_campaign(inspected, campaign.vehicle, settings)
+    verdicts, findings = inspect_campaign(split, campaign.vehicle, settings)
     return Inspection(tuple(split), verdicts, findings)
 
 

@@ -13,7 +13,7 @@ from gateway.bus.signals.signal_map import load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.cli import main, springscale
 from gateway.cli import reproduce as reproduce_command
-from gateway.cli.progress import StatusLine, bar
+from gateway.cli.progress import StatusLine, counted
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.reports.paper.evidence import Scope
@@ -152,9 +152,8 @@ def test_reproduce_drives_what_was_asked_for(
 
 
 def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[str]) -> None:
-    with bar(2, "working") as progress:
-        progress.update(2)
-        assert progress.pos == 2
+    with counted("working") as on_step:
+        on_step(2, 2)
     with StatusLine() as status:
         status.show("half way")
     told = capsys.readouterr()
@@ -163,8 +162,8 @@ def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[s
 
 def test_progress_is_seen_at_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with bar(2, "working") as progress:
-        progress.update(1)
+    with counted("working") as on_step:
+        on_step(1, 2)
     with StatusLine() as status:
         status.show("half way")
         status.show("too soon to be shown")

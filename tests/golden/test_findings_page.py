@@ -6,8 +6,9 @@ from pathlib import Path
 import make_findings
 import pytest
 
+from gateway.calibration.inspection.explained import EXPLAINED, finding_of
 from gateway.calibration.inspection.finding import Severity
-from gateway.calibration.inspection.kinds import EXPLAINED, Kind, found
+from gateway.calibration.inspection.kinds import Kind
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "findings.md").read_text(encoding="utf-8")
@@ -31,4 +32,4 @@ def test_every_finding_is_found_somewhere_in_the_code(kind: Kind) -> None:
 
 def test_a_finding_has_no_other_weight_than_the_page_says() -> None:
     with pytest.raises(ValueError, match="smooth_road is never a fault"):
-        found(Kind.SMOOTH_ROAD, Severity.FAULT, "")
+        finding_of(Kind.SMOOTH_ROAD, Severity.FAULT, "")

@@ -12,7 +12,8 @@ from gateway.bus.signals.signal_map import load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.inspection.rows import row_facts
-from gateway.calibration.inspection.run import Inspected, inspect_run
+from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
@@ -60,7 +61,7 @@ def test_a_spoiled_signal_map_is_named(
     motion = rows_within(read_whole_log(loaded.log_of(run), signal_map)[0], Stretch(0.0, 700.0))
     batches = batches_of_motion(motion, signal_map, SETTINGS)
     known = KnownRun(log, str(run.log), run.payload_kg, loaded.front_share_pct(run), batches)
-    one = Inspected(known, KnownRun(log, "", 0.0, 0.0, ()), row_facts(motion, signal_map.traits))
+    one = SplitRun(known, KnownRun(log, "", 0.0, 0.0, ()), row_facts(motion, signal_map.traits))
     faults = [
         finding.kind for finding in inspect_run(one, loaded.vehicle, SETTINGS).findings if finding.severity == "fault"
     ]

@@ -8,7 +8,8 @@ from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.signal_map import SignalMap, load_signal_map
 from gateway.calibration.inspection.finding import RunVerdict
 from gateway.calibration.inspection.rows import row_facts
-from gateway.calibration.inspection.run import Inspected, inspect_run
+from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import Traits
 from gateway.core.scheduler import Scheduler
@@ -92,7 +93,7 @@ def verdict_on(
     scheduler = Scheduler(settings, traits)
     batches = (*scheduler.feed(motion), *scheduler.flush())
     run = KnownRun(1, "a.log", load[0], front_share_pct(vehicle, *load), batches)
-    return inspect_run(Inspected(run, replace(run, batches=()), row_facts(motion, traits)), vehicle, settings)
+    return inspect_run(SplitRun(run, replace(run, batches=()), row_facts(motion, traits)), vehicle, settings)
 
 
 def kinds(verdict: RunVerdict) -> list[str]:

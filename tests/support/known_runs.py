@@ -1,7 +1,6 @@
 """Known-load drives of the half-car of support.half_car_road, as calibration reads them."""
 
-from pathlib import Path
-
+from gateway.calibration.inspection.log import LogFacts
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.half_car import HalfCar
@@ -35,7 +34,7 @@ def split_run(number: int, payload_kg: float, position_m: float | None, seed: in
     identification, validation = (
         KnownRun(number, both.name, both.payload_kg, both.front_share_pct, (batch,)) for batch in both.batches
     )
-    return SplitRun(Path(both.name), "0" * 64, identification, validation)
+    return SplitRun(identification, validation, log=LogFacts(sha256="0" * 64))
 
 
 def campaign(seed: int = 1) -> tuple[SplitRun, ...]:

@@ -9,6 +9,7 @@ from support.calibrated import calibration_file
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
+from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.judgement.assessment import Assessment, Judgement, Part
 from gateway.calibration.judgement.evaluation import Judged, error_table
@@ -49,7 +50,7 @@ def verdict(
     file = calibration_file().model_copy(update={"warnings": warnings})
     parts = {Part.LEFT_OUT: left_out} if left_out else {}
     parts |= {Part.VALIDATION: validation} if validation else {}
-    outcome = None if runs is None else Outcome(file, runs, (), None, None)
+    outcome = None if runs is None else Outcome(file, Inspection((), runs, ()))
     (found,) = verdicts_of(Assessment("", file, VAN, (judgement(parts),), outcome), expected)
     return found
 

@@ -7,12 +7,13 @@ from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS, campaign, known_run
 
 from gateway.calibration.inspection.campaign import inspect_campaign, load_findings
+from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
 from gateway.calibration.inspection.inspection import Inspection
-from gateway.calibration.inspection.kinds import Kind, found
+from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.inspection.loads import _Labelled, compare_loads
 from gateway.calibration.inspection.rows import RowFacts
-from gateway.calibration.inspection.run import Inspected
+from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 
@@ -95,8 +96,8 @@ def test_a_load_that_was_noted_wrong_is_told_with_what_the_others_weigh(runs: li
     assert weighed_kg == pytest.approx(100.0, abs=40.0)
 
 
-def inspected(run: KnownRun) -> Inspected:
-    return Inspected(run, replace(run, batches=()), RowFacts())
+def inspected(run: KnownRun) -> SplitRun:
+    return SplitRun(run, replace(run, batches=()), RowFacts())
 
 
 def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_of(runs: list[KnownRun]) -> None:
@@ -115,8 +116,8 @@ def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_o
     assert told == {1: [], 2: [], 3: [], 4: [], 5: [Kind.SPEED_DIFFERS], 6: [Kind.SMOOTH_ROAD]}
 
 
-FAULT = found(Kind.PITCH_RATE_SIGN, Severity.FAULT, "it is turned")
-WARNING = found(Kind.SMOOTH_ROAD, Severity.WARNING, "it is smooth")
+FAULT = finding_of(Kind.PITCH_RATE_SIGN, Severity.FAULT, "it is turned")
+WARNING = finding_of(Kind.SMOOTH_ROAD, Severity.WARNING, "it is smooth")
 
 
 def inspection(*findings: tuple[Finding, ...]) -> Inspection:

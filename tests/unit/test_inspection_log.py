@@ -9,7 +9,7 @@ from gateway.calibration.inspection.campaign import inspect_campaign
 from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.inspection.log import LogFacts, log_findings, same_drive_findings
 from gateway.calibration.inspection.rows import RowFacts
-from gateway.calibration.inspection.run import Inspected
+from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 
@@ -54,7 +54,7 @@ def test_two_runs_on_one_drive_are_found(other: LogFacts, load: tuple[float, flo
 
 def test_a_run_without_a_readable_log_is_told_once_and_a_load_far_beyond_the_range_is_doubted() -> None:
     nothing = KnownRun(1, "a.log", 4200.0, 60.0, ())
-    unreadable = Inspected(nothing, nothing, RowFacts(), log=LogFacts(unreadable="a.log: holds no CAN frame"))
+    unreadable = SplitRun(nothing, nothing, RowFacts(), log=LogFacts(unreadable="a.log: holds no CAN frame"))
     ((verdict,), _) = inspect_campaign([unreadable], VAN, BatchSettings())
     assert [finding.kind for finding in verdict.findings] == [Kind.LOG_UNREADABLE, Kind.LOAD_BEYOND_RANGE]
     assert not verdict.is_usable

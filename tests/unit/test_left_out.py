@@ -9,7 +9,7 @@ from support.known_load_logs import write_known_loads
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.judgement.left_out import judged_left_out
+from gateway.calibration.judgement.assessment import judged_left_out
 from gateway.calibration.ratio_index import fit_regression, index_rows
 from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import calibrate
@@ -57,7 +57,7 @@ def test_where_no_choice_can_be_made_anew_bands_and_terms_stay(tmp_path: Path) -
 
 
 def test_two_runs_leave_nothing_to_learn_from(outcome: Outcome) -> None:
-    assert judged_left_out(replace(outcome, cross_spectrum_without={}), "cross_spectrum") == []
+    assert judged_left_out(replace(outcome, cross_spectrum=None), "cross_spectrum") == []
 
 
 def test_the_logs_are_of_the_campaign(outcome: Outcome) -> None:

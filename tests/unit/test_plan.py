@@ -11,7 +11,9 @@ from support.half_car_road import VAN
 from support.known_runs import split_run
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import CrossSpectrumFit, calibrate_cross_spectrum
+from gateway.calibration.inspection.finding import RunVerdict
+from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, usual_drive
 from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
 from gateway.cli import springscale
@@ -62,7 +64,8 @@ def outcome() -> Outcome:
     """After the empty vehicle and one light load."""
     split = (split_run(1, 0.0, None), split_run(2, 150.0, 1.4))
     found = calibrate_cross_spectrum([one.identification for one in split], VAN)
-    return Outcome(calibration_file(), (), split, None, found)
+    verdicts = tuple(RunVerdict(one.identification.number, one.identification.name) for one in split)
+    return Outcome(calibration_file(), Inspection(split, verdicts, ()), cross_spectrum=CrossSpectrumFit(found, {}))
 
 
 def test_after_two_runs_a_heavy_load_comes_next(outcome: Outcome) -> None:

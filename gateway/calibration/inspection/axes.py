@@ -20,8 +20,9 @@ import numpy as np
 from gateway.calibration.half_car.fit import fit_half_car
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT, KnownSpectra
 from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind, found
+from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import COHERENCE_BAND_HZ
 from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model
@@ -182,18 +183,18 @@ def apart_findings(spectra: CrossSpectra, seen: Phases) -> Iterator[Finding]:
     is_vehicle = likely.best >= LEAST_AGREEMENT and USUAL_SCALE[0] <= likely.scale <= USUAL_SCALE[1]
     if coherence < LEAST_COHERENCE and not is_vehicle:
         text = f"coherence of pitch_rate and vertical_acceleration is {coherence:.2f}, their phases agree with a "
-        yield found(Kind.PITCH_RATE_AXIS, Severity.FAULT, f"{text}vehicle's by {likely.best:.2f}")
+        yield finding_of(Kind.PITCH_RATE_AXIS, Severity.FAULT, f"{text}vehicle's by {likely.best:.2f}")
 
 
 def phase_findings(seen: Phases, speed_misread: str | None) -> Iterator[Finding]:
     """Unit of the speed, unit and sign of the pitch rate beside a vertical acceleration that is right."""
     if speed_misread is not None:
         text = f"phases agree with the vehicle's by {seen.best:.2f} if {speed_misread}, by far less as it is"
-        yield found(Kind.SPEED_UNIT, Severity.FAULT, text)
+        yield finding_of(Kind.SPEED_UNIT, Severity.FAULT, text)
     yield from _scale_findings(seen.likely)
     if seen.is_turned:
         text = f"phases agree with the vehicle's by {seen.turned.best:.2f} turned over, "
-        yield found(Kind.PITCH_RATE_SIGN, Severity.FAULT, f"{text}by {seen.upright.best:.2f} as they are")
+        yield finding_of(Kind.PITCH_RATE_SIGN, Severity.FAULT, f"{text}by {seen.upright.best:.2f} as they are")
 
 
 def _scale_findings(seen: Agreement) -> Iterator[Finding]:
@@ -201,11 +202,11 @@ def _scale_findings(seen: Agreement) -> Iterator[Finding]:
         return
     text = f"pitch_rate is {seen.scale:.3g} times what a vehicle has beside this vertical acceleration"
     if UNIT_RANGE[0] <= seen.scale / DEGREES <= UNIT_RANGE[1]:
-        yield found(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text}: deg/s taken for rad/s")
+        yield finding_of(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text}: deg/s taken for rad/s")
     elif UNIT_RANGE[0] <= seen.scale * DEGREES <= UNIT_RANGE[1]:
-        yield found(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text}: rad/s taken for deg/s")
+        yield finding_of(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text}: rad/s taken for deg/s")
     else:
-        yield found(Kind.PITCH_RATE_UNIT, Severity.FAULT, text)
+        yield finding_of(Kind.PITCH_RATE_UNIT, Severity.FAULT, text)
 
 
 def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Iterator[Finding]:
@@ -218,7 +219,7 @@ def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) ->
     if off_m > max(POSITION_OFF_M, doubt_m):
         is_wrong = off_m > max(POSITION_WRONG_M, doubt_m)
         text = f"sensor_position_m is {vehicle.sensor_position_m:g}, the spectra say {position_m:.2f} +- {std_m:.2f}"
-        yield found(Kind.SENSOR_POSITION, Severity.FAULT if is_wrong else Severity.WARNING, text)
+        yield finding_of(Kind.SENSOR_POSITION, Severity.FAULT if is_wrong else Severity.WARNING, text)
 
 
 def fitted_position_m(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> tuple[float, float]:

@@ -6,11 +6,13 @@ from typing import Final
 
 import numpy as np
 
+from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
-from gateway.calibration.inspection.kinds import Kind, found
+from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.inspection.loads import compare_loads
 from gateway.calibration.inspection.log import same_drive_findings
-from gateway.calibration.inspection.run import Inspected, inspect_run
+from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
@@ -24,20 +26,18 @@ TOGETHER: Final = 0.97  # correlation of payload and share above which they are 
 
 
 def inspect_campaign(
-    inspected: Sequence[Inspected], vehicle: Vehicle, settings: BatchSettings
+    drives: Sequence[SplitRun], vehicle: Vehicle, settings: BatchSettings
 ) -> tuple[tuple[RunVerdict, ...], tuple[Finding, ...]]:
     """A verdict for every run in the order given, and what is to say of the campaign as a whole."""
-    verdicts = {one.identification.number: inspect_run(one, vehicle, settings) for one in inspected}
+    verdicts = {one.identification.number: inspect_run(one, vehicle, settings) for one in drives}
     for number, finding in (
-        *_same_drives(inspected),
-        *_beyond_range(inspected, vehicle),
-        *_beside_the_others(inspected),
+        *_same_drives(drives),
+        *_beyond_range(drives, vehicle),
+        *_beside_the_others(drives),
     ):
         verdicts[number] = _with(verdicts[number], finding)
     sound = [
-        one.identification
-        for one in inspected
-        if one.has_identification and verdicts[one.identification.number].is_usable
+        one.identification for one in drives if one.has_identification and verdicts[one.identification.number].is_usable
     ]
     for number, finding in compare_loads(sound, vehicle):
         verdicts[number] = _with(verdicts[number], finding)
@@ -49,24 +49,24 @@ def _with(verdict: RunVerdict, finding: Finding) -> RunVerdict:
     return replace(verdict, findings=(*verdict.findings, finding))
 
 
-def _same_drives(inspected: Sequence[Inspected]) -> Iterator[tuple[int, Finding]]:
-    runs = {one.identification.number: one for one in inspected}
+def _same_drives(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Finding]]:
+    runs = {one.identification.number: one for one in drives}
     loads = {number: (one.run.payload_kg, one.run.front_share_pct) for number, one in runs.items()}
     return same_drive_findings({number: one.log for number, one in runs.items()}, loads)
 
 
-def _beyond_range(inspected: Sequence[Inspected], vehicle: Vehicle) -> Iterator[tuple[int, Finding]]:
+def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> Iterator[tuple[int, Finding]]:
     low_kg, high_kg = vehicle.payload_range_kg
-    for one in inspected:
+    for one in drives:
         payload_kg = one.identification.payload_kg
         if payload_kg > high_kg + BEYOND_RANGE_BY * (high_kg - low_kg):
             text = f"{payload_kg:g} kg, payload_range_kg ends at {high_kg:g} kg"
-            yield one.identification.number, found(Kind.LOAD_BEYOND_RANGE, Severity.WARNING, text)
+            yield one.identification.number, finding_of(Kind.LOAD_BEYOND_RANGE, Severity.WARNING, text)
 
 
-def _beside_the_others(inspected: Sequence[Inspected]) -> Iterator[tuple[int, Finding]]:
+def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Finding]]:
     """Runs at another speed, or on a far smoother road, than the median run."""
-    counted = [(one.identification.number, [b for b in one.batches if not b.rejected]) for one in inspected]
+    counted = [(one.identification.number, [b for b in one.batches if not b.rejected]) for one in drives]
     runs = [(number, batches) for number, batches in counted if batches]
     if len(runs) < 3:
         return
@@ -78,10 +78,10 @@ def _beside_the_others(inspected: Sequence[Inspected]) -> Iterator[tuple[int, Fi
     for (number, _), speed_mps, shakes_mps2 in zip(runs, speeds_mps, shaking_mps2, strict=True):
         if abs(speed_mps / usual_mps - 1.0) > SPEED_DIFFERS_BY:
             text = f"{speed_mps:.1f} m/s in the mean, the median run {usual_mps:.1f} m/s"
-            yield number, found(Kind.SPEED_DIFFERS, Severity.NOTE, text)
+            yield number, finding_of(Kind.SPEED_DIFFERS, Severity.NOTE, text)
         if shakes_mps2 * SMOOTHER_BY < usual_mps2:
             text = f"vertical acceleration scatters by {shakes_mps2:.2g} m/s2, in the median run by {usual_mps2:.2g}"
-            yield number, found(Kind.SMOOTH_ROAD, Severity.WARNING, text)
+            yield number, finding_of(Kind.SMOOTH_ROAD, Severity.WARNING, text)
 
 
 def load_findings(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[Finding]:
@@ -91,13 +91,13 @@ def load_findings(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[Findin
     loads = sorted({(run.payload_kg, round(run.front_share_pct, 2)) for run in runs})
     payload_kg, share_pct = (np.array(column) for column in zip(*loads, strict=True))
     if np.ptp(payload_kg) == 0.0:
-        yield found(Kind.ONE_LOAD_ONLY, Severity.WARNING, f"{payload_kg[0]:g} kg in every run that can be used")
+        yield finding_of(Kind.ONE_LOAD_ONLY, Severity.WARNING, f"{payload_kg[0]:g} kg in every run that can be used")
         return
     if np.ptp(payload_kg) < ALIKE_SHARE * vehicle.empty_mass_kg:
         text = f"{payload_kg.min():g} to {payload_kg.max():g} kg on a vehicle of {vehicle.empty_mass_kg:g} kg"
-        yield found(Kind.LOADS_ALIKE, Severity.WARNING, text)
+        yield finding_of(Kind.LOADS_ALIKE, Severity.WARNING, text)
     if np.ptp(share_pct) < SHARES_ALIKE_PCT:
         text = f"{share_pct.min():.1f} to {share_pct.max():.1f} %"
-        yield found(Kind.SHARES_ALIKE, Severity.WARNING, text)
+        yield finding_of(Kind.SHARES_ALIKE, Severity.WARNING, text)
     elif len(loads) >= 3 and abs(correlation := float(np.corrcoef(payload_kg, share_pct)[0, 1])) > TOGETHER:
-        yield found(Kind.LOAD_AND_SHARE_TOGETHER, Severity.WARNING, f"their correlation is {correlation:.2f}")
+        yield finding_of(Kind.LOAD_AND_SHARE_TOGETHER, Severity.WARNING, f"their correlation is {correlation:.2f}")

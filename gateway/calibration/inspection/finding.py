@@ -21,6 +21,10 @@ class Finding:
     text: str
     advice: str
 
+    def to_json(self) -> dict[str, str]:
+        """As ``calibrate --json`` and the report's numbers hold it."""
+        return {"kind": str(self.kind), "severity": str(self.severity), "text": self.text, "advice": self.advice}
+
 
 @dataclass(frozen=True, slots=True)
 class RunVerdict:

@@ -15,8 +15,9 @@ import numpy as np
 from gateway.calibration.half_car.fit import fit_half_car, half_car_calibration
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
 from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind, found
+from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import locate
 from gateway.core.cross_spectrum.likelihood import Point
@@ -139,7 +140,7 @@ def _swap_findings(all_runs: _Labelled, i: int, j: int, evidence: float) -> Iter
     for n in (i, j):
         yield (
             all_runs.known[n].run.number,
-            found(Kind.LOADS_SWAPPED, Severity.FAULT, text + _weighed(all_runs, n, (i, j))),
+            finding_of(Kind.LOADS_SWAPPED, Severity.FAULT, text + _weighed(all_runs, n, (i, j))),
         )
 
 
@@ -168,7 +169,7 @@ def _disagreements(all_runs: _Labelled) -> Iterator[tuple[int, Finding]]:
             text = f"the other runs weigh this one at {_load(point.payload_kg, point.front_share)}"
             yield (
                 run.number,
-                found(Kind.LOAD_DISAGREES, Severity.WARNING, f"{text}, the file says {_stated(all_runs, i)}"),
+                finding_of(Kind.LOAD_DISAGREES, Severity.WARNING, f"{text}, the file says {_stated(all_runs, i)}"),
             )
 
 

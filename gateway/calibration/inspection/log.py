@@ -4,8 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind, found
+from gateway.calibration.inspection.kinds import Kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +28,12 @@ class LogFacts:
 def log_findings(facts: LogFacts) -> Iterator[Finding]:
     """At most one fault: no log, or no piece of it; or a warning that some of it was lost."""
     if facts.unreadable is not None:
-        yield found(Kind.LOG_UNREADABLE, Severity.FAULT, facts.unreadable)
+        yield finding_of(Kind.LOG_UNREADABLE, Severity.FAULT, facts.unreadable)
     elif facts.span_ns is None:
         text = f"the log lasts {facts.duration_s:.0f} s, the run begins at {facts.start_s:g} s"
-        yield found(Kind.CUT_AWAY, Severity.FAULT, text)
+        yield finding_of(Kind.CUT_AWAY, Severity.FAULT, text)
     elif facts.damage is not None:
-        yield found(Kind.LOG_DAMAGED, Severity.WARNING, facts.damage)
+        yield finding_of(Kind.LOG_DAMAGED, Severity.WARNING, facts.damage)
 
 
 def same_drive_findings(
@@ -45,7 +46,7 @@ def same_drive_findings(
             text = f"runs {one} and {other} are the same drive" + ("" if is_same_load else " with two different loads")
             numbers: Sequence[int] = (other,) if is_same_load else (one, other)
             for number in numbers:
-                yield number, found(Kind.SAME_DRIVE, Severity.FAULT, text)
+                yield number, finding_of(Kind.SAME_DRIVE, Severity.FAULT, text)
 
 
 def _is_same_drive(one: LogFacts, other: LogFacts) -> bool:

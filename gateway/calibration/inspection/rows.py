@@ -7,8 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind, found
+from gateway.calibration.inspection.kinds import Kind
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE, Traits
 from gateway.core.settings import BatchSettings
 from gateway.core.timeline import sample_rate_hz
@@ -90,12 +91,12 @@ def unmapped_findings(facts: RowFacts) -> Iterator[Finding]:
     if not facts.streams:
         return
     if Signal.SPEED not in facts.streams and Signal.WHEEL_SPEED not in facts.streams:
-        yield found(Kind.SIGNAL_UNMAPPED, Severity.FAULT, "neither speed nor wheel_speed is in the signal map")
+        yield finding_of(Kind.SIGNAL_UNMAPPED, Severity.FAULT, "neither speed nor wheel_speed is in the signal map")
     absent = [signal for signal in INERTIAL if signal not in facts.streams]
     if absent:
         severity = Severity.FAULT if len(absent) == len(INERTIAL) else Severity.WARNING
         text = f"{' and '.join(absent)} {'are' if len(absent) > 1 else 'is'} not in the signal map"
-        yield found(Kind.SIGNAL_UNMAPPED, severity, f"{text}; axes and loads cannot be checked")
+        yield finding_of(Kind.SIGNAL_UNMAPPED, severity, f"{text}; axes and loads cannot be checked")
 
 
 def rate_findings(facts: RowFacts, settings: BatchSettings) -> Iterator[Finding]:
@@ -105,15 +106,15 @@ def rate_findings(facts: RowFacts, settings: BatchSettings) -> Iterator[Finding]
         if stream is None:
             continue
         if stream.n < 2:
-            yield found(Kind.SENSOR_SILENT, Severity.FAULT, f"{signal} has {stream.n} samples in the whole run")
+            yield finding_of(Kind.SENSOR_SILENT, Severity.FAULT, f"{signal} has {stream.n} samples in the whole run")
         elif stream.rate_hz < RATE_MIN_SHARE * settings.rate_hz:
             text = (
                 f"{signal} comes at {stream.rate_hz:.3g} Hz, at least {RATE_MIN_SHARE * settings.rate_hz:g} are needed"
             )
-            yield found(Kind.RATE_LOW, Severity.FAULT, text)
+            yield finding_of(Kind.RATE_LOW, Severity.FAULT, text)
         elif not stream.jitter_share <= JITTER_SHARE_MAX:
             share = f"{100.0 * stream.jitter_share:.0f} %" if isfinite(stream.jitter_share) else "more than a whole one"
-            yield found(Kind.JITTER, Severity.WARNING, f"intervals of {signal} are off by {share} of their length")
+            yield finding_of(Kind.JITTER, Severity.WARNING, f"intervals of {signal} are off by {share} of their length")
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,19 +132,19 @@ def gravity_findings(facts: RowFacts) -> tuple[Mended, list[Finding]]:
         return Mended(), []
     if _carries_gravity_instead(facts):
         text = f"vertical_acceleration has mean {stream.mean:.3g}, pitch_rate has {facts.mean(Signal.PITCH_RATE):.3g}"
-        return Mended(is_axis_sound=False), [found(Kind.CHANNELS_SWAPPED, Severity.FAULT, text)]
+        return Mended(is_axis_sound=False), [finding_of(Kind.CHANNELS_SWAPPED, Severity.FAULT, text)]
     reads = f"vertical_acceleration has mean {stream.mean:.3g} m/s2"
     if abs(stream.mean + STANDARD_GRAVITY_MPS2) <= GRAVITY_TOLERANCE_MPS2:
-        return Mended(factor=-1.0), [found(Kind.ACCELERATION_SIGN, Severity.FAULT, reads)]
+        return Mended(factor=-1.0), [finding_of(Kind.ACCELERATION_SIGN, Severity.FAULT, reads)]
     for misread, ratio in MISREAD_AS_MPS2.items():
         is_unit = abs(abs(stream.mean) / STANDARD_GRAVITY_MPS2 / ratio - 1.0) <= UNIT_TOLERANCE
         if is_unit and stream.std < STEADY_SHARE * abs(stream.mean):
             factor = np.sign(stream.mean) / ratio
             turned = "" if factor > 0.0 else ", and its axis points down"
             return Mended(factor=float(factor)), [
-                found(Kind.ACCELERATION_UNIT, Severity.FAULT, f"{reads}: {misread}{turned}")
+                finding_of(Kind.ACCELERATION_UNIT, Severity.FAULT, f"{reads}: {misread}{turned}")
             ]
-    return Mended(is_axis_sound=False), [found(Kind.ACCELERATION_AXIS, Severity.FAULT, reads + _elsewhere(facts))]
+    return Mended(is_axis_sound=False), [finding_of(Kind.ACCELERATION_AXIS, Severity.FAULT, reads + _elsewhere(facts))]
 
 
 def _carries_gravity_instead(facts: RowFacts) -> bool:
@@ -166,7 +167,7 @@ def bias_findings(facts: RowFacts) -> Iterator[Finding]:
     """A pitch rate whose mean no vehicle has."""
     bias = facts.mean(Signal.PITCH_RATE)
     if abs(bias) > BIAS_MAX_RADPS:
-        yield found(Kind.PITCH_RATE_BIAS, Severity.WARNING, f"pitch_rate has mean {np.degrees(bias):.3g} deg/s")
+        yield finding_of(Kind.PITCH_RATE_BIAS, Severity.WARNING, f"pitch_rate has mean {np.degrees(bias):.3g} deg/s")
 
 
 def stands_still_but_shakes(facts: RowFacts) -> bool:

@@ -1,7 +1,6 @@
 """One known-load drive inspected: what its rows, its batches and its cross-spectra say, as a verdict."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from math import sqrt
 from typing import Final
 
@@ -19,9 +18,10 @@ from gateway.calibration.inspection.axes import (
     position_findings,
     reading_of,
 )
+from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
-from gateway.calibration.inspection.kinds import Kind, found
-from gateway.calibration.inspection.log import LogFacts, log_findings
+from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.log import log_findings
 from gateway.calibration.inspection.rows import (
     INERTIAL,
     Mended,
@@ -32,7 +32,7 @@ from gateway.calibration.inspection.rows import (
     stands_still_but_shakes,
     unmapped_findings,
 )
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.inspection.split_run import SplitRun
 from gateway.core.batch import REASON_SHARE_MIN
 from gateway.core.cross_spectrum.measured import LEAST_SEGMENTS, CrossSpectra, cross_spectra_of
 from gateway.core.settings import BatchSettings
@@ -44,48 +44,25 @@ SMOOTH_MPS2: Final = 0.08  # the quietest ordinary road shakes a vehicle more, i
 STEPS_SHARE_MAX: Final = 0.1  # of a signal's power in that band
 
 
-@dataclass(frozen=True, slots=True)
-class Inspected:
-    """A run with all that inspection needs: both its parts, the facts of its rows and of its log;
-    ``has_identification`` is False where the campaign keeps the whole run for validation."""
-
-    identification: KnownRun
-    validation: KnownRun
-    facts: RowFacts
-    has_identification: bool = True
-    log: LogFacts = field(default_factory=LogFacts)
-
-    @property
-    def batches(self) -> tuple[Batch, ...]:
-        """Of both parts."""
-        return self.identification.batches + self.validation.batches
-
-    @property
-    def run(self) -> KnownRun:
-        """The run with the batches of both parts."""
-        one = self.identification
-        return KnownRun(one.number, one.name, one.payload_kg, one.front_share_pct, self.batches)
-
-
-def inspect_run(inspected: Inspected, vehicle: Vehicle, settings: BatchSettings) -> RunVerdict:
+def inspect_run(drive: SplitRun, vehicle: Vehicle, settings: BatchSettings) -> RunVerdict:
     """Every finding of one run, faults first."""
-    one, facts = inspected.identification, inspected.facts
-    of_log = tuple(log_findings(inspected.log))
+    one, facts = drive.identification, drive.facts
+    of_log = tuple(log_findings(drive.log))
     if _has_fault(of_log):
         return RunVerdict(one.number, one.name, of_log)
     acceleration, findings = gravity_findings(facts)
     findings.extend((*of_log, *unmapped_findings(facts), *rate_findings(facts, settings)))
-    findings.extend(_speed_findings(inspected, settings))
-    findings.extend(_masked_findings(inspected))
-    spectra = cross_spectra_of(inspected.batches, reading_of(vehicle))
+    findings.extend(_speed_findings(drive, settings))
+    findings.extend(_masked_findings(drive))
+    spectra = cross_spectra_of(drive.batches, reading_of(vehicle))
     if spectra is None and all(signal in facts.streams for signal in INERTIAL):
-        findings.extend(_unsteady_findings(inspected))
+        findings.extend(_unsteady_findings(drive))
     elif spectra is not None and acceleration.is_axis_sound:
-        findings.extend(_motion_findings(spectra, inspected, vehicle, acceleration))
+        findings.extend(_motion_findings(spectra, drive, vehicle, acceleration))
         findings.extend(_excitation_findings(spectra, facts, acceleration))
     if not {Kind.CHANNELS_SWAPPED, Kind.PITCH_RATE_UNIT} & {finding.kind for finding in findings}:
         findings.extend(bias_findings(facts))
-    findings.extend(_batch_findings(inspected, settings, has_fault=_has_fault(findings)))
+    findings.extend(_batch_findings(drive, settings, has_fault=_has_fault(findings)))
     order = list(Severity)
     return RunVerdict(one.number, one.name, tuple(sorted(findings, key=lambda f: order.index(f.severity))))
 
@@ -95,29 +72,29 @@ def _has_fault(findings: Sequence[Finding]) -> bool:
 
 
 def _motion_findings(
-    spectra: CrossSpectra, inspected: Inspected, vehicle: Vehicle, acceleration: Mended
+    spectra: CrossSpectra, drive: SplitRun, vehicle: Vehicle, acceleration: Mended
 ) -> Iterator[Finding]:
     """Axes, signs and units by the cross-spectra; then, if these are right, the sensor's place."""
     spectra = mended(spectra, 1.0 / acceleration.factor)
-    as_read, misread = phases(spectra, inspected.run, vehicle), {}
+    as_read, misread = phases(spectra, drive.run, vehicle), {}
     apart = list(apart_findings(spectra, as_read))
     if apart:
         yield from apart
         return
     if as_read.best < BELIEVED_AGREEMENT:
-        misread = _if_speed_misread(inspected, vehicle, acceleration)
+        misread = _if_speed_misread(drive, vehicle, acceleration)
     speed_misread, seen = likeliest_speed(as_read, misread)
     axes = list(phase_findings(seen, speed_misread))
-    yield from axes or position_findings(spectra, inspected.run, vehicle)
+    yield from axes or position_findings(spectra, drive.run, vehicle)
 
 
-def _if_speed_misread(inspected: Inspected, vehicle: Vehicle, acceleration: Mended) -> dict[str, Phases]:
+def _if_speed_misread(drive: SplitRun, vehicle: Vehicle, acceleration: Mended) -> dict[str, Phases]:
     """The phases for each mistake of the speed's unit."""
     found_for = {}
     for what, factor in SPEED_MISREAD.items():
-        spectra = cross_spectra_of(inspected.batches, reading_of(vehicle, factor))
+        spectra = cross_spectra_of(drive.batches, reading_of(vehicle, factor))
         if spectra is not None:
-            found_for[what] = phases(mended(spectra, 1.0 / acceleration.factor), inspected.run, vehicle)
+            found_for[what] = phases(mended(spectra, 1.0 / acceleration.factor), drive.run, vehicle)
     return found_for
 
 
@@ -125,7 +102,7 @@ def _excitation_findings(spectra: CrossSpectra, facts: RowFacts, acceleration: M
     rms_mps2 = spectra.acceleration_rms_mps2 * abs(acceleration.factor)
     if rms_mps2 < SMOOTH_MPS2:
         text = f"vertical acceleration is {rms_mps2:.2g} m/s2 (root mean square)"
-        yield found(Kind.SMOOTH_ROAD, Severity.WARNING, text)
+        yield finding_of(Kind.SMOOTH_ROAD, Severity.WARNING, text)
     low_hz, high_hz = spectra.freq_hz[1], spectra.freq_hz[-2]
     for signal, rms in (
         (Signal.VERTICAL_ACCELERATION, spectra.acceleration_rms_mps2),
@@ -138,27 +115,27 @@ def _excitation_findings(spectra: CrossSpectra, facts: RowFacts, acceleration: M
         share = (steps_rms / max(rms, np.finfo(float).tiny)) ** 2
         if share > STEPS_SHARE_MAX:
             text = f"{min(share, 1.0):.0%} of {signal}'s power is its steps of {stream.resolution:.3g}"
-            yield found(Kind.COARSE_RESOLUTION, Severity.WARNING, text)
+            yield finding_of(Kind.COARSE_RESOLUTION, Severity.WARNING, text)
 
 
-def _speed_findings(inspected: Inspected, settings: BatchSettings) -> Iterator[Finding]:
+def _speed_findings(drive: SplitRun, settings: BatchSettings) -> Iterator[Finding]:
     """Speed missing, frozen or outside the gate: a fault where that alone leaves no batch, else a warning."""
-    if _is_standing(inspected, settings):
+    if _is_standing(drive, settings):
         text = "the speed reads 0 from beginning to end, the vehicle shakes as it does when driven"
-        yield found(Kind.SPEED_FROZEN, Severity.FAULT, text)
-    if _is_too_short(inspected, settings):
+        yield finding_of(Kind.SPEED_FROZEN, Severity.FAULT, text)
+    if _is_too_short(drive, settings):
         return
-    is_lost = all(batch.rejected for batch in inspected.identification.batches)
+    is_lost = all(batch.rejected for batch in drive.identification.batches)
     ruinous = 1.0 - settings.usable_share_min
     for kind, why in ((Kind.SPEED_MISSING, Why.SPEED_MISSING), (Kind.SPEED_FROZEN, Why.SPEED_FROZEN)):
-        share = _share(inspected.batches, why)
-        if share >= REASON_SHARE_MIN and _is_mapped(inspected.facts):
+        share = _share(drive.batches, why)
+        if share >= REASON_SHARE_MIN and _is_mapped(drive.facts):
             severity = Severity.FAULT if is_lost and share > ruinous else Severity.WARNING
-            yield found(kind, severity, f"{share:.0%} of the drive")
-    outside = _share(inspected.batches, Why.TOO_SLOW) + _share(inspected.batches, Why.TOO_FAST)
+            yield finding_of(kind, severity, f"{share:.0%} of the drive")
+    outside = _share(drive.batches, Why.TOO_SLOW) + _share(drive.batches, Why.TOO_FAST)
     if is_lost and outside > ruinous:  # towns and stops cost time, no more
-        yield found(
-            Kind.SPEED_OUTSIDE_GATE, Severity.FAULT, f"{outside:.0%} of the drive{_speeds(inspected, settings)}"
+        yield finding_of(
+            Kind.SPEED_OUTSIDE_GATE, Severity.FAULT, f"{outside:.0%} of the drive{_speeds(drive, settings)}"
         )
 
 
@@ -170,20 +147,20 @@ def _needed_s(settings: BatchSettings) -> float:
     return settings.last_batch_share_min * settings.window_s
 
 
-def _is_standing(inspected: Inspected, settings: BatchSettings) -> bool:
+def _is_standing(drive: SplitRun, settings: BatchSettings) -> bool:
     """True where a whole batch could have been driven, and was to all appearance, but the speed stays at 0."""
-    return inspected.facts.duration_s >= _needed_s(settings) and stands_still_but_shakes(inspected.facts)
+    return drive.facts.duration_s >= _needed_s(settings) and stands_still_but_shakes(drive.facts)
 
 
-def _is_too_short(inspected: Inspected, settings: BatchSettings) -> bool:
+def _is_too_short(drive: SplitRun, settings: BatchSettings) -> bool:
     """True where not even the longest stretch of the drive, or of the part that identifies, makes one batch."""
-    part = inspected.identification.batches if inspected.has_identification else inspected.batches
+    part = drive.identification.batches if drive.has_identification else drive.batches
     return all(batch.duration_s < _needed_s(settings) for batch in part)
 
 
-def _speeds(inspected: Inspected, settings: BatchSettings) -> str:
+def _speeds(drive: SplitRun, settings: BatchSettings) -> str:
     """Which speeds there were, and whether another unit would bring them inside the gate."""
-    speed = inspected.facts.streams.get(Signal.SPEED)
+    speed = drive.facts.streams.get(Signal.SPEED)
     if speed is None:
         return ""
     text = f": {speed.low:.3g} to {speed.high:.3g} m/s, the gate is {settings.speed_min_mps:g} to "
@@ -194,44 +171,44 @@ def _speeds(inspected: Inspected, settings: BatchSettings) -> str:
     return text
 
 
-def _masked_findings(inspected: Inspected) -> Iterator[Finding]:
+def _masked_findings(drive: SplitRun) -> Iterator[Finding]:
     """Time lost to gaps, and to sensors that stuck or sat at the end of their range."""
-    if any(stream.n < 2 for stream in inspected.facts.streams.values()):
+    if any(stream.n < 2 for stream in drive.facts.streams.values()):
         return
     for kind, whys in (
         (Kind.GAPS, (Why.GAP, Why.ACCELERATION_MISSING, Why.PITCH_RATE_MISSING)),
         (Kind.SENSOR_STUCK, (Why.ACCELERATION_STUCK, Why.PITCH_RATE_STUCK)),
         (Kind.SENSOR_SATURATED, (Why.ACCELERATION_SATURATED, Why.PITCH_RATE_SATURATED)),
     ):
-        shares = {why: _share(inspected.batches, why) for why in whys}
+        shares = {why: _share(drive.batches, why) for why in whys}
         if sum(shares.values()) > MASKED_SHARE_NOTED:
             text = ", ".join(f"{why} {share:.1%} of the drive" for why, share in shares.items() if share > 0.0)
-            yield found(kind, Severity.WARNING, text)
+            yield finding_of(kind, Severity.WARNING, text)
 
 
-def _unsteady_findings(inspected: Inspected) -> Iterator[Finding]:
-    if any(not batch.rejected for batch in inspected.identification.batches):
+def _unsteady_findings(drive: SplitRun) -> Iterator[Finding]:
+    if any(not batch.rejected for batch in drive.identification.batches):
         text = f"fewer than {LEAST_SEGMENTS} unbroken stretches of 5 s at even speed"
-        yield found(Kind.UNSTEADY, Severity.WARNING, text)
+        yield finding_of(Kind.UNSTEADY, Severity.WARNING, text)
 
 
-def _batch_findings(inspected: Inspected, settings: BatchSettings, *, has_fault: bool) -> Iterator[Finding]:
+def _batch_findings(drive: SplitRun, settings: BatchSettings, *, has_fault: bool) -> Iterator[Finding]:
     """Whether anything is left to identify from; said in general only where nothing else says why not."""
-    batches = inspected.identification.batches
-    if not inspected.has_identification:
+    batches = drive.identification.batches
+    if not drive.has_identification:
         return
-    if _is_too_short(inspected, settings):
-        if _is_standing(inspected, settings):
+    if _is_too_short(drive, settings):
+        if _is_standing(drive, settings):
             return
         longest_s = max((batch.duration_s for batch in batches), default=0.0)
-        text = f"of the {inspected.facts.duration_s:.0f} s driven the longest unbroken stretch that identifies lasts "
+        text = f"of the {drive.facts.duration_s:.0f} s driven the longest unbroken stretch that identifies lasts "
         text += f"{longest_s:.0f} s, a batch needs {_needed_s(settings):.0f} s"
-        yield found(Kind.TOO_SHORT, Severity.FAULT, text)
+        yield finding_of(Kind.TOO_SHORT, Severity.FAULT, text)
     elif all(batch.rejected for batch in batches):
         if not has_fault:
-            yield found(Kind.NO_USABLE_BATCH, Severity.FAULT, f"{len(batches)} batches: {_reasons(batches)}")
+            yield finding_of(Kind.NO_USABLE_BATCH, Severity.FAULT, f"{len(batches)} batches: {_reasons(batches)}")
     elif lost := [one for one in batches if one.rejected and Why.TOO_SHORT not in one.rejected]:  # ends are no loss
-        yield found(Kind.BATCHES_LOST, Severity.NOTE, f"{len(lost)} of {len(batches)} batches: {_reasons(lost)}")
+        yield finding_of(Kind.BATCHES_LOST, Severity.NOTE, f"{len(lost)} of {len(batches)} batches: {_reasons(lost)}")
 
 
 def _reasons(batches: Sequence[Batch]) -> str:

@@ -1,15 +1,14 @@
 """What a report of a calibration or an evaluation is made of: estimates held against known loads, by set."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.file.parts import RegressionPart
-from gateway.calibration.judgement.evaluation import ErrorTable, Target, error_table, judge
-from gateway.calibration.judgement.left_out import judged_left_out
+from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
 from gateway.core.vehicle import Vehicle
 
 
@@ -83,6 +82,23 @@ def assess_evaluation(campaign: Campaign, file: CalibrationFile, part: Part, tab
     """One estimator of a calibration file judged on one part of a campaign."""
     judgement = Judgement(table.estimator, {part: table}, _dof(file, table.estimator))
     return Assessment(f"Evaluation of {campaign.vehicle.name}", file, campaign.vehicle, (judgement,))
+
+
+def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:
+    """Every identification batch with its estimate by a calibration from the other runs.
+
+    Empty where fewer than three runs leave nothing to learn from. By how much intervals are widened, and which
+    loads count as seen, stays as of all runs: the errors are those of a new load, the coverage is a little kinder.
+    """
+    whole = outcome.file.for_core()
+    if estimator == "ratio_index":
+        ratio = outcome.ratio_index
+        without = {n: replace(whole, ratio_index=taught) for n, taught in (ratio.without if ratio else {}).items()}
+    else:
+        cross = outcome.cross_spectrum
+        without = {n: replace(whole, cross_spectrum=taught) for n, taught in (cross.without if cross else {}).items()}
+    runs = [one.identification for one in outcome.split if one.identification.number in without]
+    return [one for run in runs for one in judge(run, without[run.number], estimator)]
 
 
 def _dof(file: CalibrationFile, estimator: str) -> dict[Target, float]:

@@ -83,7 +83,7 @@ def _verdict(assessment: Assessment, judgement: Judgement, expected: Expected | 
     if expected and judgement.estimator == "cross_spectrum":
         reasons.append(_stated(expected, assessment.vehicle))
     if assessment.outcome:
-        reasons += [*_runs(assessment.outcome.verdicts), *_campaign(assessment.outcome)]
+        reasons += [*_runs(assessment.outcome.inspection.verdicts), *_campaign(assessment.outcome)]
     return Verdict(judgement.estimator, (*reasons, *_warnings(assessment, judgement.estimator)))
 
 
@@ -181,14 +181,14 @@ def _warnings(assessment: Assessment, estimator: str) -> Iterator[Reason]:
     """Those of the file, but for what was said of another estimator or is told from the drives themselves."""
     skipped = [f"{name}: " for name in ESTIMATOR_NAMES if name != estimator]
     if assessment.outcome:
-        skipped += ["run ", *(f"{finding.kind}: " for finding in assessment.outcome.campaign_findings)]
+        skipped += ["run ", *(f"{finding.kind}: " for finding in assessment.outcome.inspection.findings)]
     for warning in assessment.file.warnings:
         if not warning.startswith(tuple(skipped)):
             yield Reason("warning", Grade.RESERVED, _WARNING_TEXT.get(warning, warning))
 
 
 def _campaign(outcome: Outcome) -> Iterator[Reason]:
-    for finding in outcome.campaign_findings:
+    for finding in outcome.inspection.findings:
         if finding.severity is not Severity.NOTE:
             text = f"{finding.kind.replace('_', ' ').capitalize()}: {finding.text}."
             yield Reason(str(finding.kind), Grade.RESERVED, text)

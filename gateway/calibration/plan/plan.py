@@ -107,7 +107,7 @@ def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadP
 
     Raises CalibrationImpossibleError where it holds no cross-spectral part: the advice is of the half-car.
     """
-    known = outcome.cross_spectrum
+    known = outcome.cross_spectrum.calibration if outcome.cross_spectrum else None
     if known is None:
         raise CalibrationImpossibleError(
             "a plan needs the cross-spectral calibration: leave out --estimator, and see its warning if it has one"

@@ -1,6 +1,6 @@
 """Verdicts on known-load drives, as people and programs read them."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 from gateway.calibration.inspection.finding import Finding, RunVerdict
 from gateway.calibration.inspection.inspection import Inspection
@@ -55,16 +55,9 @@ def inspection_json(inspection: Inspection) -> dict[str, object]:
                 "number": verdict.number,
                 "log": verdict.name,
                 "is_usable": verdict.is_usable,
-                "findings": _finding_records(verdict.findings),
+                "findings": [finding.to_json() for finding in verdict.findings],
             }
             for verdict in inspection.verdicts
         ],
-        "campaign_findings": _finding_records(inspection.findings),
+        "campaign_findings": [finding.to_json() for finding in inspection.findings],
     }
-
-
-def _finding_records(findings: Sequence[Finding]) -> list[dict[str, str]]:
-    return [
-        {"kind": str(one.kind), "severity": str(one.severity), "text": one.text, "advice": one.advice}
-        for one in findings
-    ]

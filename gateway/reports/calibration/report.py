@@ -68,7 +68,7 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: LoadPlan |
     if outcome.ratio_index is not None:
         yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.split])
     if outcome.cross_spectrum is not None:
-        yield half_car_section(identification, outcome.cross_spectrum, campaign.vehicle)
+        yield half_car_section(identification, outcome.cross_spectrum.calibration, campaign.vehicle)
 
 
 def _evaluation_sections(assessment: Assessment) -> list[Section]:
@@ -166,12 +166,9 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: Loa
                 "run": one.number,
                 "log": one.name,
                 "is_usable": one.is_usable,
-                "findings": [
-                    {"kind": str(f.kind), "severity": str(f.severity), "text": f.text, "advice": f.advice}
-                    for f in one.findings
-                ],
+                "findings": [finding.to_json() for finding in one.findings],
             }
-            for one in (assessment.outcome.verdicts if assessment.outcome else ())
+            for one in (assessment.outcome.inspection.verdicts if assessment.outcome else ())
         ],
         "errors": {
             one.estimator: {str(part): table.to_json() for part, table in one.tables.items()}

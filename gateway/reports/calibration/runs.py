@@ -13,7 +13,7 @@ from gateway.reports.charts.chart import Section, Table
 def runs_section(outcome: Outcome) -> Section:
     """Every run with its verdict; what was found of it, of all of them, and what to do."""
     driven = {one.identification.number: one for one in outcome.split}
-    rows = tuple(_run_row(verdict, driven.get(verdict.number)) for verdict in outcome.verdicts)
+    rows = tuple(_run_row(verdict, driven.get(verdict.number)) for verdict in outcome.inspection.verdicts)
     columns = ("Run", "log", "verdict", "payload", "front share", "identify", "validate", "refused")
     caption = "Runs: batches that identify, that validate, and that no estimator can use"
     findings = _findings_table(outcome)
@@ -48,8 +48,8 @@ def _spoken(finding: Finding) -> str:
 
 
 def _findings_table(outcome: Outcome) -> Table | None:
-    found = [("all", finding) for finding in outcome.campaign_findings]
-    found += [(str(verdict.number), finding) for verdict in outcome.verdicts for finding in verdict.findings]
+    found = [("all", finding) for finding in outcome.inspection.findings]
+    found += [(str(verdict.number), finding) for verdict in outcome.inspection.verdicts for finding in verdict.findings]
     rows = tuple((run, str(one.severity), _spoken(one), one.text, one.advice) for run, one in found)
     columns = ("Run", "weight", "what", "as found", "what to do")
     return Table("What was found of the runs", columns, rows) if rows else None
