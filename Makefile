@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check bench deb soak test-vm vm-image vcan lock docs site screenshots clean
+.PHONY: demo test check bench deb dist soak test-vm vm-image vcan lock docs site screenshots clean
 .DEFAULT_GOAL := demo
 
 .venv/bin/python:
@@ -82,8 +82,12 @@ PACKAGED := $(shell find gateway dbc deploy docs -type f -not -name '*.pyc') \
 PACKAGES := build/.packages$(addprefix -,$(ARCHITECTURE))
 deb: $(PACKAGES)
 $(PACKAGES): $(PACKAGED) | .venv/.package
-	$(BIN)/python deploy/deb/build.py $(addprefix --architecture ,$(ARCHITECTURE))
+	$(BIN)/python deploy/deb/make_deb.py $(addprefix --architecture ,$(ARCHITECTURE))
 	touch $@
+
+# Wheel, source archive and bills of materials of the last commit in dist/: the same bytes wherever they are made.
+dist: .venv/.development
+	$(BIN)/python deploy/dist/make_dist.py
 
 # The pictures in README.md; needs chromium.
 screenshots: .venv/.development
@@ -123,4 +127,4 @@ lock:
 		--constraint requirements-build.txt --output-file requirements-dev.txt -
 
 clean:
-	rm -rf .venv .venv-lock build
+	rm -rf .venv .venv-lock build dist

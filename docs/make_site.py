@@ -17,7 +17,7 @@ from latex2mathml.converter import convert
 ROOT: Final = Path(__file__).parents[1]
 DOCS: Final = ROOT / "docs"
 PAGES: Final = ROOT / "build/site-pages"  # docs_dir of mkdocs.yml
-TOP_PAGES: Final = ("CHANGELOG.md", "CONTRIBUTING.md")
+TOP_PAGES: Final = ("CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
 STATIC: Final = ("*.md", "*.svg", "*.png", "calibration.schema.json")
 LINK: Final = re.compile(r"(?P<mark>!?)\[(?P<words>(?:`[^`]*`|[^\[\]`])*)\]\((?P<target>[^)\s]+)\)")
 

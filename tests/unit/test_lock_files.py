@@ -5,7 +5,7 @@ import json
 import tomllib
 
 import pytest
-from build import DESK_LOCK, VEHICLE_LOCK, pinned
+from make_deb import DESK_LOCK, VEHICLE_LOCK, pinned
 from support.locks import ROOT, pins
 
 from gateway.web.charting import VENDORED
