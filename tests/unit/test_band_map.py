@@ -33,8 +33,6 @@ def table_of(roughness: F64) -> SpectrumTable:
             0.1 * roughness[:, None] * (1.0 + by_share * line(3.0) - by_share * line(6.0)),
         ),
         n_segments=np.full(len(run), 28.0),
-        kind="amplitude",
-        n_segment=1024,
     )
 
 

@@ -10,11 +10,12 @@ teach without each run and its errors (``fit_ratio_index``); for the reports, th
 from gateway.calibration.ratio_index.band_map import BandMap, band_maps
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.choice import Choice
-from gateway.calibration.ratio_index.fit import N_SEGMENT, FamilyTrial, RatioIndexFit, fit_ratio_index
+from gateway.calibration.ratio_index.fit import FamilyTrial, RatioIndexFit, fit_ratio_index
 from gateway.calibration.ratio_index.indexes import IndexRows, index_rows
 from gateway.calibration.ratio_index.regression import FittedRegression, fit_regression
 from gateway.calibration.ratio_index.stepwise import Selection
 from gateway.calibration.ratio_index.structures import StructureChoice
+from gateway.calibration.ratio_index.table import N_SEGMENT
 
 __all__ = [
     "N_SEGMENT",

@@ -7,7 +7,7 @@ import numpy as np
 
 from gateway.calibration.ratio_index.bands import partial_residuals
 from gateway.calibration.ratio_index.scatter import bin_covariance, integral_covariance
-from gateway.calibration.ratio_index.table import SpectrumTable
+from gateway.calibration.ratio_index.table import N_SEGMENT, SPECTRUM, SpectrumTable
 from gateway.core.ratio_index.index import UPPER_LIMIT_HZ
 from gateway.records import F64, Bool
 
@@ -76,5 +76,5 @@ def _averages(table: SpectrumTable, spectra: F64, weights: F64, chosen: Bool) ->
     """Averages (b,) over each band of the mean spectrum of the batches chosen (n,), and their variances (b,)."""
     n_segments = table.n_segments[chosen]
     mean = n_segments @ spectra[chosen] / n_segments.sum()
-    covariance = bin_covariance(table.n_segment, len(table.freq_hz), table.kind)
+    covariance = bin_covariance(N_SEGMENT, len(table.freq_hz), SPECTRUM)
     return weights @ mean, np.diag(integral_covariance(weights, mean, float(n_segments.sum()), covariance))

@@ -1,5 +1,6 @@
 """Which frequency bands tell load from road: chosen on the vehicle's own known-load drives, or the paper's."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Final, Literal
@@ -8,8 +9,8 @@ import numpy as np
 from scipy.stats import rankdata
 
 from gateway.calibration.ratio_index.scatter import bin_covariance, integral_covariance
-from gateway.calibration.ratio_index.table import SpectrumTable
-from gateway.core.ratio_index.index import PAPER_BANDS, UPPER_LIMIT_HZ, Band, SpectrumKind, band_pass_gain
+from gateway.calibration.ratio_index.table import N_SEGMENT, SPECTRUM, SpectrumTable
+from gateway.core.ratio_index.index import PAPER_BANDS, UPPER_LIMIT_HZ, Band, band_pass_gain
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, I64
 
@@ -47,7 +48,7 @@ def ratios(table: SpectrumTable, sensor: int, pair: BandPair | None) -> F64:
     spectra = table.spectra[sensor]
     if pair is None or spectra is None:
         return np.full(len(table.run), np.nan)
-    passed = spectra @ _band_weights(table.freq_hz, list(pair.bands), table.kind).T
+    passed = spectra @ _band_weights(table.freq_hz, pair.bands).T
     return np.asarray(passed[:, 0] / passed[:, 1])
 
 
@@ -87,7 +88,7 @@ def candidate_pairs(table: SpectrumTable, sensor: int, width_hz: float, n_best: 
     if spectra is None:
         return []
     bands = [Band(float(centre), width_hz) for centre in CENTRES_HZ]
-    weights = _band_weights(table.freq_hz, bands, table.kind)
+    weights = _band_weights(table.freq_hz, bands)
     rest, aim = partial_residuals(
         table.run, np.log(spectra @ weights.T), table.targets[sensor], table.targets[1 - sensor]
     )
@@ -125,17 +126,16 @@ def rank_correlations(columns: F64, target: F64) -> F64:
     return rho
 
 
-def _band_weights(freq_hz: F64, bands: list[Band], kind: SpectrumKind) -> F64:
-    """Gains (b, m) of the band-passes (6) as they weigh a spectrum of this kind."""
-    order = 1 if kind == "amplitude" else 2
-    return np.array([band_pass_gain(freq_hz, band) ** order for band in bands])
+def _band_weights(freq_hz: F64, bands: Sequence[Band]) -> F64:
+    """Gains (b, m) of the band-passes (6), by which they weigh an amplitude spectrum."""
+    return np.array([band_pass_gain(freq_hz, band) for band in bands])
 
 
 def _log_scatter(table: SpectrumTable, spectra: F64, weights: F64) -> F64:
     """Sum over runs of the covariance (b, b) that log band levels have by the scatter of spectra alone."""
     mean = spectra.mean(axis=0)
     level = weights @ mean
-    covariance = bin_covariance(table.n_segment, len(table.freq_hz), table.kind)
+    covariance = bin_covariance(N_SEGMENT, len(table.freq_hz), SPECTRUM)
     of_one_segment = integral_covariance(weights, mean, 1.0, covariance) / np.outer(level, level)
     per_run = [table.n_segments[table.run == number].sum() for number in np.unique(table.run)]
     scatter: F64 = of_one_segment * np.sum(1.0 / np.array(per_run))

@@ -11,12 +11,13 @@ from gateway.calibration.ratio_index.regression import (
     FittedRegression,
     fit_regression,
     held_out_errors,
+    scaled_design,
     without_each_run,
 )
 from gateway.calibration.ratio_index.stepwise import Selection, select_stepwise
 from gateway.calibration.ratio_index.structures import Family, terms_of
 from gateway.calibration.ratio_index.table import SpectrumTable
-from gateway.core.ratio_index.regression import RegressionModel, scaled_columns, term_columns
+from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 
@@ -106,9 +107,7 @@ def _scores(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, v
     for target, (known, span) in enumerate(zip(table.targets, spans_of(vehicle), strict=True)):
         terms = terms_of(family, target, table)
         if terms:
-            raw = term_columns(terms, ra, rg)
-            lows, highs = raw.min(axis=1, keepdims=True), raw.max(axis=1, keepdims=True)
-            columns = scaled_columns(terms, ra, rg, lows, highs)
+            columns, _, _ = scaled_design(terms, ra, rg)
             errors = held_out_errors(columns, without_each_run(columns, known, table.run)[0], known, table.run)
             parts.append(np.mean((errors / span) ** 2, axis=1))
     return np.sum(parts, axis=0) if parts else np.full(len(candidates), np.inf)

@@ -18,14 +18,13 @@ from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import BandChoice, Pairs, candidates
 from gateway.calibration.ratio_index.choice import Choice, choose, spans_of
 from gateway.calibration.ratio_index.structures import FAMILIES, Family, StructureChoice
-from gateway.calibration.ratio_index.table import SpectrumTable, spectrum_table
-from gateway.core.ratio_index.index import RatioIndexCalibration, SpectrumKind
+from gateway.calibration.ratio_index.table import N_SEGMENT, SPECTRUM, SpectrumTable, spectrum_table
+from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Bool
 
-N_SEGMENT: Final = 1024  # 20.5 s at 50 Hz: resolves 0.05 Hz and still fits between two traffic lights
 SPEED_STD_FACTOR: Final = 2.0  # a batch's speed may spread this many times as much as the widest calibrated
 MOST: Final = 0.8  # quantile of nested errors that a spread must allow for; the rest may lie far outside the loads seen
 
@@ -80,20 +79,19 @@ class RatioIndexFit:
 def fit_ratio_index(
     runs: Sequence[KnownRun],
     vehicle: Vehicle,
-    kind: SpectrumKind = "amplitude",
     *,
     bands: BandChoice = "campaign",
     structure: StructureChoice = "auto",
 ) -> RatioIndexFit:
     """Identification runs -> calibration. Raises CalibrationImpossibleError where they cannot carry one."""
-    table = spectrum_table(runs, kind, N_SEGMENT)
+    table = spectrum_table(runs)
     trials = _family_trials(table, vehicle, bands, FAMILIES if structure == "auto" else (structure,))
     chosen = trials[0]
     batches = [batch for run in runs for batch in run.batches if not batch.rejected]
     speeds_mps = [batch.mean_speed_mps for batch in batches]
     speed_stds_mps = [float(np.std(batch.speed_mps[batch.usable])) for batch in batches]
     blank = RatioIndexCalibration(
-        spectrum=kind,
+        spectrum=SPECTRUM,
         n_segment=N_SEGMENT,
         acceleration_bands=None,
         pitch_rate_bands=None,

@@ -37,9 +37,7 @@ def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I
     mean square over runs held out, less what the held-out rows' own leverage adds, and its degrees of
     freedom are the runs' less one.
     """
-    raw = term_columns(terms, ra, rg)
-    lows, highs = raw.min(axis=0), raw.max(axis=0)
-    columns = scaled_columns(terms, ra, rg, lows, highs)
+    columns, lows, highs = scaled_design(terms, ra, rg)
     gram_inverse: F64 = np.linalg.pinv(columns.T @ columns).astype(float)
     without, inverse = without_each_run(columns, target, run)
     place = np.unique(run, return_inverse=True)[1]
@@ -47,8 +45,8 @@ def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I
     leverage = np.einsum("ni,nij,nj->n", columns, inverse[place], columns)
     model = RegressionModel(
         terms=terms,
-        lows=lows,
-        highs=highs,
+        lows=lows[0],
+        highs=highs[0],
         coefficients=gram_inverse @ columns.T @ target,
         gram_inverse=gram_inverse,
         residual_std=float(np.sqrt(np.mean(errors**2) / (1.0 + np.mean(leverage)))),
@@ -56,6 +54,13 @@ def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I
     )
     others = zip(without, inverse, strict=True)
     return FittedRegression(model, tuple(replace(model, coefficients=b, gram_inverse=g) for b, g in others), errors)
+
+
+def scaled_design(terms: tuple[str, ...], ra: F64, rg: F64) -> tuple[F64, F64, F64]:
+    """Columns (..., n, p + 1) for indexes (..., n), scaled by what these span: lows and highs (..., 1, p)."""
+    raw = term_columns(terms, ra, rg)
+    lows, highs = raw.min(axis=-2, keepdims=True), raw.max(axis=-2, keepdims=True)
+    return scaled_columns(terms, ra, rg, lows, highs), lows, highs
 
 
 def without_each_run(columns: F64, target: F64, run: I64) -> tuple[F64, F64]:

@@ -13,8 +13,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from gateway.calibration.ratio_index.bands import run_means
-from gateway.calibration.ratio_index.regression import held_out_errors, without_each_run
-from gateway.core.ratio_index.regression import scaled_columns, term_columns
+from gateway.calibration.ratio_index.regression import held_out_errors, scaled_design, without_each_run
 from gateway.records import F64, I64
 
 P_ENTER: Final = 0.05
@@ -75,8 +74,7 @@ def select_stepwise(
     whose p-value rose above P_LEAVE leaves where that costs no such error. Tests are over run means, one a
     run. May choose nothing.
     """
-    raw = term_columns(library, ra, rg)
-    batches = scaled_columns(library, ra, rg, raw.min(axis=0), raw.max(axis=0))
+    batches, _, _ = scaled_design(library, ra, rg)
     means, aim = run_means(run, batches), run_means(run, target)
 
     def held_out_rms(chosen: list[int]) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from gateway.core.ratio_index.index import SpectrumKind, mean_spectrum
 from gateway.core.spectrum import segment_starts
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, I64, Batch, Bool
+
+SPECTRUM: Final[SpectrumKind] = "amplitude"
+N_SEGMENT: Final = 1024  # 20.5 s at 50 Hz: resolves 0.05 Hz and still fits between two traffic lights
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +31,6 @@ class SpectrumTable:
     freq_hz: F64
     spectra: tuple[F64 | None, F64 | None]
     n_segments: F64
-    kind: SpectrumKind
-    n_segment: int
 
     @property
     def n_runs(self) -> int:
@@ -58,14 +60,14 @@ class SpectrumTable:
         )
 
 
-def spectrum_table(runs: Sequence[KnownRun], kind: SpectrumKind, n_segment: int) -> SpectrumTable:
+def spectrum_table(runs: Sequence[KnownRun]) -> SpectrumTable:
     """Every counted batch of which both mapped sensors give a spectrum; runs sorted by name, then by time.
 
     Raises CalibrationImpossibleError where there is none.
     """
     batches = [(run, batch) for run in runs for batch in run.batches if not batch.rejected]
     batches.sort(key=lambda one: (one[0].name, one[1].t_start_ns, one[0].payload_kg, one[0].number))
-    rows = [(run, batch, *_spectra(batch, kind, n_segment)) for run, batch in batches]
+    rows = [(run, batch, *_spectra(batch)) for run, batch in batches]
     has_a = any(a is not None for _, _, a, _ in rows)
     has_g = any(g is not None for _, _, _, g in rows)
     whole = [row for row in rows if (row[2] is not None or not has_a) and (row[3] is not None or not has_g)]
@@ -85,24 +87,22 @@ def spectrum_table(runs: Sequence[KnownRun], kind: SpectrumKind, n_segment: int)
             np.array([a[1] for _, _, a, _ in whole if a is not None]) if has_a else None,
             np.array([g[1] for _, _, _, g in whole if g is not None]) if has_g else None,
         ),
-        n_segments=np.array([_n_segments(batch, n_segment) for _, batch, _, _ in whole]),
-        kind=kind,
-        n_segment=n_segment,
+        n_segments=np.array([_n_segments(batch) for _, batch, _, _ in whole]),
     )
 
 
-def _spectra(batch: Batch, kind: SpectrumKind, n_segment: int) -> tuple[tuple[F64, F64] | None, tuple[F64, F64] | None]:
+def _spectra(batch: Batch) -> tuple[tuple[F64, F64] | None, tuple[F64, F64] | None]:
     a, g = (
-        mean_spectrum(x, batch.usable, n_segment, batch.rate_hz, kind)
+        mean_spectrum(x, batch.usable, N_SEGMENT, batch.rate_hz, SPECTRUM)
         for x in (batch.vertical_acceleration_mps2, batch.pitch_rate_radps)
     )
     return a, g
 
 
-def _n_segments(batch: Batch, n_segment: int) -> float:
+def _n_segments(batch: Batch) -> float:
     """The fewer of the two sensors' segments, a silent one left out."""
     counts = [
-        len(segment_starts(batch.usable & np.isfinite(x), n_segment, n_segment // 2))
+        len(segment_starts(batch.usable & np.isfinite(x), N_SEGMENT, N_SEGMENT // 2))
         for x in (batch.vertical_acceleration_mps2, batch.pitch_rate_radps)
     ]
     return float(min(count for count in counts if count > 0))
