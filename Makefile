@@ -40,6 +40,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_settings.py --check
 	$(BIN)/python docs/make_signal_map.py --check
 	$(BIN)/python docs/make_campaign.py --check
+	$(BIN)/python docs/make_estimate.py --check
 	$(BIN)/python docs/make_faults.py --check
 	$(BIN)/python docs/make_reasons.py --check
 	$(BIN)/python docs/make_findings.py --check
@@ -97,6 +98,7 @@ docs: .venv/.development
 	$(BIN)/python docs/make_settings.py
 	$(BIN)/python docs/make_signal_map.py
 	$(BIN)/python docs/make_campaign.py
+	$(BIN)/python docs/make_estimate.py
 	$(BIN)/python docs/make_faults.py
 	$(BIN)/python docs/make_reasons.py
 	$(BIN)/python docs/make_findings.py

@@ -201,18 +201,20 @@ _LATER: Final = Presence.SINCE_LATER
 _KNOWN: Final = Presence.WHERE_KNOWN
 _ID: Final = "1795233300000000000-0f3a9c2b11de"
 _SHARE: Final = "share of the sprung mass on the front axle"
-_POINTS: Final = "percentage points"
+_POINTS: Final = "its standard deviation, in percentage points"
+_STD: Final = "its standard deviation"
+_RAW: Final = "as the calibration alone has it"
 
 FIELDS: Final = (
     _field("id", "id", TEXT, "the same for the same batch, whenever it is computed", _ID),
-    _field("vehicle_id", "vehicle_id", TEXT, None, "van-17"),
-    _field("t_start", "t_start_ns", INSTANT, None, "2026-11-21T03:50:00.000000Z"),
-    _field("t_end", "t_end_ns", INSTANT, None, "2026-11-21T03:55:00.000000Z"),
-    _field("t_end_ns", "t_end_ns", WHOLE, "ns since 1970 UTC", 1795233300000000000),
-    _field("estimator", "estimator", TEXT, None, "ratio_index"),
-    _field("calibration_id", "calibration_id", TEXT, None, "sha256:9f86d081"),
-    _field("payload_kg", "payload.number", NUMBER, None, 271.3),
-    _field("payload_std_kg", "payload.std", NUMBER, None, 6.1),
+    _field("vehicle_id", "vehicle_id", TEXT, "as the settings name it", "van-17"),
+    _field("t_start", "t_start_ns", INSTANT, "beginning of the batch, UTC", "2026-11-21T03:50:00.000000Z"),
+    _field("t_end", "t_end_ns", INSTANT, "its end, UTC", "2026-11-21T03:55:00.000000Z"),
+    _field("t_end_ns", "t_end_ns", WHOLE, "the same end, since 1970 UTC", 1795233300000000000),
+    _field("estimator", "estimator", TEXT, "who weighed: cross_spectrum or ratio_index", "ratio_index"),
+    _field("calibration_id", "calibration_id", TEXT, "hash of the calibration used", "sha256:9f86d081"),
+    _field("payload_kg", "payload.number", NUMBER, "what is aboard besides the empty vehicle", 271.3),
+    _field("payload_std_kg", "payload.std", NUMBER, _STD, 6.1),
     _field(
         "payload_interval95_kg",
         "payload.interval95",
@@ -231,9 +233,9 @@ FIELDS: Final = (
         [50.2, 50.6],
         columns=("front_share_low95_pct", "front_share_high95_pct"),
     ),
-    _field("ratio_index_acceleration", "ratio_index_acceleration", NUMBER, None, 0.97),
-    _field("ratio_index_pitch_rate", "ratio_index_pitch_rate", NUMBER, None, 1.21),
-    _field("mean_speed_mps", "mean_speed_mps", NUMBER, None, 13.9),
+    _field("ratio_index_acceleration", "ratio_index_acceleration", NUMBER, "R_a of the paper", 0.97),
+    _field("ratio_index_pitch_rate", "ratio_index_pitch_rate", NUMBER, "R_g of the paper", 1.21),
+    _field("mean_speed_mps", "mean_speed_mps", NUMBER, "over what every gate let through", 13.9),
     _field("gap_share", "gap_share", NUMBER, "share of the batch without samples", 0.001),
     _field("usable_share", "usable_share", NUMBER, "share of the batch that every gate let through", 0.93),
     EstimateField(
@@ -250,10 +252,10 @@ FIELDS: Final = (
     EstimateField(
         "epoch_payload_kg", "epoch.payload.number", NUMBER, "all batches of this load together", 270.4, _KNOWN
     ),
-    EstimateField("epoch_payload_std_kg", "epoch.payload.std", NUMBER, None, 4.9, _KNOWN),
+    EstimateField("epoch_payload_std_kg", "epoch.payload.std", NUMBER, _STD, 4.9, _KNOWN),
     EstimateField("epoch_front_share_pct", "epoch.front_share.number", NUMBER, _SHARE, 50.3, _KNOWN),
     EstimateField("epoch_front_share_std_pct", "epoch.front_share.std", NUMBER, _POINTS, 0.1, _KNOWN),
-    EstimateField("epoch_n_batches", "epoch.n_batches", COUNT, "since the load last changed", 3.0, _KNOWN),
+    EstimateField("epoch_n_batches", "epoch.n_batches", COUNT, "batches since the load last changed", 3.0, _KNOWN),
     _field(
         "tare_id",
         "tare.tare_id",
@@ -262,7 +264,7 @@ FIELDS: Final = (
         presence=_KNOWN,
     ),
     _field("tare_payload_kg", "tare.payload.number", NUMBER, "taken off the raw payload", 12.4, presence=_KNOWN),
-    EstimateField("tare_payload_std_kg", "tare.payload.std", NUMBER, presence=_KNOWN),
+    EstimateField("tare_payload_std_kg", "tare.payload.std", NUMBER, _STD, presence=_KNOWN),
     _field(
         "tare_front_share_pct",
         "tare.front_share.number",
@@ -270,14 +272,12 @@ FIELDS: Final = (
         "percentage points taken off the raw front share",
         presence=_KNOWN,
     ),
-    EstimateField("tare_front_share_std_pct", "tare.front_share.std", NUMBER, presence=_KNOWN),
-    EstimateField(
-        "raw_payload_kg", "tare.raw_payload.number", NUMBER, "as the calibration alone has it", 283.7, _KNOWN
-    ),
-    EstimateField("raw_payload_std_kg", "tare.raw_payload.std", NUMBER, presence=_KNOWN),
-    EstimateField("raw_front_share_pct", "tare.raw_front_share.number", NUMBER, presence=_KNOWN),
-    EstimateField("raw_front_share_std_pct", "tare.raw_front_share.std", NUMBER, presence=_KNOWN),
-    EstimateField("vin", "vin", TEXT, presence=_KNOWN),
+    EstimateField("tare_front_share_std_pct", "tare.front_share.std", NUMBER, _POINTS, presence=_KNOWN),
+    EstimateField("raw_payload_kg", "tare.raw_payload.number", NUMBER, _RAW, 283.7, _KNOWN),
+    EstimateField("raw_payload_std_kg", "tare.raw_payload.std", NUMBER, _STD, presence=_KNOWN),
+    EstimateField("raw_front_share_pct", "tare.raw_front_share.number", NUMBER, _RAW, presence=_KNOWN),
+    EstimateField("raw_front_share_std_pct", "tare.raw_front_share.std", NUMBER, _POINTS, presence=_KNOWN),
+    EstimateField("vin", "vin", TEXT, "vehicle identification number", presence=_KNOWN),
     EstimateField(
         "provisional",
         "is_provisional",
@@ -285,6 +285,6 @@ FIELDS: Final = (
         "true: an early look at a batch that is still growing",
         presence=_KNOWN,
     ),
-    EstimateField("spectra", "spectra", SPECTRA, presence=_KNOWN),
+    EstimateField("spectra", "spectra", SPECTRA, "of both sensors, for people to look at", presence=_KNOWN),
 )
 COLUMNS: Final = tuple(column for one in FIELDS for column in one.columns)

@@ -1,22 +1,30 @@
-"""docs/signal-map.md and docs/campaign.md say what the code does, and every example on them is one that it takes."""
+"""The pages of files and fields say what the code does, and every example on them is one that it takes."""
 
 import re
 import shutil
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import make_campaign
+import make_estimate
 import make_signal_map
 import pytest
 from pydantic import BaseModel
+from support.half_car_road import batch_over_road, weighed
 
 from gateway.bus.signals.signal_map import SignalEntry, SignalMapFile, load_signal_map
 from gateway.calibration.campaign import CampaignTable, RunTable, VehicleTable, load_campaign
+from gateway.calibration.file.calibration_file import load_calibration
+from gateway.estimate import Estimate
+from gateway.estimate_json import FIELDS
 from gateway.records import Signal
 from gateway.units import TO_SI
 
 ROOT = Path(__file__).parents[2]
-SIGNAL_MAP, CAMPAIGN = ((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("signal-map.md", "campaign.md"))
+SIGNAL_MAP, CAMPAIGN, ESTIMATE = (
+    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("signal-map.md", "campaign.md", "estimate.md")
+)
 
 
 def examples_of(page: str) -> list[str]:
@@ -27,6 +35,7 @@ def examples_of(page: str) -> list[str]:
 def test_the_pages_are_made_from_the_code() -> None:
     assert make_signal_map.signal_map_page() == SIGNAL_MAP, "run `make docs`"
     assert make_campaign.campaign_page() == CAMPAIGN, "run `make docs`"
+    assert make_estimate.estimate_page() == ESTIMATE, "run `make docs`"
 
 
 @pytest.mark.parametrize("table", [SignalMapFile, SignalEntry, CampaignTable, VehicleTable, RunTable])
@@ -59,3 +68,16 @@ def test_an_example_of_a_campaign_can_be_loaded(example: str, tmp_path: Path) ->
 
 def test_the_pages_have_examples() -> None:
     assert (len(examples_of(SIGNAL_MAP)), len(examples_of(CAMPAIGN))) == (3, 1)
+
+
+def test_every_field_of_an_estimate_is_described_and_says_when_it_is_unknown() -> None:
+    assert [one.name for one in FIELDS if not one.description] == []
+    assert {make_estimate.part_of(one) for one in FIELDS} == set(make_estimate.NULL)
+    assert {field.name for field in fields(Estimate)} <= set(make_estimate.NULL)
+
+
+def test_every_figure_of_the_default_estimator_is_explained() -> None:
+    shipped = load_calibration(ROOT / "gateway" / "demo" / "paper_van.json").for_core().cross_spectrum
+    assert shipped is not None
+    found = weighed(batch_over_road(225.0, 50.0, seed=1), shipped)
+    assert list(found.diagnostics) == list(make_estimate.DIAGNOSTICS)

@@ -1,0 +1,132 @@
+"""Writes docs/estimate.md from gateway/estimate_json.py; with --check only tells whether it is up to date."""
+
+from pathlib import Path
+from typing import Final
+
+from generated import keep_up_to_date
+
+from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, REASONS, SPECTRA, EstimateField
+
+PAGE = Path(__file__).with_name("estimate.md")
+
+UNITS: Final = (
+    ("_kg", "kg"),
+    ("_std_pct", "pp"),
+    ("tare_front_share_pct", "pp"),
+    ("_pct", "%"),
+    ("_mps2", "m/s²"),
+    ("_mps", "m/s"),
+    ("_ns", "ns"),
+)
+SHARES: Final = ("gap_share", "usable_share", "shares")
+
+NULL: Final = {
+    "id": "",
+    "vehicle_id": "null where no configuration names the vehicle",
+    "vin": "absent unless `[vehicle] vin` says it",
+    "t_start_ns": "",
+    "t_end_ns": "",
+    "estimator": "",
+    "calibration_id": "null without a calibration",
+    "payload": "null where rejected, or where the ratio index has no model of it",
+    "front_share": "null where rejected, or where the ratio index has no model of it",
+    "ratio_index_acceleration": "null where rejected before it was computed, and without a calibrated ratio index",
+    "ratio_index_pitch_rate": "as above",
+    "mean_speed_mps": "null where no speed is known",
+    "gap_share": "",
+    "usable_share": "",
+    "roughness_mps2": "null without spectra or speed",
+    "shares": "",
+    "rejected": "",
+    "is_provisional": "absent in the estimate of a whole batch",
+    "spectra": "absent where nothing could be transformed, and where the request says `spectra=false`",
+    "diagnostics": "empty where rejected before a fit",
+    "epoch": "absent where rejected or provisional",
+    "tare": "absent where rejected, and where no tare is in use",
+}
+"""When a field is unknown, by the part of Estimate that it shows. Empty: never."""
+
+DIAGNOSTICS: Final = {
+    "reach": "how far the load lies beyond the known ones, in parts of the empty sprung mass; 0 among them",
+    "misfit": "likelihood ratio per degree of freedom against free matrices: about 1 where the model fits",
+    "n_segments": "segments that were averaged",
+    "amplitude_ratio": "how much the vehicle moved, over the usual in calibration",
+    "damper_front_ratio": "front dampers' rate over the calibrated",
+    "damper_rear_ratio": "rear dampers' rate over the calibrated",
+    "delay_scale": "by which share the rear axle came later than wheelbase and speed say",
+    "payload_drift_std_kg": "part of `payload_std_kg` that changes of the vehicle since calibration add",
+    "front_share_drift_std_pct": "the same of the front share",
+    "payload_mode_hz": "frequency at which the payload rings on its floor",
+    "delay_s": "mean time from axle to axle",
+    "delay_std_s": "its standard deviation over the segments",
+}
+"""What cross_spectrum says of its own; the ratio index says nothing."""
+
+INTRODUCTION = """\
+# An estimate, field by field
+
+Generated from `gateway/estimate_json.py` by `python docs/make_estimate.py`; do not edit by hand.
+
+Each batch is one JSON object, the same from `springscale estimate --json`, in the store, over [HTTP](api.md) and by
+[MQTT](uplink.md). Unknown is null, never 0. Where `rejected` names [reasons](reasons.md), the numbers are null. Weights
+on the road (gross, axles) are another answer, `/api/v1/weights/latest`.
+"""
+
+GROUPS: Final = (
+    ("The batch", ("",)),
+    ("Epoch: all batches of this load together", ("epoch",)),
+    ("Tare: the zero that was taken off", ("tare",)),
+)
+
+CSV = """\
+## In a CSV file
+
+`/api/v1/export.csv` has one line a batch. An interval becomes two columns, as named above. Reasons are joined by
+blanks. Fields without a column are in the JSON alone.
+"""
+
+
+def estimate_page() -> str:
+    """The whole page as Markdown."""
+    tables = [f"## {title}\n\n{_table(prefixes[0])}" for title, prefixes in GROUPS]
+    return "\n".join([INTRODUCTION, *tables, _diagnostics(), CSV])
+
+
+def part_of(one: EstimateField) -> str:
+    """The part of Estimate that a field shows: a key of NULL."""
+    return "t_end_ns" if one.name == "t_end" else one.path.partition(".")[0]
+
+
+def unit_of(one: EstimateField) -> str:
+    """The unit in which the field's number is; empty for words and pure numbers."""
+    if one.name in SHARES:
+        return "0 to 1"
+    if one.kind in (INSTANT, REASONS, SPECTRA, BY_NAME):
+        return ""
+    return next((unit for ending, unit in UNITS if one.name.endswith(ending)), "")
+
+
+def _table(group: str) -> str:
+    named = [one for one in FIELDS if (part_of(one) if part_of(one) in ("epoch", "tare") else "") == group]
+    cells = ((one.name, unit_of(one), one.description, NULL[part_of(one)], _columns(one)) for one in named)
+    rows = [f"| `{name}` | {' | '.join(map(str, rest))} |" for name, *rest in cells]
+    return "| field | unit | meaning | unknown | columns in CSV |\n|---|---|---|---|---|\n" + "\n".join(rows) + "\n"
+
+
+def _columns(one: EstimateField) -> str:
+    return ", ".join(f"`{column}`" for column in one.columns)
+
+
+def _diagnostics() -> str:
+    rows = [f"| `{name}` | {meaning} |" for name, meaning in DIAGNOSTICS.items()]
+    head = "## diagnostics of cross_spectrum\n\nUnits stand at the end of a name; what has none is a pure number.\n\n"
+    return f"{head}| name | meaning |\n|---|---|\n" + "\n".join(rows) + "\n"
+
+
+def main() -> None:
+    """Write the page, or compare it."""
+    keep_up_to_date(PAGE, estimate_page(), "gateway/estimate_json.py")
+
+
+if __name__ == "__main__":
+    main()
