@@ -106,9 +106,9 @@ def _soak(soak: dict[str, Any]) -> str:
 def _bounds(soak: dict[str, Any]) -> str:
     grow, most = soak["growth_allowed"], soak["most_allowed"]
     return (
-        f"It fails where, from the first day's end to the last's, memory grows by more than {grow['memory_mb']:g} MB, "
-        f"file handles by more than {grow['handles']:g} or threads by more than {grow['threads']:g}, or where database "
-        f"and log exceed {most['database_mb']:g} MB."
+        f"From the first day's end to the last's, memory may grow by {grow['memory_mb']:g} MB, file handles by "
+        f"{grow['handles']:g} and threads by {grow['threads']:g}; database and log together may reach "
+        f"{most['database_mb']:g} MB. Beyond that it fails."
     )
 
 
