@@ -1,1 +1,65 @@
-"""Springscale: weighs a vehicle by listening to its springs."""
+"""Springscale: weighs a vehicle by listening to its springs.
+
+What a notebook needs is here by name (docs/python-api.md); each is imported when it is first asked for.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+    from gateway.core.settings import BatchSettings
+    from gateway.errors import SpringscaleError
+    from gateway.estimate import Estimate, Quantity
+    from gateway.estimate_json import estimate_to_json, table_row
+    from gateway.offline.arrays import estimate_arrays
+    from gateway.offline.estimates import estimates_of_logs
+    from gateway.records import Spectra, Why
+    from gateway.setup import Setup, load_setup
+
+__all__ = (
+    "BatchSettings",
+    "CalibrationFile",
+    "Estimate",
+    "Quantity",
+    "Setup",
+    "Spectra",
+    "SpringscaleError",
+    "Why",
+    "estimate_arrays",
+    "estimate_to_json",
+    "estimates_of_logs",
+    "load_calibration",
+    "load_setup",
+    "table_row",
+)
+
+_HOMES = {
+    "BatchSettings": "gateway.core.settings",
+    "CalibrationFile": "gateway.calibration.file.calibration_file",
+    "Estimate": "gateway.estimate",
+    "Quantity": "gateway.estimate",
+    "Setup": "gateway.setup",
+    "Spectra": "gateway.records",
+    "SpringscaleError": "gateway.errors",
+    "Why": "gateway.records",
+    "estimate_arrays": "gateway.offline.arrays",
+    "estimate_to_json": "gateway.estimate_json",
+    "estimates_of_logs": "gateway.offline.estimates",
+    "load_calibration": "gateway.calibration.file.calibration_file",
+    "load_setup": "gateway.setup",
+    "table_row": "gateway.estimate_json",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, imported now (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(_HOMES[name]), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    """The public names too, for completion in a notebook."""
+    return sorted({*globals(), *__all__})

@@ -41,6 +41,10 @@ class LogUnreadableError(SpringscaleError):
     """A log holds no frame that can be read."""
 
 
+class ArraysError(SpringscaleError):
+    """Arrays of measurements do not fit together, or not the calibration."""
+
+
 class BusError(SpringscaleError):
     """A CAN interface cannot be opened at all (wrong name, missing driver)."""
 

@@ -139,6 +139,11 @@ def csv_cells(told: Mapping[str, Any]) -> dict[str, Any]:
     return cells
 
 
+def table_row(estimate: Estimate) -> dict[str, Any]:
+    """The columns of a CSV file, all of them, for a table of estimates such as pandas makes; None where unknown."""
+    return {**dict.fromkeys(COLUMNS), **csv_cells(estimate_to_json(estimate))}
+
+
 def _joined(shown: Any) -> Any:
     return " ".join(shown) if isinstance(shown, list) else shown
 

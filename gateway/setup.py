@@ -45,7 +45,10 @@ class Setup:
 
 
 def load_setup(
-    signals: Path | str, calibration: Path | None, estimator: str | None, identity: Identity = NOBODY
+    signals: Path | str,
+    calibration: Path | str | None = None,
+    estimator: str | None = None,
+    identity: Identity = NOBODY,
 ) -> Setup:
     """Loads the signal map and the calibration file; the best estimator of the file where none is named.
 

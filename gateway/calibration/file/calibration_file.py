@@ -107,11 +107,12 @@ def content_id(content: dict[str, Any]) -> str:
     return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_calibration(path: Path) -> CalibrationFile:
+def load_calibration(path: Path | str) -> CalibrationFile:
     """Reads, checks version, hash and shape; an older version is migrated, what it did not say is null.
 
     Raises CalibrationFileError saying what to do.
     """
+    path = Path(path)
     content = _read(path)
     if content.get("format") != FORMAT:
         raise CalibrationFileError(f"{path}: not a springscale calibration file (format is {content.get('format')!r})")

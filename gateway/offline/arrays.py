@@ -1,0 +1,55 @@
+"""Arrays in, estimates out: for measurements that come from no CAN log."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.core.flow import Flow, Identity
+from gateway.core.settings import BatchSettings
+from gateway.errors import ArraysError
+from gateway.estimate import Estimate
+from gateway.offline.estimates import AS_THE_SERVICE
+from gateway.records import F64, Motion, Signal
+from gateway.units import NS_PER_S
+
+_NOBODY: Final = Identity()
+
+
+def estimate_arrays(
+    t_s: F64,
+    vertical_acceleration_mps2: F64,
+    pitch_rate_radps: F64,
+    speed_mps: F64,
+    calibration: CalibrationFile,
+    *,
+    estimator: str | None = None,
+    settings: BatchSettings = AS_THE_SERVICE,
+) -> list[Estimate]:
+    """Every batch of one drive, by the same path as the service's: one row of each array an instant.
+
+    All of shape (n,): times in s since 1970 or any other start, in order; acceleration upwards with gravity in it;
+    pitch rate positive nose down (ISO 8855); NaN where a sensor says nothing at that instant. ``estimator`` is the
+    file's best where none is named. Raises ArraysError for arrays that do not fit, or an estimator that is not there.
+    """
+    chosen = estimator or calibration.estimators[0]
+    if chosen not in calibration.estimators:
+        raise ArraysError(f"the calibration is for {', '.join(calibration.estimators)}, not for {chosen!r}")
+    motion = _motion(t_s, (vertical_acceleration_mps2, pitch_rate_radps, speed_mps))
+    flow = Flow(settings, {}, calibration.for_core(), chosen, _NOBODY)
+    return [*flow.feed(motion), *flow.flush()]
+
+
+def _motion(t_s: F64, columns: Sequence[F64]) -> Motion:
+    """The rows that a decoder would have given."""
+    times_s = np.asarray(t_s, dtype=np.float64)
+    sensed = [np.asarray(column, dtype=np.float64) for column in columns]
+    if times_s.ndim != 1 or any(column.shape != times_s.shape for column in sensed):
+        shapes = ", ".join(str(column.shape) for column in (times_s, *sensed))
+        raise ArraysError(f"times and sensors must be of one length and one dimension; their shapes are {shapes}")
+    if not np.isfinite(times_s).all():
+        raise ArraysError("a time is not a number")
+    t_ns = np.round(times_s * NS_PER_S).astype(np.int64)
+    signals = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
+    return Motion(signals, t_ns, np.column_stack(sensed))

@@ -1,0 +1,88 @@
+"""import gateway: cheap, a few public names, and arrays are weighed as the service weighs frames."""
+
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.drives import T0_NS, drive, steady
+from support.patience import PATIENCE_S
+
+import gateway
+from gateway.core.flow import Flow, Identity
+from gateway.errors import ArraysError
+from gateway.estimate_json import COLUMNS
+from gateway.records import Motion, Signal
+
+PAPER_VAN = str(files("gateway") / "demo" / "paper_van.json")
+SENSED = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
+
+
+@pytest.fixture(scope="module")
+def calibration() -> gateway.CalibrationFile:
+    return gateway.load_calibration(PAPER_VAN)
+
+
+@pytest.fixture(scope="module")
+def motion() -> Motion:
+    """Rows as decoded, in seconds since the drive's start so that no nanosecond is lost in a float."""
+    rows = drive(330.0, steady(14.0))
+    order = [rows.signals.index(signal) for signal in SENSED]
+    return Motion(SENSED, rows.t_ns - T0_NS, rows.columns[:, order])
+
+
+def test_importing_it_imports_nothing_of_weight() -> None:
+    command = (
+        "import sys, gateway; print(sorted(name for name in sys.modules if name.startswith(('gateway', 'numpy'))))"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", command], capture_output=True, text=True, timeout=PATIENCE_S, check=True
+    ).stdout
+    assert said.strip() == "['gateway']"
+
+
+def test_every_public_name_is_there_and_told_in_the_page() -> None:
+    page = (Path(__file__).parents[2] / "docs/python-api.md").read_text()
+    assert [name for name in gateway.__all__ if getattr(gateway, name, None) is None] == []
+    assert [name for name in gateway.__all__ if f"`{name}" not in page] == []
+    assert set(gateway.__all__) <= set(dir(gateway))
+    assert set(gateway.__all__) == set(gateway._HOMES)
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = gateway.nothing
+
+
+def test_arrays_are_weighed_as_rows_of_a_bus_are(motion: Motion, calibration: gateway.CalibrationFile) -> None:
+    flow = Flow(gateway.BatchSettings(), {}, calibration.for_core(), "cross_spectrum", Identity())
+    told = [*flow.feed(motion), *flow.flush()]
+    found = gateway.estimate_arrays(motion.t_ns / 1e9, *motion.columns.T, calibration, estimator="cross_spectrum")
+    assert len(found) > 0
+    assert [gateway.estimate_to_json(each) for each in found] == [gateway.estimate_to_json(each) for each in told]
+
+
+def test_a_row_of_a_table_has_every_column(motion: Motion, calibration: gateway.CalibrationFile) -> None:
+    first, *_ = gateway.estimate_arrays(motion.t_ns / 1e9, *motion.columns.T, calibration)
+    row = gateway.table_row(first)
+    assert tuple(row) == COLUMNS
+    assert row["calibration_id"] == calibration.id
+
+
+@pytest.mark.parametrize(
+    ("t_s", "speed_mps", "said"),
+    [
+        (np.arange(3.0), np.zeros(2), r"shapes are \(3,\), \(3,\), \(3,\), \(2,\)"),
+        (np.zeros((3, 1)), np.zeros(3), "one dimension"),
+        (np.array([0.0, np.nan, 1.0]), np.zeros(3), "not a number"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(
+    t_s: np.ndarray, speed_mps: np.ndarray, said: str, calibration: gateway.CalibrationFile
+) -> None:
+    with pytest.raises(ArraysError, match=said):
+        gateway.estimate_arrays(t_s, np.zeros(3), np.zeros(3), speed_mps, calibration)
+
+
+def test_an_estimator_that_the_file_lacks_is_refused(calibration: gateway.CalibrationFile) -> None:
+    with pytest.raises(ArraysError, match="not for 'scales'"):
+        gateway.estimate_arrays(*np.zeros((4, 3)), calibration, estimator="scales")
