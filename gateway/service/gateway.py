@@ -114,11 +114,11 @@ class Gateway:
         """Show what was known before; a disk that refuses even to be read is no reason not to start."""
         try:
             self.board.restore(**asdict(self.store.reader().latest()))
-        except StoreError as fault:
+        except (StoreError, ValueError, KeyError) as fault:  # the last two: another version's record
             log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
         heard = self.board.heard()
-        if heard["id"] is not None and heard["calibration_id"] != calibration_id:
-            log_event(Event.CALIBRATION_CHANGED, calibration_id=calibration_id, before=heard["calibration_id"])
+        if heard is not None and heard.calibration_id != calibration_id:
+            log_event(Event.CALIBRATION_CHANGED, calibration_id=calibration_id, before=heard.calibration_id)
 
     @property
     def url(self) -> str:

@@ -133,7 +133,7 @@ class Pipeline:
                 self._weighed_at = (self.flow.weighed, boot_clock_s())
             record = estimate_to_json(found)
             cursor = None if found.is_provisional else self._store.write_estimate(record)
-            self._board.publish(record, cursor)
+            self._board.publish(found, cursor)
             self._on_batch(found)
 
     def _count(self, found: Estimate) -> None:

@@ -14,7 +14,7 @@ from schemathesis import GenerationMode
 from schemathesis.schemas import APIOperation, BaseSchema
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 from support.calibrated import calibration_file
-from support.estimates import make_record
+from support.estimates import make_estimate
 from support.patience import PATIENCE_S
 from support.tare import FakePipeline
 from support.web import Gateway
@@ -72,7 +72,7 @@ def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
         tempfile.TemporaryDirectory() as directory,
         Gateway(Path(directory), PATIENT, token_file, tare_desk(Path(directory))) as gateway,
     ):
-        gateway.publish(*(make_record(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
+        gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
         assert gateway.store.flush(PATIENCE_S)
         gateway.board.close()  # so that the stream has an end
         yield schemathesis.openapi.from_asgi("/openapi.json", gateway.app)

@@ -6,12 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
-from support.estimates import make_record
+from support.estimates import make_estimate, make_record
 from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
+from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
 from gateway.status import SignalHealth, State, Status
 from gateway.web import Board, create_app
@@ -22,7 +23,7 @@ N_ROWS = 1203  # several pages of the store, the last one not full
 
 def test_every_batch_is_in_the_csv_once(tmp_path: Path) -> None:
     with Gateway(tmp_path) as gateway:
-        gateway.publish(*(make_record(n, *([Why.GAP, Why.TOO_SLOW] if n % 4 == 0 else [])) for n in range(N_ROWS)))
+        gateway.publish(*(make_estimate(n, *([Why.GAP, Why.TOO_SLOW] if n % 4 == 0 else [])) for n in range(N_ROWS)))
         answer = Client(gateway.app).get("/api/v1/export.csv")
         assert answer.headers["content-type"] == "text/csv; charset=utf-8"
         assert answer.headers["content-disposition"] == 'attachment; filename="springscale.csv"'
@@ -37,7 +38,7 @@ def test_every_batch_is_in_the_csv_once(tmp_path: Path) -> None:
 def test_every_batch_is_in_the_json_lines_once(tmp_path: Path) -> None:
     with Gateway(tmp_path) as gateway:
         records = [make_record(n, with_spectra=True) for n in range(N_ROWS)]
-        gateway.publish(*records)
+        gateway.publish(*(make_estimate(n, with_spectra=True) for n in range(N_ROWS)))
         client = Client(gateway.app)
         with_spectra = client.get("/api/v1/export.jsonl?spectra=true").text.splitlines()
         assert [json.loads(line) for line in with_spectra] == records
@@ -47,7 +48,7 @@ def test_every_batch_is_in_the_json_lines_once(tmp_path: Path) -> None:
 
 def test_a_span_is_cut_out(tmp_path: Path) -> None:
     with Gateway(tmp_path) as gateway:
-        gateway.publish(*(make_record(n) for n in range(4)))
+        gateway.publish(*(make_estimate(n) for n in range(4)))
         query = "?since=1970-01-01T00:10:00Z&until=1970-01-01T00:20:00Z"
         lines = Client(gateway.app).get(f"/api/v1/export.jsonl{query}").text.splitlines()
         assert [json.loads(line) for line in lines] == [make_record(1), make_record(2)]
@@ -109,13 +110,13 @@ def test_the_last_spectra_are_those_of_the_last_batch_rejected_or_not(tmp_path: 
     with Gateway(tmp_path) as gateway:
         client = Client(create_app(board, gateway.store.reader(), lambda: gateway.status, calibrated=CALIBRATED))
         assert client.get("/api/v1/spectra/latest").json()["spectra"] is None
-        board.publish(make_record(0, with_spectra=True))
-        rejected = make_record(1, Why.NO_CALIBRATION, with_spectra=True)
+        board.publish(make_estimate(0, with_spectra=True))
+        rejected = make_estimate(1, Why.NO_CALIBRATION, with_spectra=True)
         board.publish(rejected)
-        board.publish(make_record(2, is_provisional=True, with_spectra=True))
+        board.publish(make_estimate(2, is_provisional=True, with_spectra=True))
         told = client.get("/api/v1/spectra/latest").json()
-    assert (told["id"], told["rejected"]) == (rejected["id"], ["no_calibration"])
-    assert told["spectra"] == rejected["spectra"]
+    assert (told["id"], told["rejected"]) == (rejected.id, ["no_calibration"])
+    assert told["spectra"] == estimate_to_json(rejected)["spectra"]
     assert told["acceleration_bands"] == [
         {"centre_hz": 2.4, "width_hz": 0.05},
         {"centre_hz": 3.25, "width_hz": 0.05},

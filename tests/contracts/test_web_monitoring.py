@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,12 @@ import promql_parser
 import pytest
 import yaml
 from prometheus_client.parser import text_string_to_metric_families
-from support.estimates import make_record
+from support.estimates import make_estimate
 from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
+from gateway.estimate import Quantity
 from gateway.status import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, UplinkStatus
 from gateway.web import create_app
 
@@ -47,7 +49,7 @@ def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set
             batches=BatchCounts(n_estimates=1, n_rejected=2, rejected_by_reason={"gap": 2}),
             uplink=UplinkStatus(broker="fleet.example:8883", waiting_age_s=7.0),
         )
-        gateway.publish({**make_record(0), "front_share_std_pct": 0.5})
+        gateway.publish(replace(make_estimate(0), front_share=Quantity(50.5, 0.5)))
         calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0))
         client = Client(
             create_app(gateway.board, gateway.store.reader(), lambda: gateway.status, calibrated=calibrated)

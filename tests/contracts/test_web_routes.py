@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
-from support.estimates import make_record, texts
+from support.estimates import make_estimate, make_record, texts
 from support.patience import PATIENCE_S
 from support.web import Client, Gateway
 
@@ -37,43 +37,43 @@ def test_latest_before_any_estimate(client: Client) -> None:
 
 
 def test_latest_is_the_estimate_with_its_age(gateway: Gateway, client: Client) -> None:
-    gateway.publish(make_record(5, with_spectra=True))
+    gateway.publish(make_estimate(5, with_spectra=True))
     gateway.clock_s += 7.0
     expected = make_record(5, with_spectra=True) | {"age_s": 7.0, "is_stale": False, "last_rejection": None}
     assert client.get("/api/v1/estimates/latest").json() == expected
 
 
 def test_latest_is_not_sent_twice_to_who_has_it(gateway: Gateway, client: Client) -> None:
-    gateway.publish(make_record(5))
+    gateway.publish(make_estimate(5))
     etag = client.get("/api/v1/estimates/latest").headers["etag"]
     for named in (etag, f'"other", {etag}', etag.removeprefix("W/"), "*"):
         again = client.get("/api/v1/estimates/latest", headers={"if-none-match": named})
         assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", etag)
-    gateway.publish(make_record(6))
+    gateway.publish(make_estimate(6))
     assert client.get("/api/v1/estimates/latest", headers={"if-none-match": etag}).status_code == 200
 
 
 def test_the_history_is_the_stored_text_page_by_page(gateway: Gateway, client: Client) -> None:
     records = [make_record(n, *([Why.GAP] if n % 2 else [])) for n in range(5)]
-    gateway.publish(*records)
+    gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 2 else [])) for n in range(5)))
     first = client.get("/api/v1/estimates", params={"limit": 3})
     assert first.text.startswith('{"items":[' + ",".join(texts(*records[:3])) + '],"next_cursor":"')
     second = client.get("/api/v1/estimates", params={"limit": 3, "cursor": first.json()["next_cursor"]}).json()
     assert second["items"] == records[3:]
     assert second["next_cursor"] is None
-    gateway.publish(make_record(9))
+    gateway.publish(make_estimate(9))
     tail = client.get("/api/v1/estimates", params={"cursor": second["last_cursor"]}).json()
     assert tail["items"] == [make_record(9)]
 
 
 def test_the_history_can_be_asked_newest_first_and_without_spectra(gateway: Gateway, client: Client) -> None:
-    gateway.publish(make_record(0, with_spectra=True), make_record(1, with_spectra=True))
+    gateway.publish(make_estimate(0, with_spectra=True), make_estimate(1, with_spectra=True))
     answer = client.get("/api/v1/estimates", params={"order": "newest_first", "spectra": "false"}).json()
     assert answer["items"] == [make_record(1), make_record(0)]
 
 
 def test_the_history_can_be_cut_by_time(gateway: Gateway, client: Client) -> None:
-    gateway.publish(*(make_record(n) for n in range(4)))  # they end at 00:05, 00:10, 00:15, 00:20
+    gateway.publish(*(make_estimate(n) for n in range(4)))  # they end at 00:05, 00:10, 00:15, 00:20
     span = {"since": "1970-01-01T01:10:00+01:00", "until": "1970-01-01T00:20:00Z"}
     assert client.get("/api/v1/estimates", params=span).json()["items"] == [make_record(1), make_record(2)]
     ages = {"since": "0001-01-01T00:00:00Z", "until": "9999-12-31T23:59:59Z"}
@@ -137,7 +137,7 @@ def test_a_question_is_told_in_words_how_to_mend_it(client: Client) -> None:
     ],
 )
 def test_head_is_answered_as_get_without_the_body(gateway: Gateway, client: Client, path: str) -> None:
-    gateway.publish(make_record(0))
+    gateway.publish(make_estimate(0))
     head = client.request("HEAD", path)
     gateway.board.close()  # so that the stream ends for GET
     asked = client.get(path)
@@ -147,7 +147,7 @@ def test_head_is_answered_as_get_without_the_body(gateway: Gateway, client: Clie
 
 
 def test_head_is_of_the_status_that_get_would_have(gateway: Gateway, client: Client) -> None:
-    gateway.publish(make_record(0))
+    gateway.publish(make_estimate(0))
     etag = client.get("/api/v1/estimates/latest").headers["etag"]
     known = client.request("HEAD", "/api/v1/estimates/latest", headers={"if-none-match": etag})
     assert known.status_code == 304
@@ -163,7 +163,7 @@ def test_an_unforeseen_error_is_a_problem_without_its_inside(gateway: Gateway, c
 
 
 def test_a_store_that_cannot_be_read_is_503(gateway: Gateway, client: Client, tmp_path: Path) -> None:
-    gateway.publish(make_record(0))
+    gateway.publish(make_estimate(0))
     assert gateway.store.flush(PATIENCE_S)
     gateway.store.close()
     (tmp_path / "springscale.db").write_bytes(b"no database at all" * 1000)
@@ -209,7 +209,7 @@ def test_ready_follows_the_service(gateway: Gateway, client: Client) -> None:
 
 
 def test_metrics_can_be_parsed_and_follow_the_status(gateway: Gateway, client: Client) -> None:
-    gateway.publish(make_record(20))
+    gateway.publish(make_estimate(20))
     gateway.status = Status(
         version="1.2.3",
         state=State.ESTIMATING,
@@ -288,7 +288,7 @@ def test_the_description_covers_the_contract_with_units_and_examples(client: Cli
 
 
 def test_the_described_latest_fits_what_is_sent(gateway: Gateway, client: Client) -> None:
-    gateway.publish(make_record(1, with_spectra=True), make_record(2, Why.GAP))
+    gateway.publish(make_estimate(1, with_spectra=True), make_estimate(2, Why.GAP))
     from gateway.web.schemas import EstimatesPage, Latest
 
     Latest.model_validate_json(client.get("/api/v1/estimates/latest").content, strict=True)

@@ -16,7 +16,7 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Correction, Estimate, Quantity
-from gateway.estimate_json import estimate_to_json, spectra_from_json
+from gateway.estimate_json import spectra_from_json
 from gateway.records import Spectra, Why
 from gateway.web import Board, create_app
 
@@ -70,7 +70,7 @@ def told(client: Client) -> dict[str, Any]:
 def test_the_model_is_that_of_what_was_weighed(
     client: Client, board: Board, calibrated: CalibratedVehicle, weighed: Estimate, seen: Spectra
 ) -> None:
-    board.publish(estimate_to_json(weighed))
+    board.publish(weighed)
     answer = told(client)
     assert (answer["estimator"], answer["payload_kg"], answer["front_share_pct"]) == ("cross_spectrum", 270.0, 47.0)
     assert calibrated.cross_spectrum is not None
@@ -84,24 +84,20 @@ def test_the_model_is_that_of_what_was_weighed(
 
 
 def test_the_next_batch_has_a_model_of_its_own(client: Client, board: Board, weighed: Estimate) -> None:
-    board.publish(estimate_to_json(weighed))
+    board.publish(weighed)
     first = told(client)
     assert told(client) == first
-    board.publish(
-        estimate_to_json(
-            replace(weighed, t_start_ns=weighed.t_end_ns, t_end_ns=2 * weighed.t_end_ns, payload=Quantity(100.0))
-        )
-    )
+    board.publish(replace(weighed, t_start_ns=weighed.t_end_ns, t_end_ns=2 * weighed.t_end_ns, payload=Quantity(100.0)))
     second = told(client)
     assert second["spectra"] == first["spectra"]
     assert second["model"]["pitch_rate_radps_rthz"] != first["model"]["pitch_rate_radps_rthz"]
 
 
 def test_the_model_carries_what_a_tare_took_off(client: Client, board: Board, weighed: Estimate) -> None:
-    board.publish(estimate_to_json(weighed))
+    board.publish(weighed)
     untared = told(client)["model"]
     raw = Correction("t1", Quantity(15.0), Quantity(-0.3), raw_payload=Quantity(270.0), raw_front_share=Quantity(47.0))
-    board.publish(estimate_to_json(replace(weighed, payload=Quantity(255.0), front_share=Quantity(47.3), tare=raw)))
+    board.publish(replace(weighed, payload=Quantity(255.0), front_share=Quantity(47.3), tare=raw))
     answer = told(client)
     assert answer["payload_kg"] == 255.0
     assert answer["model"] == untared
@@ -117,7 +113,7 @@ NO_MODEL = {
 
 @pytest.mark.parametrize("case", NO_MODEL)
 def test_there_is_no_model_where_none_was_fitted(client: Client, board: Board, weighed: Estimate, case: str) -> None:
-    board.publish(estimate_to_json(replace(weighed, **NO_MODEL[case])))
+    board.publish(replace(weighed, **NO_MODEL[case]))
     answer = told(client)
     assert answer["model"] is None
     assert (answer["spectra"] is None) == (case == "no spectra")
@@ -127,7 +123,7 @@ def test_a_sensor_that_stands_still_has_no_model(
     client: Client, board: Board, weighed: Estimate, seen: Spectra
 ) -> None:
     still = replace(seen, pitch_rate=0.0 * seen.pitch_rate, coherence=np.full(len(seen.freq_hz), np.nan))
-    board.publish(estimate_to_json(replace(weighed, spectra=still)))
+    board.publish(replace(weighed, spectra=still))
     answer = told(client)
     assert answer["model"] is None
     assert set(answer["spectra"]["coherence"]) == {None}
@@ -135,7 +131,7 @@ def test_a_sensor_that_stands_still_has_no_model(
 
 def test_fits_told_without_delays_take_that_of_the_mean_speed(client: Client, board: Board, weighed: Estimate) -> None:
     """As batches tell that were weighed before delays were told."""
-    board.publish(estimate_to_json(replace(weighed, diagnostics={"delay_s": 2.8 / SPEED_MPS})))
+    board.publish(replace(weighed, diagnostics={"delay_s": 2.8 / SPEED_MPS}))
     with_delay = told(client)["model"]
-    board.publish(estimate_to_json(replace(weighed, diagnostics={}, t_end_ns=2 * weighed.t_end_ns)))
+    board.publish(replace(weighed, diagnostics={}, t_end_ns=2 * weighed.t_end_ns))
     assert told(client)["model"] == with_delay

@@ -7,11 +7,12 @@ from typing import Any
 
 import pytest
 import yaml
-from support.estimates import make_record
+from support.estimates import make_estimate, make_record
 from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
+from gateway.estimate import Estimate, Quantity
 from gateway.records import Why
 from gateway.web import create_app
 
@@ -41,31 +42,31 @@ def client(gateway: Gateway, vehicle: Vehicle | None = VAN) -> Client:
     return Client(create_app(gateway.board, gateway.store.reader(), lambda: gateway.status, calibrated=calibrated))
 
 
-def record(n: int, payload_kg: float = 100.0) -> dict[str, Any]:
-    return make_record(n) | {"payload_kg": payload_kg, "front_share_pct": 50.0, "front_share_std_pct": 0.5}
+def loaded(n: int, payload_kg: float = 100.0) -> Estimate:
+    return replace(make_estimate(n), payload=Quantity(payload_kg, 6.0), front_share=Quantity(50.0, 0.5))
 
 
 def test_weights_are_told_with_deviation_limit_and_warning(gateway: Gateway) -> None:
-    gateway.publish(record(0))
+    gateway.publish(loaded(0))
     told = client(gateway).get("/api/v1/weights/latest").json()
     assert told["gross"] == {"kg": 1540.0, "std_kg": 6.0, "limit_kg": 1545.0, "is_over_limit": False}
     assert told["front_axle"] == {"kg": 760.0, "std_kg": 7.341, "limit_kg": 900.0, "is_over_limit": False}
     assert told["rear_axle"]["limit_kg"] is None
-    assert (told["id"], told["age_s"]) == (record(0)["id"], 0.0)
+    assert (told["id"], told["age_s"]) == (loaded(0).id, 0.0)
 
 
 def test_an_overload_is_warned_of_until_it_is_clearly_over(gateway: Gateway) -> None:
     ask = client(gateway)
     warned = []
     for n, payload_kg in enumerate([100.0, 106.0, 104.0, 59.0, 50.0, 104.0]):
-        gateway.publish(record(n, payload_kg))
+        gateway.publish(loaded(n, payload_kg))
         warned.append(ask.get("/api/v1/weights/latest").json()["gross"]["is_over_limit"])
     assert warned == [False, True, True, True, False, False]
 
 
 @pytest.mark.parametrize("vehicle", [None, replace(VAN, unsprung_front_kg=None)])
 def test_unknown_weights_are_null(gateway: Gateway, vehicle: Vehicle | None) -> None:
-    gateway.publish(record(0))
+    gateway.publish(loaded(0))
     told = client(gateway, vehicle).get("/api/v1/weights/latest").json()
     assert told["gross"]["kg"] is told["front_axle"]["kg"] is None
     assert (told["rear_axle"]["kg"] is None) is (vehicle is None)
@@ -77,7 +78,7 @@ def test_before_any_estimate_there_are_no_weights(gateway: Gateway) -> None:
 
 
 def test_vss_speaks_core_paths_and_exactly_those_of_the_overlay(gateway: Gateway) -> None:
-    gateway.publish(record(0))
+    gateway.publish(loaded(0))
     points = {point["path"]: point for point in client(gateway).get("/api/v1/vss").json()}
     overlay = yaml.safe_load((Path(__file__).parents[2] / "docs" / "vss" / "springscale.vspec").read_text())
     described = {path: node for path, node in overlay.items() if node["type"] != "branch"}
@@ -95,7 +96,7 @@ def test_vss_speaks_core_paths_and_exactly_those_of_the_overlay(gateway: Gateway
 
 
 def test_rfms_tells_whole_kilograms_of_good_batches(gateway: Gateway) -> None:
-    gateway.publish(record(0), make_record(1, Why.GAP), record(2, 130.6))
+    gateway.publish(loaded(0), make_estimate(1, Why.GAP), loaded(2, 130.6))
     answer = client(gateway).get(f"{STATUSES}?starttime=1970-01-01T00:00:00Z").json()
     statuses = answer["vehicleStatusResponse"]["vehicleStatuses"]
     assert [status["grossCombinationVehicleWeight"] for status in statuses] == [1540, 1571]
@@ -113,13 +114,13 @@ def test_rfms_tells_whole_kilograms_of_good_batches(gateway: Gateway) -> None:
 def test_rfms_latest_only_is_the_estimate_shown(gateway: Gateway) -> None:
     ask = client(gateway)
     assert ask.get(f"{STATUSES}?latestOnly=true").json()["vehicleStatusResponse"]["vehicleStatuses"] == []
-    gateway.publish(record(0), record(1))
+    gateway.publish(loaded(0), loaded(1))
     (status,) = ask.get(f"{STATUSES}?latestOnly=true&vin={VIN}").json()["vehicleStatusResponse"]["vehicleStatuses"]
-    assert status["createdDateTime"] == record(1)["t_end"]
+    assert status["createdDateTime"] == make_record(1)["t_end"]
 
 
 def test_rfms_says_where_more_is_and_nothing_is_missed(gateway: Gateway) -> None:
-    gateway.publish(*(record(n) for n in range(1101)))
+    gateway.publish(*(loaded(n) for n in range(1101)))
     ask, seen = client(gateway), []
     link = f"{STATUSES}?starttime=1970-01-01T00:00:00Z&triggerFilter=TIMER"
     while link:
@@ -127,7 +128,7 @@ def test_rfms_says_where_more_is_and_nothing_is_missed(gateway: Gateway) -> None
         seen += [status["createdDateTime"] for status in answer["vehicleStatusResponse"]["vehicleStatuses"]]
         assert answer["moreDataAvailable"] is ("moreDataAvailableLink" in answer)
         link = answer.get("moreDataAvailableLink")
-    assert seen == [record(n)["t_end"] for n in range(1101)]
+    assert seen == [make_record(n)["t_end"] for n in range(1101)]
 
 
 @pytest.mark.parametrize(
@@ -158,7 +159,7 @@ def test_rfms_knows_its_own_vehicle_only(gateway: Gateway) -> None:
 
 
 def test_rfms_without_a_vin_has_no_vehicle(gateway: Gateway) -> None:
-    gateway.publish(record(0))
+    gateway.publish(loaded(0))
     gateway.status = gateway.status.model_copy(update={"vin": None})
     ask = client(gateway)
     assert ask.get("/rfms/vehicles").json()["vehicleResponse"]["vehicles"] == []
@@ -166,7 +167,7 @@ def test_rfms_without_a_vin_has_no_vehicle(gateway: Gateway) -> None:
 
 
 def test_rfms_filters_by_trigger(gateway: Gateway) -> None:
-    gateway.publish(record(0))
+    gateway.publish(loaded(0))
     for filtered, n in (("TIMER", 1), ("ignition_on,timer", 1), ("IGNITION_ON", 0)):
         answer = client(gateway).get(f"{STATUSES}?latestOnly=true&triggerFilter={filtered}").json()
         assert len(answer["vehicleStatusResponse"]["vehicleStatuses"]) == n
@@ -195,7 +196,7 @@ def test_rfms_refuses_other_media_types(gateway: Gateway, accept: str) -> None:
 
 
 def test_j1939_counts_are_the_weights_in_its_resolutions(gateway: Gateway) -> None:
-    gateway.publish(record(0, payload_kg=101.3))
+    gateway.publish(loaded(0, payload_kg=101.3))
     told = client(gateway).get("/api/v1/weights/j1939").json()
     counted = {(each["spn"], each["axle"]): (each["pgn"], each["raw"], each["kg"]) for each in told["parameters"]}
     assert counted == {
@@ -204,12 +205,12 @@ def test_j1939_counts_are_the_weights_in_its_resolutions(gateway: Gateway) -> No
         (181, None): (65258, 51, 102.0),
         (1760, None): (65136, 154, 1540.0),
     }
-    assert told["id"] == record(0)["id"]
+    assert told["id"] == loaded(0).id
 
 
 @pytest.mark.parametrize(("payload_kg", "raw", "kg"), [(-3.2, 0, 0.0), (200_000.0, 65535, None)])
 def test_j1939_counts_stay_in_their_range(gateway: Gateway, payload_kg: float, raw: int, kg: float | None) -> None:
-    gateway.publish(record(0, payload_kg=payload_kg))
+    gateway.publish(loaded(0, payload_kg=payload_kg))
     cargo = client(gateway).get("/api/v1/weights/j1939").json()["parameters"][2]
     assert (cargo["spn"], cargo["raw"], cargo["kg"]) == (181, raw, kg)
 

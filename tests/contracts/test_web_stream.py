@@ -4,12 +4,13 @@ import asyncio
 import json
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
-from support.estimates import make_record
+from support.estimates import make_estimate, make_record
 from support.patience import PATIENCE_S, until
 from support.web import Client, Gateway, Server, serving
 
@@ -64,8 +65,8 @@ def test_each_record_is_sent_with_its_kind_and_cursor(tmp_path: Path) -> None:
             async with listening(server) as listener:
                 assert listener.response.headers["content-type"].startswith("text/event-stream")
                 await until(lambda: gateway.board.fanout.n_subscribers == 1)
-                cursors = gateway.publish(make_record(0), make_record(1, Why.GAP))
-                gateway.board.publish(make_record(2, is_provisional=True))
+                cursors = gateway.publish(make_estimate(0), make_estimate(1, Why.GAP))
+                gateway.board.publish(make_estimate(2, is_provisional=True))
                 assert await listener.event() == (cursors[0], "estimate", make_record(0))
                 assert await listener.event() == (cursors[1], "rejection", make_record(1, Why.GAP))
                 assert await listener.event() == (None, "provisional", make_record(2, is_provisional=True))
@@ -76,13 +77,13 @@ def test_each_record_is_sent_with_its_kind_and_cursor(tmp_path: Path) -> None:
 
 def test_a_stream_is_resumed_behind_the_last_event_without_loss_or_repetition(tmp_path: Path) -> None:
     with Gateway(tmp_path) as gateway:
-        cursors = gateway.publish(*(make_record(n) for n in range(250)))
+        cursors = gateway.publish(*(make_estimate(n) for n in range(250)))
 
         async def scenario(server: Server) -> None:
             async with listening(server, last_event_id=cursors[19]) as listener:
                 await until(lambda: gateway.board.fanout.n_subscribers == 1)
                 for n in range(250, 260):  # while the missed ones are on their way
-                    gateway.publish(make_record(n))
+                    gateway.publish(make_estimate(n))
                 assert await listener.numbers(240) == list(range(20, 260))
 
         run(gateway, scenario)
@@ -127,7 +128,7 @@ def test_closing_the_board_ends_the_streams_and_lets_the_server_stop(
         async def scenario(server: Server) -> None:
             async with listening(server) as listener, listening(server) as other:
                 await until(lambda: gateway.board.fanout.n_subscribers == 2)
-                gateway.publish(make_record(0), make_record(1))
+                gateway.publish(make_estimate(0), make_estimate(1))
                 gateway.board.close()
                 server.uvicorn.should_exit = True
                 for each in (listener, other):
@@ -145,7 +146,7 @@ def test_a_client_that_does_not_read_is_left_behind_alone(tmp_path: Path, monkey
     monkeypatch.setattr(stream, "GRACE_S", 0.0)
     with Gateway(tmp_path) as gateway:
         fanout = gateway.board.fanout
-        bulky = {**make_record(0), "ballast": "x" * 1_000_000}  # more than the sockets hold
+        ballast = "x" * 1_000_000  # more than the sockets hold
 
         async def scenario(server: Server) -> None:
             host, port = server.socket.getsockname()
@@ -155,8 +156,8 @@ def test_a_client_that_does_not_read_is_left_behind_alone(tmp_path: Path, monkey
                 await until(lambda: fanout.n_subscribers == 2)
                 n_sent = 0
                 while fanout.n_slow_clients == 0:
-                    gateway.board.publish({**bulky, "n": n_sent})
-                    assert (await listener.event())[2]["n"] == n_sent
+                    gateway.board.publish(replace(make_estimate(n_sent), vin=ballast))
+                    assert (await listener.event())[2]["payload_kg"] == 100.0 + n_sent
                     n_sent += 1
                     assert n_sent < 5 * QUEUE
                 assert fanout.n_subscribers == 1

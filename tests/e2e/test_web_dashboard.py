@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Watched, furnished
-from support.estimates import make_record
+from support.estimates import make_estimate
 from support.web import Gateway, serving
 
 from gateway.records import Why
@@ -147,21 +147,21 @@ def test_it_follows_what_happens(gateway: Gateway, watched: Watched) -> None:
         expect(page.locator("#history")).to_contain_text("No batch yet.")
         expect(page.locator("#payload-chart")).to_be_hidden()
         expect(page.locator("#link")).to_have_text("live")
-        gateway.publish(make_record(7))
+        gateway.publish(make_estimate(7))
         expect(page.locator("#payload")).to_have_text("107 kg")
         expect(page.locator("#announcement")).to_have_text("Payload 107 kg, 50.5 % on the front axle.")
         expect(page.locator("#note")).to_be_hidden()
         expect(page.locator("#recent tr")).to_have_count(1)
-        gateway.board.publish(make_record(20, is_provisional=True))
+        gateway.board.publish(make_estimate(20, is_provisional=True))
         expect(page.locator("#note")).to_contain_text("Early value")
-        gateway.publish(make_record(20, Why.SPEED_FROZEN))
+        gateway.publish(make_estimate(20, Why.SPEED_FROZEN))
         expect(page.locator("#rejected")).to_contain_text("Speed frozen: the speed repeated one number")
         expect(page.locator("#recent tr")).to_have_count(2)
         gateway.board.close()
 
 
 def test_an_old_estimate_is_said_to_be_old(gateway: Gateway, watched: Watched) -> None:
-    gateway.publish(make_record(0))
+    gateway.publish(make_estimate(0))
     gateway.clock_s += 7200.0
     with serving(gateway.app) as server:
         watched.page.goto(server.url)
@@ -198,7 +198,7 @@ def test_every_state_has_a_name_and_a_sentence(gateway: Gateway, watched: Watche
 
 
 def test_it_stays_readable_without_the_service_and_comes_back_with_it(gateway: Gateway, watched: Watched) -> None:
-    gateway.publish(make_record(0))
+    gateway.publish(make_estimate(0))
     page = watched.page
     with serving(gateway.app) as server:
         page.goto(server.url)
@@ -210,7 +210,7 @@ def test_it_stays_readable_without_the_service_and_comes_back_with_it(gateway: G
     expect(page.locator("#payload")).to_have_text("100 kg")
     gateway.restart_board()
     with serving(gateway.app, port=port):
-        gateway.publish(make_record(1))
+        gateway.publish(make_estimate(1))
         expect(page.locator("#link")).to_have_text("live")
         expect(page.locator("#state-name")).to_have_text("Estimating")
         expect(page.locator("#payload")).to_have_text("101 kg")
@@ -221,7 +221,7 @@ def test_it_stays_readable_without_the_service_and_comes_back_with_it(gateway: G
 def test_it_asks_for_a_token_where_one_is_needed(tmp_path: Path, watched: Watched) -> None:
     tokens = TokenFile(tmp_path / "tokens.json")
     with Gateway(tmp_path / "store", tokens=tokens) as gateway, serving(gateway.app) as server:
-        gateway.publish(make_record(0))
+        gateway.publish(make_estimate(0))
         page = watched.page
         page.goto(server.url)
         expect(page.locator("#state")).to_contain_text("The gateway wants a token.")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
-from support.estimates import make_record
+from support.estimates import make_estimate
 from support.tare import FakePipeline, tare_desk
 from support.web import Gateway, serving
 
@@ -99,7 +99,7 @@ def test_a_refusal_is_told_where_it_was_asked(gateway: Gateway, pipeline: FakePi
         page.get_by_role("button", name="Set the zero").click()
         expect(page.get_by_role("alert")).to_contain_text("+200.0 kg off, a tare corrects up to")
         page.get_by_text("Cancel").click()
-        gateway.publish(make_record(0))  # news, whatever they are
+        gateway.publish(make_estimate(0))  # news, whatever they are
         expect(page.locator("#tare-offer")).to_contain_text("not possible: the payload is +200.0 kg off")
         expect(page.locator("#tare-set")).to_be_disabled()
         gateway.board.close()

@@ -10,7 +10,6 @@ from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Epoch, Estimate, Quantity
-from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
 from gateway.status import BusStatus, SignalHealth, State, Status, StoreStatus, UplinkStatus
 from gateway.web import KnownLoad
@@ -66,7 +65,7 @@ def furnished(directory: Path) -> Gateway:
         weighed(3, 270.0, 48.0, calibrated), spectra=spectra_of(batch_over_road(270.0, 48.0, seed=3, duration_s=60.0))
     )
     batches = [*(weighed(n, 2.0, 50.0, calibrated) for n in range(2)), make_estimate(2, Why.TOO_SLOW, Why.GAP), last]
-    gateway.publish(*(estimate_to_json(batch) for batch in batches))
+    gateway.publish(*batches)
     return gateway
 
 

@@ -14,6 +14,8 @@ import uvicorn
 from fastapi import FastAPI
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
@@ -46,12 +48,12 @@ class Gateway:
         }
         self.app = self._make_app()
 
-    def publish(self, *records: dict[str, Any]) -> list[str]:
+    def publish(self, *estimates: Estimate) -> list[str]:
         """As the pipeline does: into the store, then onto the board."""
         cursors = []
-        for record in records:
-            cursors.append(self.store.write_estimate(record))
-            self.board.publish(record, cursors[-1])
+        for estimate in estimates:
+            cursors.append(self.store.write_estimate(estimate_to_json(estimate)))
+            self.board.publish(estimate, cursors[-1])
         return cursors
 
     def restart_board(self) -> None:

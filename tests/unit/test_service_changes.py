@@ -9,7 +9,6 @@ from support.log import fields_of, logged, names
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.estimate import Estimate, Quantity
-from gateway.estimate_json import estimate_to_json
 from gateway.log import Event
 from gateway.records import Why
 from gateway.service.changes import BatchLog, StateLog
@@ -27,7 +26,7 @@ class Told:
 
     def hear(self, *estimates: Estimate) -> None:
         for estimate in estimates:
-            self.board.publish(estimate_to_json(estimate))
+            self.board.publish(estimate)
             self.log(estimate)
 
 

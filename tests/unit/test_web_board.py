@@ -1,10 +1,13 @@
 """What latest says: the last good estimate, its age, and what came after it."""
 
 import json
+from dataclasses import replace
 
 import pytest
-from support.estimates import make_record
+from support.estimates import WINDOW_NS, make_estimate, make_record
 
+from gateway.estimate import Quantity
+from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
 from gateway.web import Board
 
@@ -43,14 +46,14 @@ def test_before_any_estimate_all_is_null_and_says_why(board: Board) -> None:
 
 
 def test_the_estimate_is_shown_as_it_is_with_its_age(board: Board, clock: Clock) -> None:
-    board.publish(make_record(3))
+    board.publish(make_estimate(3))
     clock.now_s += 12.34
     told = latest(board)
     assert told == make_record(3) | {"age_s": 12.3, "is_stale": False, "last_rejection": None}
 
 
 def test_it_becomes_stale_after_the_time_set(board: Board, clock: Clock) -> None:
-    board.publish(make_record(3))
+    board.publish(make_estimate(3))
     clock.now_s += 900.0
     assert not board.is_stale()
     clock.now_s += 0.1
@@ -59,9 +62,9 @@ def test_it_becomes_stale_after_the_time_set(board: Board, clock: Clock) -> None
 
 
 def test_a_rejection_stands_beside_the_estimate_and_does_not_renew_it(board: Board, clock: Clock) -> None:
-    board.publish(make_record(3))
+    board.publish(make_estimate(3))
     clock.now_s += 300.0
-    board.publish(make_record(4, Why.TOO_SLOW, with_spectra=True))
+    board.publish(make_estimate(4, Why.TOO_SLOW, with_spectra=True))
     told = latest(board)
     assert told["payload_kg"] == 103.0
     assert told["age_s"] == 300.0
@@ -70,7 +73,7 @@ def test_a_rejection_stands_beside_the_estimate_and_does_not_renew_it(board: Boa
 
 
 def test_a_rejection_before_any_estimate_leaves_the_nulls(board: Board) -> None:
-    board.publish(make_record(0, Why.NO_CALIBRATION))
+    board.publish(make_estimate(0, Why.NO_CALIBRATION))
     told = latest(board)
     assert told["rejected"] == ["no_estimate_yet"]
     rejection = told["last_rejection"]
@@ -79,25 +82,25 @@ def test_a_rejection_before_any_estimate_leaves_the_nulls(board: Board) -> None:
 
 
 def test_a_provisional_estimate_stands_in_until_the_drive_has_a_good_one(board: Board) -> None:
-    board.publish(make_record(0, is_provisional=True))
+    board.publish(make_estimate(0, is_provisional=True))
     assert latest(board)["provisional"] is True
-    board.publish(make_record(0))
+    board.publish(make_estimate(0))
     assert "provisional" not in latest(board)
-    board.publish(make_record(1, is_provisional=True))
+    board.publish(make_estimate(1, is_provisional=True))
     assert latest(board)["payload_kg"] == 100.0
     assert "provisional" not in latest(board)
 
 
 def test_a_new_drive_shows_its_early_value_at_once(board: Board) -> None:
-    board.publish(make_record(0))
-    board.publish(make_record(7, is_provisional=True))
+    board.publish(make_estimate(0))
+    board.publish(make_estimate(7, is_provisional=True))
     told = latest(board)
     assert (told["payload_kg"], told.get("provisional")) == (107.0, True)
 
 
 def test_an_early_look_without_an_answer_is_not_shown(board: Board) -> None:
-    board.publish(make_record(0))
-    board.publish(make_record(7, Why.NOT_ENOUGH_EXCITATION, is_provisional=True))
+    board.publish(make_estimate(0))
+    board.publish(make_estimate(7, Why.NOT_ENOUGH_EXCITATION, is_provisional=True))
     told = latest(board)
     assert told["payload_kg"] == 100.0
     assert told["last_rejection"] is None
@@ -122,13 +125,34 @@ def test_the_tag_changes_with_all_but_the_age(board: Board, clock: Clock) -> Non
         tags.append(board.latest()[0])
         return tags[-1] not in tags[:-1]
 
-    board.publish(make_record(0, is_provisional=True))
+    board.publish(make_estimate(0, is_provisional=True))
     assert is_new()
-    board.publish(make_record(0))
+    board.publish(make_estimate(0))
     assert is_new()
     clock.now_s += 10.0
     assert not is_new()
-    board.publish(make_record(1, Why.GAP))
+    board.publish(make_estimate(1, Why.GAP))
     assert is_new()
     clock.now_s += 1000.0
     assert is_new()
+
+
+def test_what_is_shown_is_the_same_before_and_after_a_restart(board: Board, clock: Clock) -> None:
+    thirds = replace(make_estimate(3), payload=Quantity(1000.0 / 3.0, 20.0 / 3.0), t_start_ns=3 * WINDOW_NS + 333)
+    board.publish(thirds)
+    clock.now_s += 12.34
+    before = board.shown()
+    assert (before.payload.number, before.age_s, before.is_stale) == (333.333333, 12.3, False)
+    assert before.estimate is not None
+    assert before.estimate.id == thirds.id
+    again = Board(stale_after_s=900.0, clock=clock)
+    again.restore(json.dumps(estimate_to_json(thirds)), None, age_s=12.34)
+    assert again.shown() == before
+    assert again.latest() == board.latest()
+
+
+def test_a_record_that_another_version_wrote_is_no_estimate_and_nothing_of_it_is_shown(board: Board) -> None:
+    strange = make_record(3, Why.GAP) | {"rejected": ["a_reason_of_tomorrow"]}
+    with pytest.raises(ValueError, match="a_reason_of_tomorrow"):
+        board.restore(json.dumps(make_record(2)), json.dumps(strange), age_s=1.0)
+    assert board.shown().estimate is None

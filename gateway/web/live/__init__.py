@@ -4,8 +4,8 @@ Estimates come in from the pipeline's thread; the latest with its age goes out, 
 and each new one as an event to every stream, after what a client missed meanwhile.
 """
 
-from gateway.web.live.board import Board, boot_clock_s
+from gateway.web.live.board import Board, Shown, boot_clock_s
 from gateway.web.live.latest import LatestFirst, LatestResponse
 from gateway.web.live.stream import EVENT_SCHEMA, EventStream
 
-__all__ = ["EVENT_SCHEMA", "Board", "EventStream", "LatestFirst", "LatestResponse", "boot_clock_s"]
+__all__ = ["EVENT_SCHEMA", "Board", "EventStream", "LatestFirst", "LatestResponse", "Shown", "boot_clock_s"]

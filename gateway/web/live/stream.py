@@ -9,7 +9,7 @@ from typing import Any, Final
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from gateway.web.live.board import kind_of
+from gateway.web.live.board import ESTIMATE, REJECTION
 from gateway.web.live.fanout import Fanout, StreamEvent, Subscription
 from gateway.web.reader import Reader
 
@@ -95,7 +95,8 @@ class EventStream(Response):
         while cursor is not None:
             page = await asyncio.to_thread(self._reader.estimates, cursor=cursor, limit=_REPLAY_PAGE)
             for text, place in zip(page.items, page.cursors, strict=True):
-                yield StreamEvent.of(kind_of(json.loads(text)), text, place)
+                kind = REJECTION if json.loads(text)["rejected"] else ESTIMATE  # the store keeps no provisional ones
+                yield StreamEvent.of(kind, text, place)
             cursor = page.next_cursor
 
 

@@ -1,6 +1,5 @@
 """/api/v1/weights/j1939: weights as SAE J1939-71 counts them, for back-ends that store those."""
 
-import json
 import math
 from dataclasses import asdict, dataclass
 from typing import Final
@@ -9,6 +8,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.weights import Weights
+from gateway.records import iso_utc
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import Scales
 
@@ -60,17 +60,19 @@ def j1939_router(board: Board, scales: Scales) -> APIRouter:
     @router.get("/weights/j1939")
     async def j1939_weights() -> J1939Weights:
         """Axle, cargo and gross weights with the SPNs, resolutions and counts of SAE J1939-71."""
-        shown = json.loads(board.latest()[1])
-        now = scales.weigh(shown)
+        shown = board.shown()
         return J1939Weights(
-            **{name: shown[name] for name in ("id", "t_end", "age_s", "is_stale")},
-            parameters=parameters_of(now, shown["payload_kg"]),
+            id=None if shown.estimate is None else shown.estimate.id,
+            t_end=None if shown.estimate is None else iso_utc(shown.estimate.t_end_ns),
+            age_s=shown.age_s,
+            is_stale=shown.is_stale,
+            parameters=parameters_of(scales.weigh(shown.payload, shown.front_share), shown.payload.number),
         )
 
     return router
 
 
-def parameters_of(weights: Weights | None, payload_kg: float | None) -> list[J1939Weight]:
+def parameters_of(weights: Weights | None, payload_kg: float) -> list[J1939Weight]:
     """Every parameter; what is not known is sent as not available."""
     front_kg, rear_kg, gross_kg = (
         (None, None, None) if weights is None else (weights.front_axle.kg, weights.rear_axle.kg, weights.gross.kg)

@@ -1,6 +1,6 @@
 """The status as Prometheus metrics: base units, counters end in _total, unknown is absent."""
 
-import json
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
@@ -167,21 +167,18 @@ def _web(board: Board, responses: Counter[int]) -> Iterator[Metric]:
     yield _counter("springscale_stream_dropped_events_total", "Events those clients lost.", fanout.n_events_dropped)
 
 
-_ESTIMATE_GAUGES: Final = (
-    ("payload_kg", "springscale_payload_kilograms", "Payload of the latest estimate.", 1.0),
-    ("payload_std_kg", "springscale_payload_std_kilograms", "Its standard deviation.", 1.0),
-    ("front_share_pct", "springscale_front_share_ratio", "Share of the sprung mass on the front axle.", 0.01),
-    ("front_share_std_pct", "springscale_front_share_std_ratio", "Its standard deviation.", 0.01),
-    ("age_s", "springscale_estimate_age_seconds", "Since the latest estimate was received.", 1.0),
-)
-
-
 def _estimate(board: Board) -> Iterator[Metric]:
-    latest = json.loads(board.latest()[1])
-    for name, metric, text, factor in _ESTIMATE_GAUGES:
-        if latest.get(name) is not None:
-            yield _gauge(metric, text, latest[name] * factor)
-    yield _gauge("springscale_estimate_stale", "1 while the latest estimate is old.", float(latest["is_stale"]))
+    shown = board.shown()
+    payload, share, age_s = shown.payload, shown.front_share, math.nan if shown.age_s is None else shown.age_s
+    gauges = (
+        ("springscale_payload_kilograms", "Payload of the latest estimate.", payload.number),
+        ("springscale_payload_std_kilograms", "Its standard deviation.", payload.std),
+        ("springscale_front_share_ratio", "Share of the sprung mass on the front axle.", share.number * 0.01),
+        ("springscale_front_share_std_ratio", "Its standard deviation.", share.std * 0.01),
+        ("springscale_estimate_age_seconds", "Since the latest estimate was received.", age_s),
+    )
+    yield from (_gauge(metric, text, reading) for metric, text, reading in gauges if math.isfinite(reading))
+    yield _gauge("springscale_estimate_stale", "1 while the latest estimate is old.", float(shown.is_stale))
 
 
 def _weights(weights: LatestWeights) -> Iterator[Metric]:

@@ -6,8 +6,10 @@ gateway does not know them.
 
 import asyncio
 import json
+import math
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Annotated, Any, Final, Literal
 from urllib.parse import urlencode
@@ -19,6 +21,8 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
 from gateway.core.weights import Weight
+from gateway.estimate import Quantity
+from gateway.records import iso_utc
 from gateway.status import Status
 from gateway.web.instant import Instant
 from gateway.web.live.board import Board
@@ -30,6 +34,7 @@ from gateway.web.schemas import problem_responses
 PREFIX: Final = "/rfms"
 TRIGGER: Final = "TIMER"  # batches end by the clock
 _PAGE: Final = 500
+_NUMBERS: Final = ("payload_kg", "payload_std_kg", "front_share_pct", "front_share_std_pct")
 _MEDIA_TYPE: Final = r"application/vnd\.fmsstandard\.com\.{service}\.v(2\.1|3\.0|4\.0)\+json"
 _ANY_JSON: Final = re.compile(r"\*/\*|application/\*|application/json", re.IGNORECASE)
 
@@ -89,9 +94,9 @@ def rfms_router(board: Board, reader: Reader, status: Callable[[], Status], scal
         vin = status().vin
         if query.vin is not None and query.vin != vin:
             raise HTTPException(404, f"there is no vehicle {query.vin} here")
-        records, next_cursor = await _records(board, reader, query, has_vin=vin is not None)
+        batches, next_cursor = await _batches(board, reader, query, has_vin=vin is not None)
         body: dict[str, Any] = {
-            "vehicleStatusResponse": {"vehicleStatuses": [_status(record, vin, scales) for record in records]},
+            "vehicleStatusResponse": {"vehicleStatuses": [_status(batch, vin, scales) for batch in batches]},
             "moreDataAvailable": next_cursor is not None,
             "requestServerDateTime": _now(),
         }
@@ -112,15 +117,33 @@ def _refuse_contradictions(query: StatusesQuery) -> None:
         raise HTTPException(400, "stoptime must be after starttime")
 
 
-async def _records(
+@dataclass(frozen=True, slots=True)
+class _Weighed:
+    """What a status needs of a batch that counted."""
+
+    t_end: str
+    payload: Quantity
+    front_share: Quantity
+
+    @classmethod
+    def stored(cls, record: Mapping[str, Any]) -> "_Weighed":
+        """From the store's JSON."""
+        numbers = {name: math.nan if record[name] is None else float(record[name]) for name in _NUMBERS}
+        payload = Quantity(numbers["payload_kg"], numbers["payload_std_kg"])
+        return cls(record["t_end"], payload, Quantity(numbers["front_share_pct"], numbers["front_share_std_pct"]))
+
+
+async def _batches(
     board: Board, reader: Reader, query: StatusesQuery, *, has_vin: bool
-) -> tuple[list[Mapping[str, Any]], str | None]:
+) -> tuple[list[_Weighed], str | None]:
     triggers = None if query.trigger_filter is None else query.trigger_filter.upper().split(",")
     if not has_vin or (triggers is not None and TRIGGER not in triggers):
         return [], None
     if query.latest_only:
-        shown = board.shown()
-        return ([] if shown["id"] is None else [shown]), None
+        shown = board.shown().estimate
+        if shown is None:
+            return [], None
+        return [_Weighed(iso_utc(shown.t_end_ns), shown.payload, shown.front_share)], None
     page = await asyncio.to_thread(
         reader.estimates,
         since_ns=query.starttime,
@@ -129,8 +152,8 @@ async def _records(
         cursor=query.cursor,
         with_spectra=False,
     )
-    records = [json.loads(item) for item in page.items]
-    return [record for record in records if not record["rejected"]], page.next_cursor
+    records = (json.loads(item) for item in page.items)
+    return [_Weighed.stored(record) for record in records if not record["rejected"]], page.next_cursor
 
 
 def _vehicle(now: Status) -> dict[str, Any]:
@@ -142,15 +165,15 @@ def _vehicle(now: Status) -> dict[str, Any]:
     }
 
 
-def _status(record: Mapping[str, Any], vin: str | None, scales: Scales) -> dict[str, Any]:
+def _status(batch: _Weighed, vin: str | None, scales: Scales) -> dict[str, Any]:
     told: dict[str, Any] = {
         "vin": vin,
         "triggerType": {"context": "RFMS", "type": TRIGGER},
-        "createdDateTime": record["t_end"],
-        "receivedDateTime": record["t_end"],
+        "createdDateTime": batch.t_end,
+        "receivedDateTime": batch.t_end,
         "snapshotData": {},
     }
-    weights = scales.weigh(record)
+    weights = scales.weigh(batch.payload, batch.front_share)
     if weights is not None:
         if weights.gross.is_known:
             told["grossCombinationVehicleWeight"] = round(weights.gross.kg)

@@ -1,6 +1,6 @@
 """/api/v1/spectra/latest: what the springs said in the last batch, and what the fitted vehicle should have said."""
 
-from collections.abc import Mapping
+import math
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,11 @@ from starlette.responses import Response
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.ratio_index.index import Band
-from gateway.estimate_json import spectra_from_json, spectra_to_json
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json, spectra_to_json
 from gateway.records import Spectra as SpectraSeen
-from gateway.records import json_line
-from gateway.web.live.board import Board, Record
+from gateway.records import Why, json_line
+from gateway.web.live.board import Board
 from gateway.web.schemas import Spectra
 
 HEAD = ("id", "t_start", "t_end", "estimator", "rejected", "payload_kg", "front_share_pct")
@@ -55,54 +56,58 @@ class LatestSpectra(BaseModel):
 def spectra_router(board: Board, calibrated: CalibratedVehicle | None) -> APIRouter:
     """The route of the spectra; ``calibrated`` is what the service estimates with."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
-    bands = _bands(calibrated)
-    modelled: dict[str | None, Any] = {}  # of the last batch asked for
+    made: dict[str | None, str] = {}  # the answer on the last batch asked for
 
     @router.get("/spectra/latest", response_model=LatestSpectra)
     async def latest_spectra() -> Response:
         """Auto- and cross-spectra of the last batch, the fitted model's beside them, and the ratio index's bands."""
         heard = board.heard()
-        identity = heard["id"]
-        if identity not in modelled:
-            found = await run_in_threadpool(modelled_of, heard, calibrated)
-            modelled.clear()
-            modelled[identity] = found
-        else:
-            found = modelled[identity]
-        told = {name: heard[name] for name in HEAD}
-        shown = {"spectra": heard.get("spectra"), "model": found}
-        return Response(json_line({**told, **shown, **bands}), media_type="application/json")
+        identity = None if heard is None else heard.id
+        if (answer := made.get(identity)) is None:
+            answer = await run_in_threadpool(_answer_on, heard, calibrated)
+            made.clear()
+            made[identity] = answer
+        return Response(answer, media_type="application/json")
 
     return router
 
 
-def modelled_of(record: Record, calibrated: CalibratedVehicle | None) -> dict[str, list[float | None]] | None:
-    """The fitted model's spectra for one record; None where there is no model, no answer or no spectrum."""
-    cross_spectrum = None if calibrated is None else calibrated.cross_spectrum
-    spectra = record.get("spectra")
-    if cross_spectrum is None or spectra is None or record["estimator"] != "cross_spectrum":
+def _answer_on(heard: Estimate | None, calibrated: CalibratedVehicle | None) -> str:
+    """The JSON of a LatestSpectra; ``heard`` is the last batch, None before the first."""
+    if heard is None:
+        told: dict[str, Any] = dict.fromkeys(HEAD) | {"rejected": [str(Why.NO_ESTIMATE_YET)]}
+        shown: dict[str, Any] = {"spectra": None, "model": None}
+    else:
+        record, model = estimate_to_json(heard), modelled_of(heard, calibrated)
+        told = {name: record[name] for name in HEAD}
+        shown = {"spectra": record.get("spectra"), "model": None if model is None else spectra_to_json(model)}
+    return json_line({**told, **shown, **_bands(calibrated)})
+
+
+def modelled_of(heard: Estimate, calibrated: CalibratedVehicle | None) -> SpectraSeen | None:
+    """The fitted model's spectra for one batch; None where there is no model, no answer or no spectrum."""
+    if calibrated is None or calibrated.cross_spectrum is None or heard.estimator != "cross_spectrum":
         return None
-    if calibrated is not None and record["calibration_id"] != calibrated.id:
+    if heard.calibration_id != calibrated.id:
         return None  # weighed with an earlier calibration
-    fitted = _fitted(record, cross_spectrum.wheelbase_m)
-    seen = spectra_from_json(spectra)
-    if fitted is None or not _is_whole(seen):
+    fitted = _fitted(heard, calibrated.cross_spectrum.wheelbase_m)
+    if fitted is None or heard.spectra is None or not _is_whole(heard.spectra):
         return None
-    return spectra_to_json(modelled_spectra(seen, cross_spectrum, fitted))
+    return modelled_spectra(heard.spectra, calibrated.cross_spectrum, fitted)
 
 
-def _fitted(record: Record, wheelbase_m: float) -> Fitted | None:
+def _fitted(heard: Estimate, wheelbase_m: float) -> Fitted | None:
     """What the estimator told of its fit; the delay of the mean speed where it told none."""
-    told: Mapping[str, float | None] = record["diagnostics"]
-    payload_kg = record.get("raw_payload_kg", record["payload_kg"])  # raw: before a tare was taken off
-    front_share_pct = record.get("raw_front_share_pct", record["front_share_pct"])
-    if payload_kg is None or front_share_pct is None or not record["mean_speed_mps"]:
+    told = {name: x for name, x in heard.diagnostics.items() if math.isfinite(x)}
+    payload_kg = heard.payload.number if heard.tare is None else heard.tare.raw_payload.number  # without a tare
+    front_share_pct = heard.front_share.number if heard.tare is None else heard.tare.raw_front_share.number
+    if not (math.isfinite(payload_kg) and math.isfinite(front_share_pct) and heard.mean_speed_mps > 0.0):
         return None
     return Fitted(
         payload_kg=payload_kg,
         front_share_pct=front_share_pct,
-        delay_s=told.get("delay_s") or wheelbase_m / record["mean_speed_mps"],
-        delay_std_s=told.get("delay_std_s") or 0.0,
+        delay_s=told.get("delay_s") or wheelbase_m / heard.mean_speed_mps,
+        delay_std_s=told.get("delay_std_s", 0.0),
         damper_front_ratio=told.get("damper_front_ratio") or 1.0,
         damper_rear_ratio=told.get("damper_rear_ratio") or 1.0,
         delay_scale=told.get("delay_scale"),

@@ -1,22 +1,23 @@
 """/api/v1/vss: the vehicle in the words of the COVESA Vehicle Signal Specification and our overlay to it."""
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.weights import unsprung_kg
-from gateway.web.live.board import Board
+from gateway.web.live.board import Board, Shown
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 
 _UINT16_LAST: Final = 65_535
 
-OVERLAY: Final = {  # path: (what LatestWeights or the estimate calls it, unit); described in docs/vss/springscale.vspec
-    "Vehicle.Load.Payload": ("payload_kg", "kg"),
-    "Vehicle.Load.PayloadStd": ("payload_std_kg", "kg"),
-    "Vehicle.Load.FrontShare": ("front_share_pct", "percent"),
-    "Vehicle.Load.FrontShareStd": ("front_share_std_pct", "percent"),
+OVERLAY: Final[dict[str, tuple[Callable[[Shown], float], str]]] = {  # described in docs/vss/springscale.vspec
+    "Vehicle.Load.Payload": (lambda shown: shown.payload.number, "kg"),
+    "Vehicle.Load.PayloadStd": (lambda shown: shown.payload.std, "kg"),
+    "Vehicle.Load.FrontShare": (lambda shown: shown.front_share.number, "percent"),
+    "Vehicle.Load.FrontShareStd": (lambda shown: shown.front_share.std, "percent"),
 }
 AXLES: Final = {"Vehicle.Chassis.Axle.Row1": "front_axle", "Vehicle.Chassis.Axle.Row2": "rear_axle"}
 
@@ -44,7 +45,7 @@ def vss_router(board: Board, scales: Scales) -> APIRouter:
 
 def vss_points(board: Board, scales: Scales) -> list[VssPoint]:
     """Every path we speak, in a fixed order."""
-    weights, record = weigh_latest(board, scales), board.shown()
+    weights, shown = weigh_latest(board, scales), board.shown()
     t_end = weights.t_end
     points = [
         VssPoint(path="Vehicle.CurrentOverallWeight", value=_uint16(weights.gross.kg), unit="kg", timestamp=t_end),
@@ -52,7 +53,8 @@ def vss_points(board: Board, scales: Scales) -> list[VssPoint]:
         VssPoint(path="Vehicle.GrossWeight", value=_uint16(weights.gross.limit_kg), unit="kg", timestamp=None),
     ]
     points += [
-        VssPoint(path=path, value=record[name], unit=unit, timestamp=t_end) for path, (name, unit) in OVERLAY.items()
+        VssPoint(path=path, value=_or_none(number_of(shown)), unit=unit, timestamp=t_end)
+        for path, (number_of, unit) in OVERLAY.items()
     ]
     for path, name in AXLES.items():
         points += _axle(path, name, weights)
@@ -72,6 +74,10 @@ def _kerb_kg(scales: Scales) -> float | None:
         return None
     kerb_kg = scales.vehicle.empty_mass_kg + sum(unsprung_kg(scales.vehicle))
     return kerb_kg if math.isfinite(kerb_kg) else None
+
+
+def _or_none(x: float) -> float | None:
+    return x if math.isfinite(x) else None
 
 
 def _uint16(kg: float | None) -> int | None:

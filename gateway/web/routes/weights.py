@@ -1,9 +1,7 @@
 """/api/v1/weights/latest: gross weight and axle loads of the latest estimate, and whether they are too much."""
 
-import json
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
@@ -11,6 +9,8 @@ from pydantic import BaseModel, Field
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import Place, Weights, is_over_limit, place_of, weights_of
+from gateway.estimate import Quantity
+from gateway.records import iso_utc
 from gateway.web.live.board import Board
 
 
@@ -49,24 +49,16 @@ class Scales:
     def __init__(self, calibrated: CalibratedVehicle | None) -> None:
         self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
 
-    def weigh(self, record: Mapping[str, Any]) -> Weights | None:
-        """Weights of one record; None without an answer in it or without figures of the vehicle."""
-        if self.vehicle is None or record["payload_kg"] is None or record["front_share_pct"] is None:
+    def weigh(self, payload: Quantity, front_share: Quantity) -> Weights | None:
+        """Weights with such a payload; None without an answer or without figures of the vehicle."""
+        if self.vehicle is None or math.isnan(payload.number) or math.isnan(front_share.number):
             return None
-        return weights_of(
-            self.vehicle,
-            record["payload_kg"],
-            _number(record["payload_std_kg"]),
-            record["front_share_pct"],
-            _number(record["front_share_std_pct"]),
-        )
+        return weights_of(self.vehicle, payload.number, payload.std, front_share.number, front_share.std)
 
-    def place(self, record: Mapping[str, Any]) -> Place | None:
-        """Where the payload of one record lies; None where that cannot be told."""
-        names = ("payload_kg", "payload_std_kg", "front_share_pct", "front_share_std_pct")
-        if self.vehicle is None or any(record[name] is None for name in names):
-            return None
-        return place_of(self.vehicle, *(record[name] for name in names))
+    def place(self, payload: Quantity, front_share: Quantity) -> Place | None:
+        """Where such a payload lies; None where that cannot be told."""
+        numbers = (payload.number, payload.std, front_share.number, front_share.std)
+        return None if self.vehicle is None or any(map(math.isnan, numbers)) else place_of(self.vehicle, *numbers)
 
     def limits_kg(self) -> dict[str, float | None]:
         """The limits that were stated for this vehicle."""
@@ -92,15 +84,16 @@ def weights_router(board: Board, scales: Scales) -> APIRouter:
 
 def weigh_latest(board: Board, scales: Scales) -> LatestWeights:
     """Weights of the estimate shown now; the warnings look back over the last estimates."""
-    shown = json.loads(board.latest()[1])
-    history = [weights for record in board.recent_estimates() if (weights := scales.weigh(record)) is not None]
-    now, place = scales.weigh(shown), scales.place(shown)
+    shown = board.shown()
+    weighed = (scales.weigh(past.payload, past.front_share) for past in board.recent_estimates())
+    history = [weights for weights in weighed if weights is not None]
+    now, place = scales.weigh(shown.payload, shown.front_share), scales.place(shown.payload, shown.front_share)
     limits = scales.limits_kg()
     return LatestWeights(
-        id=shown["id"],
-        t_end=shown["t_end"],
-        age_s=shown["age_s"],
-        is_stale=shown["is_stale"],
+        id=None if shown.estimate is None else shown.estimate.id,
+        t_end=None if shown.estimate is None else iso_utc(shown.estimate.t_end_ns),
+        age_s=shown.age_s,
+        is_stale=shown.is_stale,
         gross=_figure(now, history, "gross", limits["gross"]),
         front_axle=_figure(now, history, "front_axle", limits["front_axle"]),
         rear_axle=_figure(now, history, "rear_axle", limits["rear_axle"]),
@@ -115,10 +108,6 @@ def _figure(now: Weights | None, history: Sequence[Weights], name: str, limit_kg
         limit_kg=limit_kg,
         is_over_limit=is_over_limit((getattr(weights, name).kg for weights in history), limit_kg),
     )
-
-
-def _number(x: float | None) -> float:
-    return math.nan if x is None else x
 
 
 def _or_none(x: float) -> float | None:
