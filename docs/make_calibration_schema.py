@@ -7,7 +7,7 @@ from typing import Any, Final
 from generated import keep_up_to_date
 from pydantic.json_schema import GenerateJsonSchema
 
-from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file import CalibrationFile
 
 PAGE = Path(__file__).with_name("calibration.schema.json")
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"

@@ -5,8 +5,9 @@ from typing import Final
 
 from generated import keep_up_to_date, key_table
 
+from gateway.bus.signals import SignalMapFile, shipped_map
 from gateway.bus.signals.resolve import QUANTITIES
-from gateway.bus.signals.signal_map import SignalEntry, SignalMapFile, shipped_map, shipped_maps
+from gateway.bus.signals.signal_map import SignalEntry, shipped_maps
 from gateway.records import Signal
 from gateway.units import TO_SI
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from gateway.bus.signals.signal_map import SignalMap, load_signal_map
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.bus.signals import SignalMap, load_signal_map
+from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.tare_file import load_tares
 from gateway.config import Settings
 from gateway.core.calibrated import CalibratedVehicle

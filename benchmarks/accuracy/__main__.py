@@ -20,7 +20,7 @@ from benchmarks.accuracy.coverage_drives import Scope
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.inspection import SplitRun
 from gateway.calibration.judgement import learning_curve as on_learning
 from gateway.cli.options import FILE, batch_settings, window
 from gateway.cli.progress import counted
@@ -28,7 +28,7 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.vehicle import Vehicle
 from gateway.errors import SpringscaleError
-from gateway.offline.campaigns import inspect
+from gateway.offline import inspect
 
 _output = click.option("--output", type=FILE, default=None, help="directory to write the numbers and their page to")
 

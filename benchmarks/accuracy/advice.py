@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.calibration.inspection.split_run import SplitRun
-from gateway.calibration.judgement.evaluation import errors_of
+from gateway.calibration.inspection import SplitRun
+from gateway.calibration.judgement import errors_of
 from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all, triples_at_different_positions
 from gateway.calibration.plan import Design, PlacedLoad, Spread, usual_drive, weighed_loads
 from gateway.core.calibrated import CalibratedVehicle

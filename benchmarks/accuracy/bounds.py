@@ -7,8 +7,8 @@ from types import MappingProxyType
 from typing import Final
 
 from benchmarks.accuracy.sensor_bounds import SPEED, Bound, Scene, Seen, bound_of
+from gateway.calibration.half_car import prior_of
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
-from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import Reading

@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, scattered
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.signal_map import SHIPPED_PREFIX, load_signal_map
+from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle as StatedVehicle

@@ -6,8 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.calibration.judgement.coverage import Coverage, coverage_of
-from gateway.calibration.judgement.evaluation import Judged
+from gateway.calibration.judgement import Coverage, Judged, coverage_of
 from gateway.core.vehicle import Vehicle
 from gateway.records import Why
 

@@ -25,10 +25,10 @@ import numpy as np
 from isal import igzip
 
 from gateway.bus.frames import merge_frames
+from gateway.bus.logs import motion_of_log
 from gateway.bus.logs.candump_write import append_candump
 from gateway.bus.logs.line_blocks import open_maybe_gzip
-from gateway.bus.logs.open import motion_of_log
-from gateway.bus.signals.signal_map import load_signal_map, shipped_map
+from gateway.bus.signals import load_signal_map, shipped_map
 from gateway.records import EXTENDED_ID, Frames
 
 FRAMES_PER_S = 2500

@@ -24,11 +24,10 @@ import can
 import cantools
 from can.interfaces.socketcan import socketcan as python_can_socketcan
 
+from gateway.bus.live import LiveSource
 from gateway.bus.live.socketcan import SocketCanReceiver, ask_for_stamps
-from gateway.bus.live.source import LiveSource
-from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.signals.mapping import SignalMap
-from gateway.bus.signals.signal_map import load_signal_map, shipped_map
 
 PROGRAM = (sys.executable, "-m", "benchmarks.speed.live")
 OURS_SHARE = 0.084  # of the frames on the bus: two IMU messages at 100 Hz, GNSS at 10 Hz

@@ -29,7 +29,7 @@ from gateway.records import Frames
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
 from gateway.units import NS_PER_S
-from gateway.workbench.demo_drive import demo_drive, frames_of
+from gateway.workbench import demo_drive, frames_of
 
 DAY_S: Final = 86_400
 BURST_S: Final = 10.0

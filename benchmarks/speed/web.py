@@ -27,10 +27,9 @@ import uvicorn
 import uvloop
 
 from benchmarks.speed import live
+from gateway.bus.live import LiveSource
 from gateway.bus.live.socketcan import SocketCanReceiver
-from gateway.bus.live.source import LiveSource
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.signal_map import load_signal_map
+from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate, Quantity

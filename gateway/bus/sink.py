@@ -12,9 +12,8 @@ from typing import Any, Final, Literal
 import can
 
 from gateway.bus.frames import take
-from gateway.bus.live.python_can import require_known_interface
-from gateway.bus.logs.open import open_whole_log
-from gateway.bus.logs.report import LogReport
+from gateway.bus.live import require_known_interface
+from gateway.bus.logs import LogReport, open_whole_log
 from gateway.bus.messages import message_of
 from gateway.errors import BusError
 from gateway.records import Frames

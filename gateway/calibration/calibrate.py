@@ -8,7 +8,7 @@ from importlib.metadata import version
 import numpy as np
 
 from gateway.calibration.campaign import Campaign, file_sha256
-from gateway.calibration.file.calibration_file import (
+from gateway.calibration.file import (
     CalibrationFile,
     CrossSpectrumPart,
     ExpectedErrorsPart,
@@ -18,10 +18,8 @@ from gateway.calibration.file.calibration_file import (
     SeenPart,
     VehiclePart,
 )
-from gateway.calibration.half_car.fit import CrossSpectrumFit, fit_cross_spectrum
-from gateway.calibration.inspection.finding import Severity
-from gateway.calibration.inspection.inspection import Inspection
-from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
+from gateway.calibration.inspection import Inspection, Severity, SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index import BandChoice, RatioIndexFit, StructureChoice, fit_ratio_index
 from gateway.core.spectrum import roughness_mps2, spectra_of

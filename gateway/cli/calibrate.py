@@ -10,9 +10,9 @@ import click
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file.calibration_file import CalibrationFile
-from gateway.calibration.inspection.inspection import Inspection
-from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
+from gateway.calibration.file import CalibrationFile
+from gateway.calibration.inspection import Inspection
+from gateway.calibration.judgement import LearningCurve, curve_of
 from gateway.calibration.plan import LoadPlan, plan_first, plan_next
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
@@ -23,7 +23,7 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError, ConfigurationError
-from gateway.offline.campaigns import inspect
+from gateway.offline import inspect
 from gateway.records import json_line
 
 

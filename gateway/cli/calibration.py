@@ -9,9 +9,15 @@ import click
 
 from gateway.calibration.axle_weights import DIVISION_KG, AxleWeights, sprung_of
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
-from gateway.calibration.file.check import Check, Verdict, check_against_campaign
-from gateway.calibration.file.comparison import Difference, differences
+from gateway.calibration.file import (
+    CalibrationFile,
+    Check,
+    Difference,
+    check_against_campaign,
+    differences,
+    load_calibration,
+)
+from gateway.calibration.file.check import Verdict
 from gateway.cli.calibration_tare import tare_commands
 from gateway.cli.options import FILE, as_json
 from gateway.cli.text.axle_weights import vehicle_block

@@ -22,7 +22,7 @@ from gateway.sim.scenario import START_NS, Truth
 from gateway.store import Store
 from gateway.units import NS_PER_S
 from gateway.web import KnownLoad
-from gateway.workbench.demo_drive import demo_drive, frames_of
+from gateway.workbench import demo_drive, frames_of
 
 CHANNEL: Final = "springscale-demo"
 ROUND_NS: Final = 1800 * NS_PER_S  # from the start of one drive to the start of the next

@@ -11,7 +11,7 @@ from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.estimate_json import estimate_to_json
-from gateway.offline.estimates import estimates_of_logs
+from gateway.offline import estimates_of_logs
 from gateway.records import json_line
 from gateway.setup import Setup, load_setup, setup_of
 

@@ -5,13 +5,13 @@ from pathlib import Path
 import click
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
-from gateway.calibration.judgement.assessment import Part, assess_evaluation
-from gateway.calibration.judgement.evaluation import Errors, ErrorTable, Judged, TargetErrors, error_table
+from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.judgement import Errors, ErrorTable, Judged, Part, TargetErrors, assess_evaluation, error_table
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError
-from gateway.offline.campaigns import Split, judge_campaign
+from gateway.offline import judge_campaign
+from gateway.offline.campaigns import Split
 from gateway.records import json_line
 
 

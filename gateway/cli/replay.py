@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from gateway.bus.logs.report import LogReport
+from gateway.bus.logs import LogReport
 from gateway.bus.sink import ReplayProgress, Speed
 from gateway.bus.sink import replay as send_log
 from gateway.cli import options

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.bus.logs.open import motion_of_log
-from gateway.bus.logs.report import LogReport
-from gateway.bus.signals.signal_map import SignalMap
+from gateway.bus.logs import LogReport, motion_of_log
+from gateway.bus.signals import SignalMap
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.records import Batch, Motion

@@ -5,16 +5,12 @@ from typing import Final, Literal
 
 import numpy as np
 
-from gateway.bus.logs.report import LogReport
-from gateway.bus.signals.signal_map import SignalMap, load_signal_map
+from gateway.bus.logs import LogReport
+from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
-from gateway.calibration.inspection.campaign import inspect_campaign
-from gateway.calibration.inspection.inspection import Inspection
-from gateway.calibration.inspection.log import LogFacts
-from gateway.calibration.inspection.rows import row_facts
-from gateway.calibration.inspection.split_run import SplitRun
-from gateway.calibration.judgement.evaluation import Judged, judge
+from gateway.calibration.inspection import Inspection, LogFacts, SplitRun, inspect_campaign, row_facts
+from gateway.calibration.judgement import Judged, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.core.calibrated import CalibratedVehicle

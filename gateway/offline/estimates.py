@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from gateway.bus.logs.open import motion_of_log
+from gateway.bus.logs import motion_of_log
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate
 from gateway.setup import Setup

@@ -10,8 +10,8 @@ from functools import partial
 
 import uvicorn
 
-from gateway.bus.live.source import OpenReceiver
-from gateway.bus.signals.decode import Decoder
+from gateway.bus.live import OpenReceiver
+from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError, StoreError
 from gateway.log import Event, log_event

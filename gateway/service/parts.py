@@ -2,7 +2,7 @@
 
 from importlib.metadata import version
 
-from gateway.bus.live.source import LiveSource, OpenReceiver
+from gateway.bus.live import LiveSource, OpenReceiver
 from gateway.config import BusSection, StoreSection
 from gateway.setup import Setup
 from gateway.store import Retention, Store

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.bus.live.inbox import Inbox
-from gateway.bus.signals.decode import Decoder
+from gateway.bus.live import Inbox
+from gateway.bus.signals import Decoder
 from gateway.core.flow import Flow
 from gateway.core.tare import Weighed
 from gateway.estimate import Estimate

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from importlib.metadata import version
 
-from gateway.bus.live.source import LiveSource, SourceState
+from gateway.bus.live import LiveSource, SourceState
 from gateway.config import Settings
 from gateway.records import Signal
 from gateway.service.pipeline import Pipeline

@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.frames import merge_frames
-from gateway.bus.logs.candump_write import write_candump
-from gateway.bus.signals.signal_map import SignalMapFile, shipped_map
+from gateway.bus.logs import write_candump
+from gateway.bus.signals import SignalMapFile, shipped_map
 from gateway.bus.sink import BusSink, OnProgress, Speed, replay_frames
 from gateway.errors import ConfigurationError, SignalMapError
 from gateway.records import Frames

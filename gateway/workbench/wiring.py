@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.frames import merge_frames, take
-from gateway.bus.signals.encode import Encoder
-from gateway.bus.signals.signal_map import SHIPPED_PREFIX, load_signal_map
+from gateway.bus.signals import SHIPPED_PREFIX, Encoder, load_signal_map
 from gateway.errors import ConfigurationError
 from gateway.records import F64, I64, Frames
 from gateway.sim.sensors import Recording

@@ -15,12 +15,11 @@ from support.encoded import encode_signals
 from support.patience import PATIENCE_S
 
 from gateway.bus.frames import join, merge_frames
-from gateway.bus.live.source import LiveSource
-from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.live import LiveSource
+from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.messages import message_of
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.signal_map import load_signal_map, shipped_map
+from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.sink import BusSink, replay
 from gateway.errors import LogUnreadableError
 from gateway.records import EXTENDED_ID, Frames, Motion, Signal

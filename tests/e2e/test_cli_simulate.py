@@ -7,9 +7,8 @@ import can
 import pytest
 from click.testing import CliRunner, Result
 
-from gateway.bus.logs.open import motion_of_log
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.signal_map import load_signal_map
+from gateway.bus.logs import motion_of_log
+from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.cli import main, springscale
 from gateway.cli import reproduce as reproduce_command
@@ -17,7 +16,8 @@ from gateway.cli.progress import StatusLine, counted
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.reports.paper.evidence import Scope
-from gateway.workbench.demo_drive import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, frames_of
+from gateway.workbench import demo_drive, frames_of
+from gateway.workbench.demo_drive import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS
 
 LINE = "({t:.6f}) can1 101#0102030405060708\n"
 

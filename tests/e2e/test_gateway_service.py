@@ -18,12 +18,12 @@ from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
 from support.process import running_service
 
-from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs import write_candump
 from gateway.bus.sink import replay
 from gateway.config import load_settings
 from gateway.errors import StoreError
 from gateway.estimate_json import estimate_to_json
-from gateway.offline.estimates import estimates_of_logs
+from gateway.offline import estimates_of_logs
 from gateway.records import Motion, json_line
 from gateway.service.gateway import Gateway, GatewayFailedError
 from gateway.setup import setup_of

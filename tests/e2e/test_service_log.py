@@ -16,7 +16,7 @@ from support.patience import wait_until
 from support.ports import free_port
 from support.process import TESTS
 
-from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs import write_candump
 
 CONFIG = """
 signals = "springscale:reference"

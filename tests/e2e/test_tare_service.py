@@ -15,7 +15,7 @@ from support.log import fields_of, names
 from support.patience import wait_until
 from support.ports import first_answer
 
-from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs import write_candump
 from gateway.bus.sink import replay
 from gateway.cli import springscale
 from gateway.config import load_settings

@@ -6,8 +6,8 @@ from pathlib import Path
 import make_findings
 import pytest
 
+from gateway.calibration.inspection import Severity
 from gateway.calibration.inspection.explained import EXPLAINED, finding_of
-from gateway.calibration.inspection.finding import Severity
 from gateway.calibration.inspection.kinds import Kind
 
 ROOT = Path(__file__).parents[2]

@@ -8,16 +8,14 @@ from pathlib import Path
 import pytest
 from support.recordings import recordings
 
-from gateway.bus.signals.signal_map import load_signal_map
+from gateway.bus.signals import load_signal_map
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.inspection.inspection import Inspection
-from gateway.calibration.inspection.rows import row_facts
+from gateway.calibration.inspection import Inspection, SplitRun, row_facts
 from gateway.calibration.inspection.run import inspect_run
-from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
+from gateway.offline import inspect
 from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
-from gateway.offline.campaigns import inspect
 
 SETTINGS = BatchSettings()
 

@@ -13,7 +13,8 @@ import pytest
 from pydantic import BaseModel
 from support.half_car_road import batch_over_road, weighed
 
-from gateway.bus.signals.signal_map import SignalEntry, SignalMapFile, load_signal_map
+from gateway.bus.signals import SignalMapFile, load_signal_map
+from gateway.bus.signals.signal_map import SignalEntry
 from gateway.calibration.campaign import CampaignTable, RunTable, VehicleTable, load_campaign
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.estimate import Estimate

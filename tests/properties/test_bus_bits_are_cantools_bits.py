@@ -10,9 +10,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.encode import Encoder
-from gateway.bus.signals.signal_map import SignalMap, load_signal_map
+from gateway.bus.signals import Decoder, Encoder, SignalMap, load_signal_map
 from gateway.records import Frames, Signal
 
 MAP = 'dbc = ["one.dbc"]\n[signals.ignition]\nmessage = "M"\nsignal = "S"\nunit = "1"\n'

@@ -10,11 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gateway.bus.frames import join
+from gateway.bus.logs import LogReport, write_candump
 from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.candump_line import LineFrame, read_line
-from gateway.bus.logs.candump_write import write_candump
 from gateway.bus.logs.open import EVERY_FRAME
-from gateway.bus.logs.report import LogReport
 from gateway.bus.signals.mapping import exact_filter
 from gateway.records import EXTENDED_ID, Frames
 

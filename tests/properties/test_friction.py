@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.half_car_road import CAR, VAN, batch_over_road, weighed
 
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
-from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.half_car import calibrate_cross_spectrum, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.friction import LEAST_LEFT, LEVELS, MOST, at_levels, level_weights

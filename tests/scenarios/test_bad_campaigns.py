@@ -10,13 +10,13 @@ import can
 import pytest
 from click.testing import CliRunner, Result
 
-from gateway.bus.logs.open import open_whole_log
+from gateway.bus.logs import open_whole_log
 from gateway.bus.messages import message_of
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.cli import springscale
 from gateway.errors import CalibrationImpossibleError
-from gateway.workbench.simulate import bench_of, write_campaign
+from gateway.workbench import bench_of, write_campaign
 
 DRIVE_S = 165.0
 WINDOW = ("--window-s", "50")

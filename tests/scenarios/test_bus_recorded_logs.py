@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from support.recordings import recordings
 
-from gateway.bus.logs.open import motion_of_log
-from gateway.bus.signals.signal_map import load_signal_map
+from gateway.bus.logs import motion_of_log
+from gateway.bus.signals import load_signal_map
 from gateway.records import Signal
 from gateway.units import si_factor
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from support.sensor_faults import Fault, with_fault
 
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.signal_map import load_signal_map
+from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.settings import BatchSettings
 from gateway.offline.batches import batches_of_motion
 from gateway.records import Why

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gateway.bus.signals.signal_map import load_signal_map
+from gateway.bus.signals import load_signal_map
 from gateway.records import Frames, Signal
 from support.encoded import encode_signals
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gateway.bus.frames import merge_frames
-from gateway.bus.signals.encode import Encoder
+from gateway.bus.signals import Encoder
 from gateway.bus.signals.mapping import SignalMap
 from gateway.records import F64, I64, Frames, Signal
 

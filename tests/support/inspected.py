@@ -4,12 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.signal_map import SignalMap, load_signal_map
-from gateway.calibration.inspection.finding import RunVerdict
-from gateway.calibration.inspection.rows import row_facts
+from gateway.bus.signals import Decoder, SignalMap, load_signal_map
+from gateway.calibration.inspection import RunVerdict, SplitRun, row_facts
 from gateway.calibration.inspection.run import inspect_run
-from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import Traits
 from gateway.core.scheduler import Scheduler

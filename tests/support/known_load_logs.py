@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.bus.logs.candump_write import write_candump
-from gateway.bus.signals.signal_map import load_signal_map
+from gateway.bus.logs import write_candump
+from gateway.bus.signals import load_signal_map
 from gateway.core.vehicle import front_share_pct
 from gateway.records import Signal
 from support.encoded import encode_signals

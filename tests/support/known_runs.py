@@ -1,7 +1,6 @@
 """Known-load drives of the half-car of support.half_car_road, as calibration reads them."""
 
-from gateway.calibration.inspection.log import LogFacts
-from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.inspection import LogFacts, SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.half_car import HalfCar
 from gateway.core.vehicle import front_share_pct

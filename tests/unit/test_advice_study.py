@@ -11,8 +11,8 @@ from support.known_runs import campaign, split_run
 from benchmarks.accuracy import advice
 from benchmarks.accuracy.advice import AdviceStudy, Choice, advice_of, compared
 from benchmarks.accuracy.pages import advice_page
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
-from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.inspection import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle

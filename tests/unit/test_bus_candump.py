@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from gateway.bus.frames import join
+from gateway.bus.logs import LogReport
 from gateway.bus.logs.candump import read_candump
-from gateway.bus.logs.report import LogReject, LogReport
-from gateway.bus.signals.mapping import IdFilter, exact_filter, j1939_filter
+from gateway.bus.logs.report import LogReject
+from gateway.bus.signals import IdFilter
+from gateway.bus.signals.mapping import exact_filter, j1939_filter
 from gateway.errors import LogUnreadableError
 from gateway.records import EXTENDED_ID, Frames
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from support.encoded import encode_signals
 
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.encode import Encoder
-from gateway.bus.signals.signal_map import load_signal_map, shipped_maps
+from gateway.bus.signals import Decoder, Encoder, load_signal_map
+from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import Signal
 
 TYPICAL = {

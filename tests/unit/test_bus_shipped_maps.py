@@ -6,9 +6,8 @@ import struct
 import numpy as np
 import pytest
 
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.mapping import CLASSIC_BYTES
-from gateway.bus.signals.signal_map import load_signal_map, shipped_map, shipped_maps
+from gateway.bus.signals import CLASSIC_BYTES, Decoder, load_signal_map, shipped_map
+from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import EXTENDED_ID, Frames, Signal
 
 RAD = math.pi / 180

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from gateway.bus.signals.signal_map import load_signal_map, shipped_map, shipped_maps
+from gateway.bus.signals import load_signal_map, shipped_map
+from gateway.bus.signals.signal_map import shipped_maps
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID, Signal
 

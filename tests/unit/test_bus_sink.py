@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gateway.bus import sink as sink_module
-from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs import write_candump
 from gateway.bus.sink import BusSink, replay, replay_frames
 from gateway.errors import BusError, LogUnreadableError
 from gateway.records import Frames

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from support.calibrated import calibration_file
 
-from gateway.calibration.file.calibration_file import content_id, load_calibration
-from gateway.calibration.file.parts import CrossSpectrumPart
+from gateway.calibration.file import CrossSpectrumPart, load_calibration
+from gateway.calibration.file.calibration_file import content_id
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.errors import CalibrationFileError
 

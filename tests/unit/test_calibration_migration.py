@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from support.calibrated import first_version
 
-from gateway.calibration.file.calibration_file import FIRST_VERSION, MIGRATIONS, VERSION, load_calibration, migrated
+from gateway.calibration.file import load_calibration
+from gateway.calibration.file.calibration_file import FIRST_VERSION, MIGRATIONS, VERSION, migrated
 
 SHIPPED = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 

@@ -5,13 +5,13 @@ import pytest
 from support.calibrated import ratio_index_calibration
 from support.half_car_road import RATE_HZ, VAN, batch_of, batch_over_road
 
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.ratio_index.index import Band
 from gateway.records import Batch
 from gateway.reports.calibration.half_car import fits_of
 from gateway.reports.calibration.spectra import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section
-from gateway.reports.charts.chart import Line, Ribbon, Span
+from gateway.reports.charts import Line, Ribbon, Span
 
 
 def white(seed: int, n: int = 20_000) -> Batch:

@@ -8,12 +8,9 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
-from gateway.calibration.inspection.inspection import Inspection
+from gateway.calibration.inspection import Finding, Inspection, RunVerdict, Severity
 from gateway.calibration.inspection.kinds import Kind
-from gateway.calibration.judgement.assessment import Assessment, Judgement, Part
-from gateway.calibration.judgement.evaluation import Judged, error_table
-from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
+from gateway.calibration.judgement import Assessment, Grade, Judged, Judgement, Part, Verdict, error_table, verdicts_of
 from gateway.calibration.plan import Expected
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_table
-from gateway.calibration.judgement.coverage import coverage_of
+from gateway.calibration.judgement import coverage_of
 
 
 def test_batches_of_different_runs_give_the_exact_binomial_limits() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.drives import T0_NS, drive, joined, later
 
-from gateway.calibration.judgement.evaluation import Judged, error_table, errors_of
+from gateway.calibration.judgement import Judged, error_table, errors_of
 from gateway.core.batch import Window, build_batch
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate

@@ -6,14 +6,19 @@ import pytest
 from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS, campaign, known_run
 
-from gateway.calibration.inspection.campaign import inspect_campaign, load_findings
+from gateway.calibration.inspection import (
+    Finding,
+    Inspection,
+    RowFacts,
+    RunVerdict,
+    Severity,
+    SplitRun,
+    inspect_campaign,
+)
+from gateway.calibration.inspection.campaign import load_findings
 from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
-from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.inspection.loads import _Labelled, compare_loads
-from gateway.calibration.inspection.rows import RowFacts
-from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 

@@ -5,11 +5,9 @@ from dataclasses import replace
 import pytest
 from support.half_car_road import VAN
 
-from gateway.calibration.inspection.campaign import inspect_campaign
+from gateway.calibration.inspection import LogFacts, RowFacts, SplitRun, inspect_campaign
 from gateway.calibration.inspection.kinds import Kind
-from gateway.calibration.inspection.log import LogFacts, log_findings, same_drive_findings
-from gateway.calibration.inspection.rows import RowFacts
-from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.inspection.log import log_findings, same_drive_findings
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 

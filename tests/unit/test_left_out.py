@@ -12,7 +12,7 @@ from gateway.calibration.campaign import load_campaign
 from gateway.calibration.judgement.assessment import judged_left_out
 from gateway.calibration.ratio_index import fit_regression, index_rows
 from gateway.core.settings import BatchSettings
-from gateway.offline.campaigns import calibrate
+from gateway.offline import calibrate
 
 LOADS = ((0.0, None), (150.0, 0.5), (200.0, 2.6), (300.0, 1.4), (400.0, 0.7), (400.0, 2.4))
 

@@ -11,9 +11,8 @@ from support.half_car_road import VAN
 from support.known_runs import split_run
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.half_car.fit import CrossSpectrumFit, calibrate_cross_spectrum
-from gateway.calibration.inspection.finding import RunVerdict
-from gateway.calibration.inspection.inspection import Inspection
+from gateway.calibration.half_car import CrossSpectrumFit, calibrate_cross_spectrum
+from gateway.calibration.inspection import Inspection, RunVerdict
 from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, usual_drive
 from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
 from gateway.cli import springscale

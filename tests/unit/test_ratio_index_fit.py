@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gateway.calibration.file.parts import RatioIndexPart
+from gateway.calibration.file import RatioIndexPart
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.ratio_index.structures import StructureChoice

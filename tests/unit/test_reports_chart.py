@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.reports.charts.chart import COLOURS, Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts import Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts.chart import COLOURS
 from gateway.reports.charts.live import live, plotly_json, plotly_script
 from gateway.reports.charts.still import draw, save_still
 

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 from support.patience import wait_until
 
-from gateway.bus.live.source import LiveSource
+from gateway.bus.live import LiveSource
 from gateway.calibration.campaign import load_campaign
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.offline.campaigns import split_runs
+from gateway.offline import split_runs
 from gateway.records import Why
 from gateway.sim.vans import PAPER_VAN, VANS
 from gateway.sim.vehicle import front_share_pct, payload_kg
+from gateway.workbench import bench_of, stream, write_campaign
 from gateway.workbench.campaigns import PLANS, plan_of
-from gateway.workbench.simulate import BETWEEN_DRIVES_S, bench_of, simulated_frames, stream, write_campaign
+from gateway.workbench.simulate import BETWEEN_DRIVES_S, simulated_frames
 
 
 @pytest.mark.parametrize("vehicle", list(VANS))
@@ -135,7 +136,7 @@ def test_drives_follow_one_another_with_the_vehicle_parked_between() -> None:
 
 
 def test_a_stream_reaches_a_listener_frame_by_frame() -> None:
-    from gateway.bus.signals.signal_map import load_signal_map
+    from gateway.bus.signals import load_signal_map
 
     bench = bench_of("test1", longest_s=3.0)
     source = LiveSource("virtual", "simulate-stream", load_signal_map("springscale:reference"))

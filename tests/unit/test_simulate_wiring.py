@@ -6,10 +6,8 @@ import cantools.database
 import numpy as np
 import pytest
 
-from gateway.bus.logs.candump_write import write_candump
-from gateway.bus.logs.open import motion_of_log
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.signal_map import load_signal_map, shipped_map
+from gateway.bus.logs import motion_of_log, write_candump
+from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.batches import batches_of_motion, read_whole_log

@@ -10,7 +10,8 @@ from click.testing import CliRunner
 from benchmarks.accuracy import __main__ as command
 from benchmarks.accuracy.advice import AdviceStudy, Choice, compared
 from benchmarks.accuracy.coverage_table import JudgedBatch, coverage_table
-from gateway.calibration.judgement.learning_curve import LearningCurve, Score, Trial
+from gateway.calibration.judgement import LearningCurve
+from gateway.calibration.judgement.learning_curve import Score, Trial
 
 SCORE = Score(3, 1, 2.5, 1.0, 1.25, 0.5)
 CURVE = LearningCurve(

@@ -8,7 +8,7 @@ import can
 
 from gateway.bus.live.receiver import Burst
 from gateway.bus.messages import ExactStamp, frames_of
-from gateway.bus.signals.mapping import IdFilter
+from gateway.bus.signals import IdFilter
 from gateway.errors import BusError
 from gateway.records import EXTENDED_ID
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from gateway.bus.frames import empty_frames, take
 from gateway.bus.live.receiver import Burst, error_class_names
-from gateway.bus.signals.mapping import IdFilter
+from gateway.bus.signals import IdFilter
 from gateway.errors import BusError
 from gateway.records import I64, U32, Frames
 from gateway.units import NS_PER_S

@@ -21,7 +21,7 @@ from gateway.bus.live.inbox import Inbox
 from gateway.bus.live.python_can import open_python_can, require_known_interface
 from gateway.bus.live.receiver import BUS_OFF, Burst, Receiver
 from gateway.bus.live.socketcan import interface_statistics, open_socketcan
-from gateway.bus.signals.signal_map import SignalMap
+from gateway.bus.signals import SignalMap
 from gateway.log import Event, log_event
 
 POLL_S: Final = 0.1  # longest wait inside a receiver: how soon a stop is heeded

@@ -17,7 +17,7 @@ from gateway.bus.logs.candump_line import LineFrame, NotData, read_line
 from gateway.bus.logs.candump_shape import LineShape, learn_shape
 from gateway.bus.logs.line_blocks import BLOCK_BYTES, LineBlock, line_blocks
 from gateway.bus.logs.report import LogReject, LogReport
-from gateway.bus.signals.mapping import CLASSIC_BYTES, IdFilter
+from gateway.bus.signals import CLASSIC_BYTES, IdFilter
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
 CHUNK_FRAMES: Final = 32_768  # what is handed on at once: large enough that the decoder's own steps cost little

@@ -13,7 +13,7 @@ from can.io.generic import MessageReader
 from gateway.bus.logs.line_blocks import open_maybe_gzip
 from gateway.bus.logs.report import LogReject, LogReport
 from gateway.bus.messages import frames_of, message_id
-from gateway.bus.signals.mapping import IdFilter
+from gateway.bus.signals import IdFilter
 from gateway.errors import LogUnreadableError
 from gateway.records import Frames
 

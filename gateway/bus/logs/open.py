@@ -7,9 +7,7 @@ from typing import Final
 from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.message_log import MESSAGE_SUFFIXES, read_message_log
 from gateway.bus.logs.report import LogReport
-from gateway.bus.signals.decode import Decoder
-from gateway.bus.signals.mapping import CAN_FD_BYTES, IdFilter
-from gateway.bus.signals.signal_map import SignalMap
+from gateway.bus.signals import CAN_FD_BYTES, Decoder, IdFilter, SignalMap
 from gateway.errors import LogUnreadableError
 from gateway.records import EXTENDED_ID, Frames, Motion
 

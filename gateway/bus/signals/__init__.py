@@ -1,1 +1,23 @@
-"""TODO-ROOM."""
+"""The signal map and what it does: which message and signal is which motion, in which unit and with which sign.
+
+A map with its DBC files comes in (``load_signal_map``); a ``Decoder`` turns frames into SI samples in ISO 8855 axes
+and counts what it refuses, an ``Encoder`` goes the other way for the simulator. Units end at this border.
+"""
+
+from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.encode import Encoder
+from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES, IdFilter
+from gateway.bus.signals.signal_map import SHIPPED_PREFIX, SignalMap, SignalMapFile, load_signal_map, shipped_map
+
+__all__ = [
+    "CAN_FD_BYTES",
+    "CLASSIC_BYTES",
+    "SHIPPED_PREFIX",
+    "Decoder",
+    "Encoder",
+    "IdFilter",
+    "SignalMap",
+    "SignalMapFile",
+    "load_signal_map",
+    "shipped_map",
+]

@@ -1,1 +1,40 @@
-"""TODO-ROOM."""
+"""The vehicle calibration file: JSON whose id is the hash of its content, checked whole when it is read.
+
+What the estimators learned comes in; what the core needs to weigh goes out (``CalibrationFile.for_core``). Older
+versions are migrated on reading. Here too: the file's figures for people, the difference of two files, and the check
+of a file against the logs that it was made from.
+"""
+
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file.check import Check, check_against_campaign
+from gateway.calibration.file.comparison import Difference, differences
+from gateway.calibration.file.figures import Figure, figures_of
+from gateway.calibration.file.parts import (
+    CrossSpectrumPart,
+    ExpectedErrorsPart,
+    ProvenancePart,
+    RatioIndexPart,
+    RegressionPart,
+    RunPart,
+    SeenPart,
+    VehiclePart,
+)
+
+__all__ = [
+    "CalibrationFile",
+    "Check",
+    "CrossSpectrumPart",
+    "Difference",
+    "ExpectedErrorsPart",
+    "Figure",
+    "ProvenancePart",
+    "RatioIndexPart",
+    "RegressionPart",
+    "RunPart",
+    "SeenPart",
+    "VehiclePart",
+    "check_against_campaign",
+    "differences",
+    "figures_of",
+    "load_calibration",
+]

@@ -1,1 +1,28 @@
-"""TODO-ROOM."""
+"""Calibrates the cross-spectral estimator: known-load drives in, a half-car with its covariance out.
+
+The half-car's parameters are the most probable ones given all drives, under priors that any road vehicle meets, so
+one empty drive is enough to begin with. Runs left out in turn tell by how much its intervals must be widened, and are
+kept for the judgement (``CrossSpectrumFit.without``). Inspection asks the same fit whether axes and loads are as told.
+"""
+
+from gateway.calibration.half_car.fit import (
+    CrossSpectrumFit,
+    calibrate_cross_spectrum,
+    fit_cross_spectrum,
+    fit_half_car,
+    half_car_calibration,
+)
+from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
+from gateway.calibration.half_car.prior import Prior, prior_of
+
+__all__ = [
+    "CrossSpectrumFit",
+    "KnownSpectra",
+    "Prior",
+    "calibrate_cross_spectrum",
+    "fit_cross_spectrum",
+    "fit_half_car",
+    "half_car_calibration",
+    "known_spectra",
+    "prior_of",
+]

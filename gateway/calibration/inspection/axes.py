@@ -17,9 +17,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car.fit import fit_half_car
-from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT, KnownSpectra
-from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.half_car import KnownSpectra, fit_half_car, prior_of
+from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Severity
 from gateway.calibration.inspection.kinds import Kind

@@ -12,9 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car.fit import fit_half_car, half_car_calibration
-from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
-from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.half_car import KnownSpectra, fit_half_car, half_car_calibration, known_spectra, prior_of
 from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Severity
 from gateway.calibration.inspection.kinds import Kind

@@ -1,1 +1,66 @@
-"""TODO-ROOM."""
+"""How well a calibration weighs: its answers beside the truth, and a grade that follows from them.
+
+The outcome of a calibration, or batches of known load with a calibration file, come in. Out go the error table (12)
+(``error_table``), the same by what calibration knew of the batches (``Assessment``), how often intervals hold
+(``coverage_of``), a verdict with reasons (``verdicts_of``) and the errors with fewer known loads (``curve_of``).
+"""
+
+from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
+from gateway.calibration.judgement.assessment import (
+    PART_NAMES,
+    PART_TEXT,
+    Assessment,
+    Judgement,
+    Part,
+    assess_calibration,
+    assess_evaluation,
+)
+from gateway.calibration.judgement.coverage import Coverage, coverage_of
+from gateway.calibration.judgement.evaluation import (
+    TARGETS,
+    Comparison,
+    Errors,
+    ErrorTable,
+    Judged,
+    Target,
+    TargetErrors,
+    error_table,
+    errors_of,
+    judge,
+)
+from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, Spread, curve_of
+from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
+
+__all__ = [
+    "LEVELS",
+    "PART_NAMES",
+    "PART_TEXT",
+    "TARGETS",
+    "Answers",
+    "Assessment",
+    "Comparison",
+    "Coverage",
+    "ErrorTable",
+    "Errors",
+    "Grade",
+    "Judged",
+    "Judgement",
+    "LearningCurve",
+    "Part",
+    "Rung",
+    "Spread",
+    "Target",
+    "TargetErrors",
+    "Verdict",
+    "answers_of",
+    "assess_calibration",
+    "assess_evaluation",
+    "coverage_of",
+    "curve_of",
+    "error_table",
+    "errors_of",
+    "judge",
+    "observed_coverage",
+    "standardised",
+    "verdicts_of",
+]

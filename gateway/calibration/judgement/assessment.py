@@ -6,8 +6,7 @@ from enum import StrEnum
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
-from gateway.calibration.file.calibration_file import CalibrationFile
-from gateway.calibration.file.parts import RegressionPart
+from gateway.calibration.file import CalibrationFile, RegressionPart
 from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
 from gateway.core.vehicle import Vehicle
 

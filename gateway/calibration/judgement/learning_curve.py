@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
-from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.inspection import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index import fit_ratio_index

@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Final
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.inspection.finding import RunVerdict, Severity
+from gateway.calibration.inspection import RunVerdict, Severity
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement, Part
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Target, TargetErrors

@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.calibration.calibrate import Outcome
+from gateway.calibration.half_car import prior_of
 from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATION
-from gateway.calibration.half_car.prior import prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import Design
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads

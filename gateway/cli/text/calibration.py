@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from gateway.calibration.file.calibration_file import CalibrationFile, ExpectedErrorsPart
-from gateway.calibration.file.figures import Figure, figures_of
+from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, Figure, figures_of
 
 
 def calibration_text(held: CalibrationFile) -> str:

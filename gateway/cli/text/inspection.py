@@ -2,9 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
-from gateway.calibration.inspection.finding import Finding, RunVerdict
-from gateway.calibration.inspection.inspection import Inspection
-from gateway.calibration.inspection.split_run import SplitRun
+from gateway.calibration.inspection import Finding, Inspection, RunVerdict, SplitRun
 
 
 def inspection_sentences(inspection: Inspection) -> str:

@@ -6,13 +6,23 @@ from typing import Final
 import numpy as np
 from scipy.special import ndtri
 
-from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
-from gateway.calibration.judgement.assessment import PART_NAMES, PART_TEXT, Judgement, Part
-from gateway.calibration.judgement.evaluation import TARGETS, Target
+from gateway.calibration.judgement import (
+    LEVELS,
+    PART_NAMES,
+    PART_TEXT,
+    TARGETS,
+    Answers,
+    Judgement,
+    Part,
+    Target,
+    answers_of,
+    observed_coverage,
+    standardised,
+)
 from gateway.records import F64
 from gateway.reports.calibration.error_tables import batches_table, runs_table, summary_table
 from gateway.reports.calibration.text import estimator_name, percent, shown
-from gateway.reports.charts.chart import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
+from gateway.reports.charts import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
 
 _MARKERS: Final[Mapping[Part, Marker]] = {Part.LEFT_OUT: "circle", Part.VALIDATION: "diamond"}
 _COLOURS: Final[Mapping[Part, int]] = {Part.LEFT_OUT: 0, Part.VALIDATION: 1, Part.IDENTIFICATION: GREY, Part.ALL: 0}

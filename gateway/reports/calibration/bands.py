@@ -8,7 +8,7 @@ import numpy as np
 from gateway.calibration.ratio_index import BandMap, FamilyTrial, FittedRegression, RatioIndexFit, Selection, band_maps
 from gateway.core.ratio_index.index import Band
 from gateway.reports.calibration.text import NONE, shown
-from gateway.reports.charts.chart import Axis, Cells, Chart, Marker, Panel, Points, Table
+from gateway.reports.charts import Axis, Cells, Chart, Marker, Panel, Points, Table
 
 _NAMES: Final = (("J_L", "kg"), ("J_D", "% front"))  # of acceleration, of pitch rate
 _MARKERS: Final[tuple[tuple[str, Marker], ...]] = (("numerator of the index", "circle"), ("denominator", "diamond"))

@@ -3,11 +3,10 @@
 import math
 from typing import Final
 
-from gateway.calibration.judgement.assessment import PART_NAMES, Judgement, Part
-from gateway.calibration.judgement.evaluation import TARGETS, Comparison, Judged, TargetErrors
+from gateway.calibration.judgement import PART_NAMES, TARGETS, Comparison, Judged, Judgement, Part, TargetErrors
 from gateway.records import iso_utc
 from gateway.reports.calibration.text import NONE, percent, shown
-from gateway.reports.charts.chart import Table
+from gateway.reports.charts import Table
 
 _COLUMNS: Final = ("mean |e|", "bias", "std", "max", "mean |e| %", "with misses %", "of gross %", "95 % covers")
 

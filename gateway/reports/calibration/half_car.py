@@ -15,7 +15,7 @@ from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64, Spectra
 from gateway.reports.calibration.knowledge import knowledge_chart, knowledge_of, knowledge_table, told
-from gateway.reports.charts.chart import Axis, Chart, Line, Panel, Section, Table
+from gateway.reports.charts import Axis, Chart, Line, Panel, Section, Table
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.half_car import prior_of
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, is_positive
 from gateway.core.vehicle import Vehicle
-from gateway.reports.charts.chart import Axis, Chart, Panel, Points, Rule, Table
+from gateway.reports.charts import Axis, Chart, Panel, Points, Rule, Table
 
 UNTOLD_SHARE: Final = 0.9  # of a prior's standard deviation left over: the data said next to nothing
 

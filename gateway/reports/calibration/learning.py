@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, Spread
+from gateway.calibration.judgement import LearningCurve, Rung, Spread
 from gateway.reports.calibration.text import NONE, estimator_name, percent, shown
-from gateway.reports.charts.chart import Axis, Chart, Marker, Panel, Points, Rule, Section, Table
+from gateway.reports.charts import Axis, Chart, Marker, Panel, Points, Rule, Section, Table
 
 _MARKERS: tuple[Marker, ...] = ("circle", "diamond", "square", "x")
 

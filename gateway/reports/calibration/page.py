@@ -7,9 +7,9 @@ from html import escape
 from importlib.resources import files
 from typing import Final
 
-from gateway.calibration.judgement.verdict import Grade, Verdict
+from gateway.calibration.judgement import Grade, Verdict
 from gateway.reports.calibration.text import estimator_name
-from gateway.reports.charts.chart import Chart, Section, Table
+from gateway.reports.charts import Chart, Section, Table
 
 GRADE_TEXT: Final = {
     Grade.FIT: "Fit for use",

@@ -12,7 +12,7 @@ from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64
 from gateway.reports.calibration.bands import band_chart, model_table, steps_table, trials_table
 from gateway.reports.calibration.text import NONE
-from gateway.reports.charts.chart import Axis, Chart, Line, Mark, Marker, Panel, Points, Ribbon, Section, Table
+from gateway.reports.charts import Axis, Chart, Line, Mark, Marker, Panel, Points, Ribbon, Section, Table
 
 N_ALONG: Final = 60
 INTERVAL: Final = "95 % interval of a new batch"

@@ -14,9 +14,14 @@ from typing import Any
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
-from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, assess_calibration
-from gateway.calibration.judgement.learning_curve import LearningCurve
-from gateway.calibration.judgement.verdict import Verdict, verdicts_of
+from gateway.calibration.judgement import (
+    PART_NAMES,
+    Assessment,
+    LearningCurve,
+    Verdict,
+    assess_calibration,
+    verdicts_of,
+)
 from gateway.calibration.plan import LoadPlan, plan_next
 from gateway.errors import ConfigurationError
 from gateway.reports.calibration.accuracy import accuracy_section
@@ -27,7 +32,7 @@ from gateway.reports.calibration.ratio_index import ratio_index_section
 from gateway.reports.calibration.runs import best_next, plan_section, provenance_section, runs_section
 from gateway.reports.calibration.spectra import spectra_section
 from gateway.reports.calibration.text import shown, span
-from gateway.reports.charts.chart import Chart, Section
+from gateway.reports.charts import Chart, Section
 from gateway.reports.charts.live import plotly_json, plotly_script
 from gateway.reports.charts.still import save_still
 from gateway.words import counted

@@ -1,13 +1,12 @@
 """What was driven and whether it was sound, what to drive next, and where every number comes from."""
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.inspection.finding import Finding, RunVerdict
-from gateway.calibration.inspection.split_run import SplitRun
-from gateway.calibration.judgement.assessment import Assessment
+from gateway.calibration.inspection import Finding, RunVerdict, SplitRun
+from gateway.calibration.judgement import Assessment
 from gateway.calibration.plan import Advice, Expected, LoadPlan
 from gateway.records import Why
 from gateway.reports.calibration.text import NONE, percent, shown, span
-from gateway.reports.charts.chart import Section, Table
+from gateway.reports.charts import Section, Table
 
 
 def runs_section(outcome: Outcome) -> Section:

@@ -11,7 +11,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import F64, Batch
-from gateway.reports.charts.chart import Axis, Chart, Line, Mark, Panel, Ribbon, Section, Span
+from gateway.reports.charts import Axis, Chart, Line, Mark, Panel, Ribbon, Section, Span
 
 N_SEGMENT: Final = 512
 SHOWN_HZ: Final = (0.7, 15.0)

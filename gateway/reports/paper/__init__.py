@@ -1,1 +1,5 @@
-"""TODO-ROOM."""
+"""Section 4 of the paper, driven again with our simulator: its numbers beside ours, on one page with its figures.
+
+A directory and a scope come in (``reproduce``); campaigns, calibrations, figures, report.html, results.json and the
+text of docs/accuracy.md go out. ``evidence`` drives and calibrates, ``figures`` and ``table`` show.
+"""

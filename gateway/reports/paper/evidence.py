@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Final
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.inspection.split_run import SplitRun
-from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
+from gateway.calibration.inspection import SplitRun
+from gateway.calibration.judgement import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index import N_SEGMENT, fit_regression, index_rows
 from gateway.config import ESTIMATOR_NAMES
@@ -16,8 +16,8 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
 from gateway.core.settings import BatchSettings
-from gateway.offline.campaigns import calibrate, split_runs
-from gateway.workbench.simulate import bench_of, write_campaign
+from gateway.offline import calibrate, split_runs
+from gateway.workbench import bench_of, write_campaign
 
 OnStep = Callable[[str, int, int], None]  # (what is being done, steps done, steps in all)
 

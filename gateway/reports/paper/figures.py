@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gateway.calibration.judgement.evaluation import Judged
+from gateway.calibration.judgement import Judged
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index import N_SEGMENT, IndexRows, fit_regression, index_rows
 from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum

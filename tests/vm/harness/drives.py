@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs import write_candump
 from gateway.records import Frames
 from gateway.sim.drive import constant
 from gateway.sim.road import iso_road
