@@ -166,7 +166,6 @@ class Batch:
     longest_stop_s: float = 0.0
     rejected: tuple[Why, ...] = ()
     is_provisional: bool = False
-    longitudinal_acceleration_mps2: F64 | None = None
 
     @property
     def duration_s(self) -> float:

@@ -59,7 +59,6 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
         longest_stop_s=_longest_run(speed < settings.standstill_speed_mps) / settings.rate_hz,
         rejected=_reasons((acceleration, pitch_rate), window, n, usable, gravity, shares, settings),
         is_provisional=window.is_provisional,
-        longitudinal_acceleration_mps2=_optional(rows, window, n, settings),
     )
 
 
@@ -182,13 +181,6 @@ def _mean(x: F64, usable: Bool) -> float:
 def _longest_run(mask: Bool) -> int:
     edges = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(np.int8)))
     return int(np.max(edges[1::2] - edges[::2], initial=0))
-
-
-def _optional(rows: Motion, window: Window, n: int, settings: BatchSettings) -> F64 | None:
-    t_ns, x = rows.of(Signal.LONGITUDINAL_ACCELERATION)
-    if not len(x):
-        return None
-    return onto_grid(t_ns, x, window.t_start_ns, n, settings.rate_hz, settings.gap_s)
 
 
 def _reasons(

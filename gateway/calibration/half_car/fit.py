@@ -117,7 +117,6 @@ def fit_half_car(known: Sequence[KnownSpectra], prior: Prior, start: F64) -> Fou
     def curvature(theta: F64) -> Curvature:
         parts = [k.whittle.curvature(k.at(theta), everything, is_load_free=False) for k in known]
         return Curvature(
-            cost=sum(part.cost for part in parts),
             gradient=np.sum([part.gradient for part in parts], axis=0),
             information=np.sum([part.information for part in parts], axis=0),
         )

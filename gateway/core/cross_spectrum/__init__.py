@@ -1,1 +1,12 @@
-"""TODO-ROOM."""
+"""The default estimator: both sensors' spectra together, phase included, held against a half-car.
+
+A batch and what known-load drives taught (``calibration``) come in; payload, front share and diagnostics go out
+(``estimator``). ``measured`` takes the spectra, ``expected`` says what the half-car would show, ``likelihood`` compares
+them, ``search`` finds the most probable load. Calibration fits the same model, and ``displayed`` draws it.
+docs/method.md derives it.
+"""
+
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.estimator import Located, by_cross_spectrum, locate
+
+__all__ = ["CrossSpectrumCalibration", "Located", "by_cross_spectrum", "locate"]

@@ -21,7 +21,8 @@ from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.parameters import (
     HALF_CAR_PARAMETERS,
     INDEX,
-    SLACK_KNOTS_HZ,
+    SLACK_ACCELERATION,
+    SLACK_PITCH_RATE,
     Ground,
     half_car,
     slack_weights,
@@ -76,8 +77,8 @@ def spectral_model(theta: F64, payload_kg: F64, front_share: F64, ground: Ground
 
     return SpectralModel(
         responses=_responses(theta, payload_kg, front_share, ground, freq_hz),
-        slack_acceleration=_slack(theta, "acceleration", freq_hz),
-        slack_pitch_rate=_slack(theta, "pitch_rate", freq_hz),
+        slack_acceleration=_slack(theta, SLACK_ACCELERATION, freq_hz),
+        slack_pitch_rate=_slack(theta, SLACK_PITCH_RATE, freq_hz),
         noise_acceleration=positive("noise_acceleration_m2ps3"),
         noise_pitch_rate=positive("noise_pitch_rate_rad2ps"),
         track_offset_m=positive("track_offset_m"),
@@ -140,10 +141,9 @@ def _responses(
     return r.acceleration_front, r.acceleration_rear, r.pitch_rate_front, r.pitch_rate_rear
 
 
-def _slack(theta: F64, sensor: str, freq_hz: F64) -> F64:
+def _slack(theta: F64, knots: range, freq_hz: F64) -> F64:
     """Slack (..., m) of one sensor: log-linear between its knots, above a floor."""
-    first = INDEX[f"slack_{sensor}_{SLACK_KNOTS_HZ[0]:g}hz"]
-    slack: F64 = SLACK_FLOOR + np.exp(theta[..., first : first + len(SLACK_KNOTS_HZ)] @ slack_weights(freq_hz))
+    slack: F64 = SLACK_FLOOR + np.exp(theta[..., knots.start : knots.stop] @ slack_weights(freq_hz))
     return slack
 
 
@@ -203,16 +203,12 @@ def _by_response(p: _Paths, moved: tuple[C128, C128, C128, C128], model: Spectra
 def _by_other(entry: int, theta: F64, p: _Paths, model: SpectralModel, spectra: CrossSpectra) -> Matrix:
     """Change of the matrix (b, m) with a parameter that is not the half-car's; noise comes later and has none."""
     zero = np.zeros(p.phase.shape)
-    slack_a, slack_g = (
-        INDEX[f"slack_acceleration_{SLACK_KNOTS_HZ[0]:g}hz"],
-        INDEX[f"slack_pitch_rate_{SLACK_KNOTS_HZ[0]:g}hz"],
-    )
     weights = slack_weights(spectra.freq_hz)
-    if slack_a <= entry < slack_a + len(SLACK_KNOTS_HZ):
-        share = (model.slack_acceleration - SLACK_FLOOR) * weights[entry - slack_a]
+    if entry in SLACK_ACCELERATION:
+        share = (model.slack_acceleration - SLACK_FLOOR) * weights[SLACK_ACCELERATION.index(entry)]
         return share * (_power(p.acceleration_front) + _power(p.acceleration_rear)), zero, zero.astype(np.complex128)
-    if slack_g <= entry < slack_g + len(SLACK_KNOTS_HZ):
-        share = (model.slack_pitch_rate - SLACK_FLOOR) * weights[entry - slack_g]
+    if entry in SLACK_PITCH_RATE:
+        share = (model.slack_pitch_rate - SLACK_FLOOR) * weights[SLACK_PITCH_RATE.index(entry)]
         return zero, share * (_power(p.pitch_rate_front) + _power(p.pitch_rate_rear)), zero.astype(np.complex128)
     return _by_phase(_phase_slope(entry, p, model, spectra), p)
 
@@ -288,7 +284,7 @@ def _with_noise_slopes(
     noise_a, noise_g = _noise(model, matrix, spectra)
     grown = 0.5 * sum(
         d.mean(axis=-1, keepdims=True) / s.mean(axis=-1, keepdims=True)
-        for d, s in zip((d_aa, d_gg), matrix, strict=False)
+        for d, s in ((d_aa, matrix[0]), (d_gg, matrix[1]))
     )
     d_aa, d_gg = d_aa + noise_a * grown, d_gg + noise_g * grown
     for row, entry in enumerate(free):

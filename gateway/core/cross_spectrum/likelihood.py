@@ -38,9 +38,8 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Curvature:
-    """Negative log-likelihood, its gradient (k,) and its expected second derivative (k, k)."""
+    """Gradient (k,) and expected second derivative (k, k) of the negative log-likelihood."""
 
-    cost: float
     gradient: F64
     information: F64
 
@@ -107,7 +106,6 @@ class Whittle:
         d_level = -(d_aa * z.z_aa + d_gg * z.z_gg + 2.0 * np.real(d_ga * np.conj(z.z_ga))) / z.trace
         level_gradient, level_information = self._level_curvature(z, d_level)
         return Curvature(
-            cost=self._shape_cost(z) + self._level_cost(z),
             gradient=level_gradient - rows @ residual.ravel(),
             information=level_information + rows @ rows.T,
         )

@@ -19,6 +19,8 @@ from gateway.units import STANDARD_GRAVITY_MPS2
 SLACK_KNOTS_HZ: Final = np.array([1.0, 1.5, 2.2, 3.3, 5.0, 7.0, 9.0, 11.0, 13.0, 15.0])
 BEND_SHARES: Final = (0.0, 0.2, 0.4, 0.6, 0.9, 1.2)  # added axle load over half the empty weight where rates may bend
 
+_SLACK_ACCELERATION: Final = tuple(f"slack_acceleration_{hz:g}hz" for hz in SLACK_KNOTS_HZ)
+_SLACK_PITCH_RATE: Final = tuple(f"slack_pitch_rate_{hz:g}hz" for hz in SLACK_KNOTS_HZ)
 _POSITIVE: Final = (
     "spring_front_npm",
     "spring_rear_npm",
@@ -34,8 +36,8 @@ _POSITIVE: Final = (
     "payload_gyration_m2",
     "payload_mode_hz",
     "payload_damping_ratio",
-    *(f"slack_acceleration_{hz:g}hz" for hz in SLACK_KNOTS_HZ),
-    *(f"slack_pitch_rate_{hz:g}hz" for hz in SLACK_KNOTS_HZ),
+    *_SLACK_ACCELERATION,
+    *_SLACK_PITCH_RATE,
     "noise_acceleration_m2ps3",
     "noise_pitch_rate_rad2ps",
     "track_offset_m",
@@ -56,6 +58,8 @@ _SIGNED: Final = (
 )
 PARAMETERS: Final = _POSITIVE + _SIGNED
 INDEX: Final = {name: i for i, name in enumerate(PARAMETERS)}
+SLACK_ACCELERATION: Final = range(INDEX[_SLACK_ACCELERATION[0]], INDEX[_SLACK_ACCELERATION[-1]] + 1)  # one a knot
+SLACK_PITCH_RATE: Final = range(INDEX[_SLACK_PITCH_RATE[0]], INDEX[_SLACK_PITCH_RATE[-1]] + 1)
 _NOT_OF_THE_HALF_CAR: Final = ("slack_", "noise_", "track_offset_m", "delay_scale", "rear_lag_s")
 HALF_CAR_PARAMETERS: Final = frozenset(i for name, i in INDEX.items() if not name.startswith(_NOT_OF_THE_HALF_CAR))
 

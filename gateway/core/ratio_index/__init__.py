@@ -1,1 +1,12 @@
-"""TODO-ROOM."""
+"""The paper's estimator, kept for comparison: the ratio of two narrow bands of a sensor's spectrum, and a regression.
+
+A batch and a RatioIndexCalibration come in; the indexes R_a and R_g, and what they tell of payload and front share, go
+out (``estimator``). ``index`` has equations (6) to (8), ``regression`` the structures (9) to (11).
+docs/ratio-index.md tells how it is calibrated.
+"""
+
+from gateway.core.ratio_index.estimator import by_ratio_index
+from gateway.core.ratio_index.index import PAPER_BANDS, Band, RatioIndexCalibration, indexes_of
+from gateway.core.ratio_index.regression import RegressionModel
+
+__all__ = ["PAPER_BANDS", "Band", "RatioIndexCalibration", "RegressionModel", "by_ratio_index", "indexes_of"]
