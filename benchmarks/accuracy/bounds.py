@@ -60,7 +60,7 @@ class Limit:
 def limits(drive: Drive | None = None) -> list[Limit]:
     """Bounds at half the rated payload, 50 % in front; by default 300 s at 50 km/h."""
     driven = drive or Drive(300.0, PAPER_SPEED_MPS)
-    ground = Ground(PAPER_VAN.empty_mass_kg, PAPER_VAN.empty_front_share_pct / 100.0, PAPER_VAN.wheelbase_m)
+    ground = Ground.of(PAPER_VAN)
     point = Point(prior_of(PAPER_VAN).mean, PAPER_PAYLOAD_KG / 2.0, 0.5)
     reading = Reading(PAPER_VAN.wheelbase_m, BAND_HZ, N_SEGMENT)
     scenes = {

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from gateway.core.vehicle import Load
 from gateway.records import Batch
 
 
@@ -14,3 +15,8 @@ class KnownRun:
     payload_kg: float
     front_share_pct: float
     batches: tuple[Batch, ...]
+
+    @property
+    def load(self) -> Load:
+        """What it carried."""
+        return Load(self.payload_kg, self.front_share_pct)

@@ -4,6 +4,23 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
+class Load:
+    """A payload and the front share that it gives the sprung mass.
+
+    The share is in percent, as people state it and files hold it; the half-car's formulas take ``front_share``,
+    0..1. The two properties of this module by that name are where one becomes the other.
+    """
+
+    payload_kg: float
+    front_share_pct: float
+
+    @property
+    def front_share(self) -> float:
+        """0..1."""
+        return self.front_share_pct / 100.0
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """What a fitter states of a vehicle. Masses and shares are of the sprung mass.
 
@@ -30,6 +47,11 @@ class Vehicle:
     rear_axle_limit_kg: float | None = None
     gross_limit_kg: float | None = None
 
+    @property
+    def empty_front_share(self) -> float:
+        """0..1."""
+        return self.empty_front_share_pct / 100.0
+
 
 def front_share_pct(vehicle: Vehicle, payload_kg: float, position_m: float | None) -> float:
     """Share of the sprung mass M + L on the front axle, in percent.
@@ -40,7 +62,7 @@ def front_share_pct(vehicle: Vehicle, payload_kg: float, position_m: float | Non
     """
     if payload_kg == 0.0 or position_m is None:
         return vehicle.empty_front_share_pct
-    empty_front_kg = vehicle.empty_front_share_pct / 100.0 * vehicle.empty_mass_kg
+    empty_front_kg = vehicle.empty_front_share * vehicle.empty_mass_kg
     front_kg = empty_front_kg + (1.0 - position_m / vehicle.wheelbase_m) * payload_kg
     return 100.0 * front_kg / (vehicle.empty_mass_kg + payload_kg)
 
@@ -51,5 +73,5 @@ def payload_position_m(vehicle: Vehicle, payload_kg: float, share_pct: float) ->
     Raises ZeroDivisionError without payload, where no position follows from the share.
     """
     total_kg = vehicle.empty_mass_kg + payload_kg
-    front_kg = share_pct / 100.0 * total_kg - vehicle.empty_front_share_pct / 100.0 * vehicle.empty_mass_kg
+    front_kg = share_pct / 100.0 * total_kg - vehicle.empty_front_share * vehicle.empty_mass_kg
     return vehicle.wheelbase_m * (1.0 - front_kg / payload_kg)

@@ -79,7 +79,7 @@ def place_of(
     """
     if not payload_kg > Z95 * payload_std_kg:
         return None
-    share, empty_share = front_share_pct / 100.0, vehicle.empty_front_share_pct / 100.0
+    share, empty_share = front_share_pct / 100.0, vehicle.empty_front_share
     total_kg = vehicle.empty_mass_kg + payload_kg
     front_share_of_load = (share * total_kg - empty_share * vehicle.empty_mass_kg) / payload_kg
     by_payload = (share - front_share_of_load) / payload_kg * payload_std_kg
@@ -90,7 +90,7 @@ def place_of(
 
 def unsprung_kg(vehicle: Vehicle) -> tuple[float, float]:
     """Unsprung mass at the front and the rear axle; NaN where neither it nor the kerb weight is stated."""
-    share = vehicle.empty_front_share_pct / 100.0
+    share = vehicle.empty_front_share
     return (
         _unsprung(vehicle.unsprung_front_kg, vehicle.kerb_front_axle_kg, share * vehicle.empty_mass_kg),
         _unsprung(vehicle.unsprung_rear_kg, vehicle.kerb_rear_axle_kg, (1.0 - share) * vehicle.empty_mass_kg),

@@ -13,7 +13,7 @@ from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
 from gateway.core.cross_spectrum.parameters import PARAMETERS, Ground
 
-GROUND = Ground(VAN.empty_mass_kg, VAN.empty_front_share_pct / 100.0, VAN.wheelbase_m)
+GROUND = Ground.of(VAN)
 READING = Reading(VAN.wheelbase_m, (1.1, 14.0), 256)
 
 

@@ -28,7 +28,7 @@ from gateway.core.cross_spectrum.estimator import locate
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.vehicle import front_share_pct
+from gateway.core.vehicle import Load, front_share_pct
 from gateway.core.weights import weights_of
 
 PRIOR = prior_of(VAN)
@@ -86,7 +86,7 @@ def test_with_a_vehicle_fully_known_the_spread_is_the_cramer_rao_bound(
 
 def test_the_spread_is_what_the_service_would_state_of_such_a_batch(calibration: CrossSpectrumCalibration) -> None:
     target = placed(220.0, 1.9)
-    point = Point(calibration.parameters, 220.0, target.front_share_pct / 100.0)
+    point = Point.of(calibration.parameters, Load(220.0, target.front_share_pct))
     spectra = expected_of(steady_spectra(calibration.reading, Drive(300.0, 14.0)), point, calibration.ground)
     located = locate(spectra, calibration)
     found = Design(VAN, calibration.parameters, DRIVE, [target]).spread(calibration.covariance)

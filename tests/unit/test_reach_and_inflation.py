@@ -7,15 +7,15 @@ from hypothesis import strategies as st
 
 from gateway.calibration.half_car.inflation import LEAST, UNTESTED, inflation_of
 from gateway.core.cross_spectrum.reach import beyond
+from gateway.core.vehicle import Load
 
 EMPTY_KG = 1000.0
-Load = tuple[float, float]
 
 
 def placed(front_kg: float, rear_kg: float) -> Load:
-    """(payload kg, front share %) of a vehicle that presses so on its axles."""
+    """The load of a vehicle that presses so on its axles."""
     whole_kg = front_kg + rear_kg
-    return whole_kg - EMPTY_KG, 100.0 * front_kg / whole_kg
+    return Load(whole_kg - EMPTY_KG, 100.0 * front_kg / whole_kg)
 
 
 TRIANGLE = [placed(500, 500), placed(500, 900), placed(900, 500)]

@@ -20,7 +20,7 @@ from gateway.core.cross_spectrum.parameters import Ground
 TRIALS = Path(__file__).parents[2] / "benchmarks" / "accuracy" / "trials.md"
 SCENE = Scene(
     point=Point(prior_of(VAN).mean, 200.0, 0.5),
-    ground=Ground(VAN.empty_mass_kg, VAN.empty_front_share_pct / 100.0, VAN.wheelbase_m),
+    ground=Ground.of(VAN),
     reading=Reading(VAN.wheelbase_m, (1.1, 14.0), 256),
     drive=Drive(300.0, 14.0),
     road_m3=3e-6,

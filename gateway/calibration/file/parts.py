@@ -1,6 +1,6 @@
 """The parts of the calibration file: what each table of the JSON holds, and the same in the core's terms."""
 
-from dataclasses import fields
+from dataclasses import astuple, fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -10,6 +10,7 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.parameters import PARAMETERS
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import TERMS, RegressionModel
+from gateway.core.vehicle import Load
 from gateway.errors import CalibrationFileError
 from gateway.records import F64
 
@@ -144,7 +145,8 @@ class CrossSpectrumPart(Part):
     @classmethod
     def of(cls, calibration: CrossSpectrumCalibration) -> "CrossSpectrumPart":
         """The core's calibration as the file holds it."""
-        return cls(**{one.name: getattr(calibration, one.name) for one in fields(calibration)})
+        known = {one.name: getattr(calibration, one.name) for one in fields(calibration)}
+        return cls(**known | {"known_loads": tuple(astuple(load) for load in calibration.known_loads)})
 
     def for_core(self) -> CrossSpectrumCalibration:
         """The same in the core's terms. Raises CalibrationFileError where the model has other parameters today."""
@@ -153,9 +155,8 @@ class CrossSpectrumPart(Part):
                 "the cross_spectrum part was fitted with another vehicle model than this springscale has: "
                 "calibrate again"
             )
-        return CrossSpectrumCalibration(
-            **{one.name: getattr(self, one.name) for one in fields(CrossSpectrumCalibration)}
-        )
+        known = {one.name: getattr(self, one.name) for one in fields(CrossSpectrumCalibration)}
+        return CrossSpectrumCalibration(**known | {"known_loads": tuple(Load(*load) for load in self.known_loads)})
 
 
 class VehiclePart(Part):

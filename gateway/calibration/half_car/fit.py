@@ -149,7 +149,7 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         front_share_seen_pct=(min(shares), max(shares)),
         speed_seen_mps=(min(speeds), max(speeds)),
         warnings=(SPRINGS_FROM_PRIORS,) if len({*payloads}) == 1 else (),
-        known_loads=tuple(zip(payloads, shares, strict=True)),
+        known_loads=tuple(run.load for run in runs),
         usual_log_amplitude=reading.usual_log_amplitude,
     )
 
@@ -171,7 +171,7 @@ class _LeftOut:
 def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -> list[_LeftOut]:
     """Every batch of a run that ``calibration`` has not seen."""
     errors = []
-    truth = (one.run.payload_kg, one.run.front_share_pct)
+    truth = one.run.load
     reach = beyond(truth, calibration.known_loads, calibration.empty_mass_kg)
     for batch in one.run.batches:
         spectra = cross_spectra_of([batch], calibration.reading)
@@ -179,8 +179,8 @@ def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -
             continue
         located = locate(spectra, calibration)
         payload_std_kg, share_std = np.sqrt(np.diag(located.load_covariance))
-        payload_kg = located.point.payload_kg - one.run.payload_kg
-        share = located.point.front_share - one.run.front_share_pct / 100.0
+        payload_kg = located.point.payload_kg - truth.payload_kg
+        share = located.point.front_share - truth.front_share
         errors.append(
             _LeftOut(payload_kg / payload_std_kg, share / share_std, located.misfit, payload_kg, 100.0 * share, reach)
         )

@@ -23,14 +23,14 @@ class KnownSpectra:
     """A run's spectra and likelihood with its true load."""
 
     def __init__(self, run: KnownRun, vehicle: Vehicle, spectra: CrossSpectra) -> None:
-        ground = Ground(vehicle.empty_mass_kg, vehicle.empty_front_share_pct / 100.0, vehicle.wheelbase_m)
+        ground = Ground.of(vehicle)
         self.run = run
         self.spectra = spectra
         self.whittle = Whittle(spectra, ground, EVIDENCE_WEIGHT)
 
     def at(self, theta: F64) -> Point:
         """The parameters theta (p,) with the run's load."""
-        return Point(theta, self.run.payload_kg, self.run.front_share_pct / 100.0)
+        return Point.of(theta, self.run.load)
 
 
 def known_spectra(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[KnownSpectra]:

@@ -91,7 +91,7 @@ def _body(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
 
 
 def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
-    share = vehicle.empty_front_share_pct / 100.0
+    share = vehicle.empty_front_share
     sprung_kg = vehicle.empty_mass_kg * (share if end == "front" else 1.0 - share)
     spring_npm = sprung_kg * (2.0 * pi * BOUNCE_HZ) ** 2 * 1.15  # in series with the tyre
     damper_nspm = 2.0 * DAMPING_RATIO * (spring_npm * sprung_kg) ** 0.5

@@ -27,7 +27,7 @@ from gateway.core.cross_spectrum.estimator import COHERENCE_BAND_HZ
 from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
 from gateway.core.cross_spectrum.parameters import INDEX, Ground
-from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import Load, Vehicle
 from gateway.records import C128, F64
 
 LEAST_COHERENCE: Final = 0.4  # behind the axles right axes have 0.45 and more, roll or yaw for pitch below 0.35
@@ -89,10 +89,10 @@ def mean_coherence(spectra: CrossSpectra) -> float:
     return float(np.mean(spectra.coherence[seen]))
 
 
-def agreement(spectra: CrossSpectra, load: tuple[float, float], vehicle: Vehicle) -> Agreement:
+def agreement(spectra: CrossSpectra, load: Load, vehicle: Vehicle) -> Agreement:
     """The best over sensor positions from 1.5 m ahead of the front axle to 1.5 m behind the rear one.
 
-    ``load`` is the payload (kg) and front share (%) of the half-car.
+    ``load`` is what the half-car carries.
     """
     positions_m = np.arange(-BEYOND_AXLES_M, vehicle.wheelbase_m + BEYOND_AXLES_M + STEP_M / 2.0, STEP_M)
     m_aa, m_gg, m_ga = _half_cars(spectra, load, vehicle, positions_m)
@@ -107,14 +107,12 @@ def agreement(spectra: CrossSpectra, load: tuple[float, float], vehicle: Vehicle
     return Agreement(float((inner / np.sqrt(norms))[at]), float(positions_m[at]), scale)
 
 
-def _half_cars(
-    spectra: CrossSpectra, load: tuple[float, float], vehicle: Vehicle, positions_m: F64
-) -> tuple[F64, F64, C128]:
+def _half_cars(spectra: CrossSpectra, load: Load, vehicle: Vehicle, positions_m: F64) -> tuple[F64, F64, C128]:
     """The usual half-car's spectra (p, b, m) with its sensor at each of positions_m (p,)."""
     theta = np.repeat(prior_of(vehicle).mean[None], len(positions_m), axis=0)
     theta[:, INDEX["sensor_position_m"]] = positions_m
-    ground = Ground(vehicle.empty_mass_kg, vehicle.empty_front_share_pct / 100.0, vehicle.wheelbase_m)
-    payload_kg, share = np.full(len(theta), load[0]), np.full(len(theta), load[1] / 100.0)
+    ground = Ground.of(vehicle)
+    payload_kg, share = np.full(len(theta), load.payload_kg), np.full(len(theta), load.front_share)
     return expected_spectra(spectral_model(theta, payload_kg, share, ground, spectra.freq_hz), spectra)
 
 
@@ -146,16 +144,12 @@ def phases(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Phases:
 
     It carries the load stated or none, whichever explains more: a load noted wrong shall not look like a wrong axis.
     """
-    loads = dict.fromkeys([_stated(run), (0.0, vehicle.empty_front_share_pct)])
+    loads = dict.fromkeys([run.load, Load(0.0, vehicle.empty_front_share_pct)])
     upright, turned = (
         _likeliest([agreement(seen, load, vehicle) for load in loads])
         for seen in (spectra, spectra.with_pitch_reversed())
     )
     return Phases(upright, turned)
-
-
-def _stated(run: KnownRun) -> tuple[float, float]:
-    return run.payload_kg, run.front_share_pct
 
 
 def _likeliest(found: Sequence[Agreement]) -> Agreement:
@@ -223,7 +217,7 @@ def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) ->
 
 def fitted_position_m(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> tuple[float, float]:
     """The most probable sensor position of one run and its standard deviation, the rest of the vehicle unknown too."""
-    start_m = agreement(spectra, _stated(run), vehicle).position_m
+    start_m = agreement(spectra, run.load, vehicle).position_m
     loose = prior_of(replace(vehicle, sensor_position_m=start_m, sensor_position_std_m=LOOSE_STD_M))
     at_rest = fit_half_car([KnownSpectra(run, vehicle, spectra)], loose, loose.start(0.0, 0.0))
     at = INDEX["sensor_position_m"]

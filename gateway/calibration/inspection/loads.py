@@ -21,7 +21,7 @@ from gateway.core.cross_spectrum.estimator import locate
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found
-from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import Load, Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
 
@@ -68,8 +68,8 @@ class _Labelled:
 
     def costs(self) -> F64:
         """(n, n) cost of run i with the load of run j."""
-        loads = [(k.run.payload_kg, k.run.front_share_pct / 100.0) for k in self.known]
-        return np.array([[k.whittle.cost(Point(self.found.x, *load)) for load in loads] for k in self.known])
+        points = [k.at(self.found.x) for k in self.known]
+        return np.array([[k.whittle.cost(point) for point in points] for k in self.known])
 
     def swapped_pair(self) -> tuple[int, int, float] | None:
         """The pair whose exchange explains the drives best, with its evidence; None where none does by enough.
@@ -97,9 +97,8 @@ class _Labelled:
 
     def _is_nearer(self, one: int, other: int, left_out: Sequence[int]) -> bool:
         point, _ = self.weighed_by_others(one, left_out)
-        weighed = (point.payload_kg, 100.0 * point.front_share)
         own, exchanged = (
-            beyond(weighed, [(run.payload_kg, run.front_share_pct)], self.vehicle.empty_mass_kg)
+            beyond(point.load, [run.load], self.vehicle.empty_mass_kg)
             for run in (self.known[one].run, self.known[other].run)
         )
         return exchanged < own
@@ -110,8 +109,7 @@ class _Labelled:
         return float(np.nanmax(misfits)) > STRAINED_MISFIT
 
     def _differ(self, i: int, j: int) -> bool:
-        one, other = self.known[i].run, self.known[j].run
-        return (one.payload_kg, one.front_share_pct) != (other.payload_kg, other.front_share_pct)
+        return self.known[i].run.load != self.known[j].run.load
 
     def _with_exchanged(self, i: int, j: int) -> Found:
         one, other = self.known[i], self.known[j]
@@ -147,9 +145,7 @@ def _weighed(all_runs: _Labelled, i: int, left_out: Sequence[int]) -> str:
     if len(all_runs.known) - len(left_out) < LEAST_OTHERS:
         return ""
     point, _ = all_runs.weighed_by_others(i, left_out)
-    return (
-        f"; the other runs weigh this one at {_load(point.payload_kg, point.front_share)}, not {_stated(all_runs, i)}"
-    )
+    return f"; the other runs weigh this one at {_load(point.load)}, not {_stated(all_runs, i)}"
 
 
 def _disagreements(all_runs: _Labelled) -> Iterator[tuple[int, Finding]]:
@@ -161,10 +157,10 @@ def _disagreements(all_runs: _Labelled) -> Iterator[tuple[int, Finding]]:
     for i in np.flatnonzero(excess > LEAST_EVIDENCE).tolist():
         run = all_runs.known[i].run
         point, std = all_runs.weighed_by_others(i, (i,))
-        off = np.abs([point.payload_kg - run.payload_kg, point.front_share - run.front_share_pct / 100.0])
+        off = np.abs([point.payload_kg - run.payload_kg, point.front_share - run.load.front_share])
         allowed = [DOUBT_PAYLOAD_SHARE * all_runs.vehicle.empty_mass_kg, DOUBT_FRONT_SHARE]
         if np.any((off > allowed) & (off > DOUBT_STDS * std)):
-            text = f"the other runs weigh this one at {_load(point.payload_kg, point.front_share)}"
+            text = f"the other runs weigh this one at {_load(point.load)}"
             yield (
                 run.number,
                 finding_of(Kind.LOAD_DISAGREES, Severity.WARNING, f"{text}, the file says {_stated(all_runs, i)}"),
@@ -172,9 +168,8 @@ def _disagreements(all_runs: _Labelled) -> Iterator[tuple[int, Finding]]:
 
 
 def _stated(all_runs: _Labelled, i: int) -> str:
-    run = all_runs.known[i].run
-    return _load(run.payload_kg, run.front_share_pct / 100.0)
+    return _load(all_runs.known[i].run.load)
 
 
-def _load(payload_kg: float, front_share: float) -> str:
-    return f"{payload_kg:.0f} kg with {100.0 * front_share:.1f} % in front"
+def _load(load: Load) -> str:
+    return f"{load.payload_kg:.0f} kg with {load.front_share_pct:.1f} % in front"

@@ -43,7 +43,7 @@ class Design:
 
     def __init__(self, vehicle: Vehicle, theta: F64, drive: Drive, targets: Sequence[PlacedLoad]) -> None:
         self._theta = theta
-        self._ground = Ground(vehicle.empty_mass_kg, vehicle.empty_front_share_pct / 100.0, vehicle.wheelbase_m)
+        self._ground = Ground.of(vehicle)
         self._reading = Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT)
         self._drive = drive
         self._information: dict[PlacedLoad, F64] = {}
@@ -100,6 +100,6 @@ class Design:
         return np.diag(own)[-2:], moves
 
     def _seen(self, load: PlacedLoad, drive: Drive, weight: float) -> tuple[Whittle, Point]:
-        point = Point(self._theta, load.payload_kg, load.front_share_pct / 100.0)
+        point = Point.of(self._theta, load.load)
         spectra = expected_of(steady_spectra(self._reading, drive), point, self._ground)
         return Whittle(spectra, self._ground, weight), point

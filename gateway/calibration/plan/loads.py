@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.calibrated import RANGE_MARGIN
-from gateway.core.vehicle import Vehicle, front_share_pct
+from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.core.weights import weights_of
 
 DRIVEN_PARTS: Final = (0.25, 0.5, 0.75, 1.0)  # of the largest payload
@@ -25,6 +25,11 @@ class PlacedLoad:
     payload_kg: float
     position_m: float | None
     front_share_pct: float
+
+    @property
+    def load(self) -> Load:
+        """Without its place."""
+        return Load(self.payload_kg, self.front_share_pct)
 
 
 def empty(vehicle: Vehicle) -> PlacedLoad:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from gateway.core.cross_spectrum.measured import Reading
 from gateway.core.cross_spectrum.parameters import Ground
+from gateway.core.vehicle import Load
 from gateway.records import F64
 
 
@@ -13,7 +14,7 @@ class CrossSpectrumCalibration:
 
     parameters (p,) and covariance (p, p) follow ``names`` (parameters.PARAMETERS; logarithms where
     these are positive quantities). The inflations widen standard deviations, by so much more per_reach
-    as a load lies beyond ``known_loads`` (payload kg, front share %; core.reach); misfit_limit is the
+    as a load lies beyond ``known_loads`` (reach.beyond); misfit_limit is the
     largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
     root mean squares within the band. usual_log_amplitude: see core.cross_spectra.Reading.
     """
@@ -35,7 +36,7 @@ class CrossSpectrumCalibration:
     front_share_seen_pct: tuple[float, float]
     speed_seen_mps: tuple[float, float]
     warnings: tuple[str, ...] = ()
-    known_loads: tuple[tuple[float, float], ...] = ()
+    known_loads: tuple[Load, ...] = ()
     payload_inflation_per_reach: float = 0.0
     front_share_inflation_per_reach: float = 0.0
     usual_log_amplitude: float | None = None

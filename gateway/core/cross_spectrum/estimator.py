@@ -120,7 +120,7 @@ def _fit_load(whittle: Whittle, calibration: CrossSpectrumCalibration) -> Found:
 
 def _starting_loads(calibration: CrossSpectrumCalibration) -> list[tuple[float, float]]:
     """(payload in kg, front share 0..1) for a few loads at a few places."""
-    empty_kg, share = calibration.empty_mass_kg, calibration.empty_front_share_pct / 100.0
+    empty_kg, share = calibration.empty_mass_kg, calibration.ground.empty_front_share
     loads = []
     most_kg = max(calibration.payload_seen_kg[1], LEAST_START_SHARE * empty_kg)
     for payload_kg in np.linspace(0.0, most_kg, START_PAYLOADS_N).tolist():
@@ -175,10 +175,10 @@ def _judged(
     blank: Estimate, spectra: CrossSpectra, located: Located, unseen: float, calibration: CrossSpectrumCalibration
 ) -> Estimate:
     """``unseen`` widens what is away from the calibration's speeds and roads."""
-    payload_kg, share_pct = located.point.payload_kg, 100.0 * located.point.front_share
+    load = located.point.load
     payload_var, share_var = np.diag(located.load_covariance)
     payload_drift_var, share_drift_var = np.diag(located.drift_covariance)
-    reach = beyond((payload_kg, share_pct), calibration.known_loads, calibration.empty_mass_kg)
+    reach = beyond(load, calibration.known_loads, calibration.empty_mass_kg)
     of_payload = calibration.payload_inflation * (1.0 + calibration.payload_inflation_per_reach * reach)
     of_share = calibration.front_share_inflation * (1.0 + calibration.front_share_inflation_per_reach * reach)
     payload_std_kg = math.sqrt((unseen * of_payload) ** 2 * payload_var + payload_drift_var)
@@ -202,8 +202,8 @@ def _judged(
         return replace(blank, rejected=(why,), diagnostics=diagnostics)
     return replace(
         blank,
-        payload=Quantity.normal(payload_kg, payload_std_kg),
-        front_share=Quantity.normal(share_pct, share_std_pct),
+        payload=Quantity.normal(load.payload_kg, payload_std_kg),
+        front_share=Quantity.normal(load.front_share_pct, share_std_pct),
         diagnostics=diagnostics,
     )
 

@@ -20,6 +20,7 @@ import numpy as np
 from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model, spectral_slopes
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.parameters import Ground
+from gateway.core.vehicle import Load
 from gateway.records import C128, F64
 
 EFFECTIVE_SHARE: Final = 0.5  # neighbouring Hann bins and half-overlapping segments repeat each other
@@ -34,6 +35,16 @@ class Point:
     theta: F64
     payload_kg: float
     front_share: float
+
+    @classmethod
+    def of(cls, theta: F64, load: Load) -> "Point":
+        """The parameters with a load."""
+        return cls(theta, load.payload_kg, load.front_share)
+
+    @property
+    def load(self) -> Load:
+        """The load alone."""
+        return Load(self.payload_kg, 100.0 * self.front_share)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.half_car import Axle, HalfCar
+from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 from gateway.units import STANDARD_GRAVITY_MPS2
 
@@ -71,6 +72,11 @@ class Ground:
     empty_mass_kg: float
     empty_front_share: float
     wheelbase_m: float
+
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> "Ground":
+        """Of a vehicle as its fitter states it."""
+        return cls(vehicle.empty_mass_kg, vehicle.empty_front_share, vehicle.wheelbase_m)
 
     @property
     def half_weight_kn(self) -> float:

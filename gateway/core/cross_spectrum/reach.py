@@ -12,14 +12,15 @@ from typing import Final
 import numpy as np
 from scipy.optimize import nnls
 
+from gateway.core.vehicle import Load
 from gateway.records import F64
 
 _SUM_WEIGHT: Final = 1e3  # holds the weights of a mixture to a sum of one
 _TOUCHING: Final = 1e-3  # nearer than this is inside: a kilogram or two
 
 
-def beyond(load: tuple[float, float], seen: Sequence[tuple[float, float]], empty_mass_kg: float) -> float:
-    """Distance of ``load`` (payload kg, front share %) from the convex hull of ``seen`` in the plane of axle loads.
+def beyond(load: Load, seen: Sequence[Load], empty_mass_kg: float) -> float:
+    """Distance of ``load`` from the convex hull of ``seen`` in the plane of axle loads.
 
     In parts of the empty sprung mass; 0 inside, and where nothing was seen to be compared with.
     """
@@ -33,9 +34,8 @@ def beyond(load: tuple[float, float], seen: Sequence[tuple[float, float]], empty
     return distance if distance > _TOUCHING else 0.0
 
 
-def _axle_loads(load: tuple[float, float], empty_mass_kg: float) -> F64:
+def _axle_loads(load: Load, empty_mass_kg: float) -> F64:
     """Front and rear load (2,) in parts of the empty sprung mass."""
-    payload_kg, front_share_pct = load
-    whole = 1.0 + payload_kg / empty_mass_kg
-    front = whole * front_share_pct / 100.0
+    whole = 1.0 + load.payload_kg / empty_mass_kg
+    front = whole * load.front_share_pct / 100.0
     return np.array([front, whole - front], dtype=float)

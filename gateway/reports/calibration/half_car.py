@@ -49,7 +49,7 @@ def fits_of(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration) -> 
             cross.delay_std_s,
             amplitude_ratio=math.exp(cross.log_amplitude_mean),
         )
-        point = Point(calibration.parameters, run.payload_kg, run.front_share_pct / 100.0)
+        point = Point.of(calibration.parameters, run.load)
         misfit = Whittle(cross, calibration.ground).misfit(point)
         fits.append(Fit(run, measured, modelled_spectra(measured, calibration, at_truth), misfit))
     return fits
