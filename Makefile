@@ -90,7 +90,7 @@ $(PACKAGES): $(PACKAGED) | .venv/.package
 dist: .venv/.development
 	$(BIN)/python deploy/dist/make_dist.py
 
-# The pictures in README.md; needs chromium.
+# The pictures in README.md and docs; needs chromium.
 screenshots: .venv/.development
 	$(BIN)/python docs/make_screenshots.py
 
@@ -105,6 +105,7 @@ docs: .venv/.development
 	$(BIN)/python docs/make_calibration_schema.py
 	$(BIN)/python docs/make_readme_table.py
 	$(BIN)/python docs/make_drawings.py
+	$(BIN)/python docs/make_tutorial.py
 
 # The documents as a site, in build/site.
 site: .venv/.development

@@ -1,7 +1,10 @@
-"""Writes the pictures of the dashboard in docs/images (`make screenshots`).
+"""Writes the pictures of the dashboard and of the calibration report in docs/images (`make screenshots`).
 
 Runs `springscale demo` as anybody would, opens its dashboard in Debian's chromium through playwright, and takes
-the pictures on the second drive, when a loaded batch has been weighed and the next is under way.
+the pictures on the second drive, when a loaded batch has been weighed and the next is under way. The tutorial's own
+pictures come from its commands: the report of its calibration, and the dashboard after the demonstration's first drive.
+
+Names of pictures, such as `python docs/make_screenshots.py dashboard tutorial`, take these alone.
 """
 
 import json
@@ -12,12 +15,17 @@ import time
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
+from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 IMAGES: Final = Path(__file__).with_name("images")
+SPRINGSCALE: Final = (sys.executable, "-m", "gateway")
+N_WEIGHED_FIRST: Final = 5
 N_WEIGHED: Final = 9  # the first drive's five batches, the second's three empty ones and its first loaded one
 PATIENCE_S: Final = 300.0
 MOST_BYTES: Final = 300_000
@@ -32,9 +40,9 @@ PHONE: Final[dict[str, Any]] = {
 
 
 @contextmanager
-def demonstration() -> Iterator[str]:
+def demonstration(speed: str) -> Iterator[str]:
     """Where the dashboard of a running demonstration is."""
-    command = [sys.executable, "-m", "gateway", "demo", "--port", "0", "--speed", "20"]
+    command = [*SPRINGSCALE, "demo", "--port", "0", "--speed", speed]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
         try:
             assert running.stdout is not None
@@ -70,23 +78,63 @@ def down_to(page: Page, last: str) -> Any:
     return {"x": 0, "y": 0, "width": LAPTOP["viewport"]["width"], "height": bottom_px + 12}
 
 
-def main() -> None:
-    """Take the pictures."""
-    IMAGES.mkdir(exist_ok=True)
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    with demonstration() as url, sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+def save(picture: bytes, name: str) -> None:
+    """As a PNG of 256 colours: charts and words need no more."""
+    with Image.open(BytesIO(picture)) as whole:
+        whole.convert("RGB").quantize(256).save(IMAGES / name, optimize=True)
+    if (IMAGES / name).stat().st_size > MOST_BYTES:
+        sys.exit(f"{name} is larger than {MOST_BYTES / 1000:g} kB")
+
+
+def take_dashboard(browser: Browser) -> None:
+    """README's pictures and those of dashboard.md."""
+    with demonstration("20") as url:
         wait_for_batches(url, 1)  # before the first there is nothing to draw
         laptop, phone = opened(browser, url, LAPTOP), opened(browser, url, PHONE)
         wait_for_batches(url, N_WEIGHED)
         laptop.wait_for_timeout(2000)
-        laptop.screenshot(path=IMAGES / "dashboard-laptop.png", full_page=True, clip=down_to(laptop, "#history"))
-        phone.screenshot(path=IMAGES / "dashboard-phone.png")
-        laptop.locator("#spectra").screenshot(path=IMAGES / "dashboard-spectra.png")
+        save(laptop.screenshot(full_page=True, clip=down_to(laptop, "#history")), "dashboard-laptop.png")
+        save(phone.screenshot(), "dashboard-phone.png")
+        save(laptop.locator("#spectra").screenshot(), "dashboard-spectra.png")
+
+
+def take_tutorial(browser: Browser) -> None:
+    """The dashboard as the tutorial's reader meets it."""
+    with demonstration("1") as url:
+        wait_for_batches(url, 1)
+        page = opened(browser, url, LAPTOP)
+        wait_for_batches(url, N_WEIGHED_FIRST)
+        page.wait_for_timeout(2000)
+        save(page.screenshot(full_page=True, clip=down_to(page, "#history")), "tutorial-dashboard.png")
+
+
+def take_report(browser: Browser) -> None:
+    """The first screens of the tutorial's calibration report."""
+    with TemporaryDirectory() as folder:
+        bench, report = Path(folder) / "bench", Path(folder) / "report"
+        for command in (
+            ["simulate", "campaign", "experiment", bench],
+            ["calibrate", bench / "campaign.toml", "--output", f"{folder}/vehicle.json", "--report", report],
+        ):
+            subprocess.run([*SPRINGSCALE, *command], stdout=subprocess.DEVNULL, check=True)
+        page = browser.new_page(locale="en-GB", **LAPTOP)
+        page.goto((report / "report.html").as_uri())
+        page.wait_for_timeout(2000)
+        save(page.screenshot(), "calibration-report.png")
+
+
+TAKEN: Final = {"dashboard": take_dashboard, "tutorial": take_tutorial, "report": take_report}
+
+
+def main() -> None:
+    """Take the pictures."""
+    IMAGES.mkdir(exist_ok=True)
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    with sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        for name in sys.argv[1:] or TAKEN:
+            TAKEN[name](browser)
         browser.close()
-    for picture in IMAGES.glob("dashboard-*.png"):
-        if picture.stat().st_size > MOST_BYTES:
-            sys.exit(f"{picture} is larger than {MOST_BYTES / 1000:g} kB")
 
 
 if __name__ == "__main__":
