@@ -104,7 +104,8 @@ def take_tutorial(browser: Browser) -> None:
         wait_for_batches(url, 1)
         page = opened(browser, url, LAPTOP)
         wait_for_batches(url, N_WEIGHED_FIRST)
-        page.wait_for_timeout(2000)
+        page.wait_for_selector("text=Bus silent")  # the second drive is being simulated
+        page.wait_for_selector("text=Bus silent", state="detached", timeout=PATIENCE_S * 1000.0)
         save(page.screenshot(full_page=True, clip=down_to(page, "#history")), "tutorial-dashboard.png")
 
 
