@@ -50,7 +50,7 @@ def weighed(n: int, payload_kg: float, front_share_pct: float, calibrated: Calib
         make_estimate(n),
         estimator="cross_spectrum",
         calibration_id=calibrated.id,
-        payload=Quantity(payload_kg, interval95=(payload_kg - 12.0, payload_kg + 12.0)),
+        payload=Quantity(payload_kg, 6.0, (payload_kg - 12.0, payload_kg + 12.0)),
         front_share=Quantity(front_share_pct, 0.2, (front_share_pct - 0.4, front_share_pct + 0.4)),
         epoch=Epoch(Quantity(payload_kg, 4.0), Quantity(), 2),
     )
