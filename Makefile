@@ -103,9 +103,9 @@ docs: .venv/.development
 	$(BIN)/python docs/make_reasons.py
 	$(BIN)/python docs/make_findings.py
 	$(BIN)/python docs/make_calibration_schema.py
+	$(BIN)/python docs/make_tutorial.py
 	$(BIN)/python docs/make_readme_table.py
 	$(BIN)/python docs/make_drawings.py
-	$(BIN)/python docs/make_tutorial.py
 
 # The documents as a site, in build/site.
 site: .venv/.development

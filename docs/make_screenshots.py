@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -25,7 +25,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 IMAGES: Final = Path(__file__).with_name("images")
 SPRINGSCALE: Final = (sys.executable, "-m", "gateway")
-N_WEIGHED_FIRST: Final = 5
+N_FIRST_DRIVE: Final = 7  # its last rest is closed by the first frames of the second drive
 N_WEIGHED: Final = 9  # the first drive's five batches, the second's three empty ones and its first loaded one
 PATIENCE_S: Final = 300.0
 MOST_BYTES: Final = 300_000
@@ -51,16 +51,21 @@ def demonstration(speed: str) -> Iterator[str]:
             running.terminate()
 
 
-def wait_for_batches(url: str, n_weighed: int) -> None:
-    """Until so many batches are weighed, the newest among them."""
+def wait_for_batches(url: str, are_there: Callable[[list[dict[str, Any]]], bool]) -> None:
+    """Until the batches in the history are those one waits for."""
     end_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < end_s:
         with urllib.request.urlopen(f"{url}/api/v1/estimates?spectra=false") as answer:
             items = json.load(answer)["items"]
-        if items and sum(not item["rejected"] for item in items) >= n_weighed and not items[-1]["rejected"]:
+        if items and are_there(items):
             return
         time.sleep(0.5)
-    sys.exit(f"the demonstration did not weigh {n_weighed} batches in {PATIENCE_S:g} s")
+    sys.exit(f"the demonstration did not weigh what the picture needs in {PATIENCE_S:g} s")
+
+
+def weighed(n: int) -> Callable[[list[dict[str, Any]]], bool]:
+    """So many batches are weighed, the newest among them."""
+    return lambda items: sum(not item["rejected"] for item in items) >= n and not items[-1]["rejected"]
 
 
 def opened(browser: Browser, url: str, options: dict[str, Any]) -> Page:
@@ -89,9 +94,9 @@ def save(picture: bytes, name: str) -> None:
 def take_dashboard(browser: Browser) -> None:
     """README's pictures and those of dashboard.md."""
     with demonstration("20") as url:
-        wait_for_batches(url, 1)  # before the first there is nothing to draw
+        wait_for_batches(url, weighed(1))  # before the first there is nothing to draw
         laptop, phone = opened(browser, url, LAPTOP), opened(browser, url, PHONE)
-        wait_for_batches(url, N_WEIGHED)
+        wait_for_batches(url, weighed(N_WEIGHED))
         laptop.wait_for_timeout(2000)
         save(laptop.screenshot(full_page=True, clip=down_to(laptop, "#history")), "dashboard-laptop.png")
         save(phone.screenshot(), "dashboard-phone.png")
@@ -101,11 +106,10 @@ def take_dashboard(browser: Browser) -> None:
 def take_tutorial(browser: Browser) -> None:
     """The dashboard as the tutorial's reader meets it."""
     with demonstration("1") as url:
-        wait_for_batches(url, 1)
+        wait_for_batches(url, weighed(1))
         page = opened(browser, url, LAPTOP)
-        wait_for_batches(url, N_WEIGHED_FIRST)
-        page.wait_for_selector("text=Bus silent")  # the second drive is being simulated
-        page.wait_for_selector("text=Bus silent", state="detached", timeout=PATIENCE_S * 1000.0)
+        wait_for_batches(url, lambda items: len(items) == N_FIRST_DRIVE)
+        page.wait_for_timeout(5000)
         save(page.screenshot(full_page=True, clip=down_to(page, "#history")), "tutorial-dashboard.png")
 
 
