@@ -63,6 +63,8 @@ class Event(StrEnum):
     TARE_UNDONE = "tare undone"
     TARE_DROPPED = "tare dropped"
     TARE_NOT_DROPPED = "tare of another calibration could not be ended"
+    TARE_SET_ASIDE = "broken tares set aside"
+    TOKENS_SET_ASIDE = "broken tokens set aside"
     TOKENS_UNREADABLE = "no token is accepted"
 
 

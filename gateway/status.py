@@ -145,6 +145,9 @@ class Status(_Told):
     uplink: UplinkStatus | None = Field(None, description="null where no broker is configured")
     is_ready: bool = Field(True, description="whether estimates can come: what /health/ready tells")
     not_ready_reason: str | None = None
+    warnings: tuple[str, ...] = Field(
+        (), description="what is broken beside the weighing, which goes on, and how to mend it"
+    )
 
     def model_post_init(self, _context: object) -> None:
         if not self.state_in_words:
@@ -165,4 +168,5 @@ class Status(_Told):
             said.append(f"Estimates are kept in memory only ({self.store.reason}).")
         if self.uplink is not None and not self.uplink.is_connected and self.uplink.last_fault:
             said.append(f"Not connected to the fleet's broker ({self.uplink.last_fault}); estimates wait.")
+        said += [f"{warning[:1].upper()}{warning[1:]}." for warning in self.warnings]
         return " ".join(said)

@@ -11,6 +11,7 @@ from drawings.canvas import Canvas, Point
 PYPROJECT: Final = Path(__file__).parents[2] / "pyproject.toml"
 PACKAGE: Final = "gateway"
 MODULES: Final = ("setup", "config")  # single files that are drawn like rooms; others are small and shared
+SHARED: Final = frozenset({"files"})  # a folder that is small and shared like those
 WIDTH: Final = 840
 MIDDLES: Final = {
     **{"cli": 420.0, "service": 220.0, "reports": 620.0, "offline": 560.0, "workbench": 750.0, "setup": 390.0},
@@ -30,7 +31,7 @@ def _room_of(module: str) -> str:
 def _imports(graph: grimp.ImportGraph) -> dict[str, set[str]]:
     """What each room imports of the others."""
     children = graph.find_children(PACKAGE)
-    rooms = {_room_of(child) for child in children if graph.find_children(child)} | set(MODULES)
+    rooms = {_room_of(child) for child in children if graph.find_children(child)} - SHARED | set(MODULES)
     unplaced = rooms ^ MIDDLES.keys()
     if unplaced:
         raise ValueError(f"docs/drawings/rooms.py has no place for, or too many of: {', '.join(sorted(unplaced))}")

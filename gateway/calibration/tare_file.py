@@ -5,7 +5,6 @@ It lies beside the database, apart from the calibration file, which no tare chan
 
 import hashlib
 import json
-import os
 from pathlib import Path
 from typing import Final, Literal
 
@@ -14,6 +13,7 @@ from pydantic import Field, ValidationError
 from gateway.calibration.file.parts import Part
 from gateway.core.tare import Tare, Weighed, Zero
 from gateway.errors import ConfigurationError
+from gateway.files.kept import KeptFiles
 from gateway.records import iso_utc
 from gateway.toml_file import describe_faults
 
@@ -121,7 +121,7 @@ def entry_of(
 def load_tares(path: Path) -> TareHistory:
     """The history in ``path``, empty where there is none yet. Raises ConfigurationError for a file that is none."""
     try:
-        history = TareHistory.model_validate_json(path.read_bytes())
+        history = TareHistory.model_validate_json(KeptFiles(path.parent).read(path.name))
     except FileNotFoundError:
         return TareHistory()
     except OSError as fault:
@@ -136,17 +136,8 @@ def load_tares(path: Path) -> TareHistory:
 
 def save_tares(path: Path, history: TareHistory) -> None:
     """Replace the file in one step; on disk when this returns. Raises OSError, and then the old file stands."""
-    fresh = path.with_name(f".{path.name}.new")
-    with fresh.open("w", encoding="utf-8") as file:
-        file.write(json.dumps(history.model_dump(mode="json"), indent=1, allow_nan=False) + "\n")
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(path)
-    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(folder)  # the new name, too, outlives a power cut
-    finally:
-        os.close(folder)
+    text = json.dumps(history.model_dump(mode="json"), indent=1, allow_nan=False, ensure_ascii=False)
+    KeptFiles(path.parent).write(path.name, (text + "\n").encode())  # no UTF-8, no file: it could not be read again
 
 
 _MEND: Final = "restore it, or remove it to go on from the factory zero"

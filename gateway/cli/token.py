@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from gateway.config import load_settings
+from gateway.files.kept import become_owner_of
 from gateway.web import Scope, TokenFile
 
 SECONDS_PER_DAY = 86_400.0
@@ -16,8 +17,13 @@ _config = click.option(
 
 
 def token_file(config_path: Path) -> TokenFile:
-    """The tokens of the service that this file configures: tokens.json beside its database."""
-    return TokenFile(load_settings(config_path).store.directory / "tokens.json")
+    """The tokens of the service that this file configures: tokens.json beside its database.
+
+    Root gives up its rights first: what lies in the service's directory is the service's, links among it.
+    """
+    directory = load_settings(config_path).store.directory
+    become_owner_of(directory)
+    return TokenFile(directory / "tokens.json")
 
 
 @click.group("token")

@@ -73,7 +73,7 @@ class Gateway:
         self._settings = settings
         self._on_started = on_started
         token_file = TokenFile(settings.store.directory / "tokens.json")
-        tokens = token_file if token_file.tokens() else None
+        tokens = token_file if token_file.are_in_use() else None
         refuse_open_address(settings.web.host, has_tokens=tokens is not None)
         forwarding = uplink_settings(settings.uplink, settings.vehicle)
         self.store = store_of(settings.store)
@@ -86,7 +86,16 @@ class Gateway:
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board, log_batch)
         self.uplink = uplink_of(forwarding, setup, self.store)
-        self.status = StatusReport(settings, setup, self.source, self.pipeline, self.store, self.board, self.uplink)
+        self.status = StatusReport(
+            settings,
+            setup,
+            self.source,
+            self.pipeline,
+            self.store,
+            self.board,
+            self.uplink,
+            warnings=lambda: tuple(fault for fault in (token_file.fault, self.tare.fault) if fault),
+        )
         self.tare = TareDesk(
             settings.store.directory,
             Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id),

@@ -31,6 +31,8 @@ class StatusReport:
         store: Store,
         board: Board,
         uplink: Uplink | None = None,
+        *,
+        warnings: Callable[[], tuple[str, ...]] = tuple,
     ) -> None:
         self._settings = settings
         self._setup = setup
@@ -39,6 +41,7 @@ class StatusReport:
         self._store = store
         self._board = board
         self._uplink = uplink
+        self._warnings = warnings
         self._version = version("springscale")  # read once: it is a file, and a status must not want one
         self._started = time.monotonic()
 
@@ -68,6 +71,7 @@ class StatusReport:
             uplink=self._uplink.report() if self._uplink else None,
             is_ready=not_ready is None,
             not_ready_reason=not_ready,
+            warnings=self._warnings(),
         )
 
     def state(self) -> State:

@@ -12,7 +12,8 @@ from gateway.calibration.tare_file import FILE_NAME, TareEnd, TareEntry, TareHis
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow
 from gateway.core.tare import Refusal, Weighed, Zero, zero_of
-from gateway.errors import TareRefusedError
+from gateway.errors import ConfigurationError, TareRefusedError
+from gateway.files.kept import KeptFiles
 from gateway.log import Event, log_event
 from gateway.records import iso_utc, json_line
 
@@ -60,7 +61,7 @@ class TareDesk:
     ) -> None:
         """Reads the history and puts the tare in use that is for this calibration; others end here.
 
-        Raises ConfigurationError for a file that cannot be believed.
+        A file that cannot be believed is set aside: weighing goes on from the factory zero, and ``fault`` says so.
         """
         self._path = directory / FILE_NAME
         self._subject = subject
@@ -69,7 +70,9 @@ class TareDesk:
         self._on_event = on_event
         self._clock_ns = clock_ns
         self._lock = threading.Lock()
-        self._history = load_tares(self._path)
+        self.fault: str | None = None
+        self._has_broken_file = False
+        self._history = self._believed()
         self._drop_others()
         self._use()
 
@@ -99,6 +102,7 @@ class TareDesk:
                 estimator=self._subject.estimator,
             )
             self._keep(self._history.with_entry(entry))
+            self.fault = None
             self._tell(Event.TARE_SET, {"tare_id": entry.id, "by": by, **asdict(zero)})
             return json_line(entry.model_dump(mode="json"))
 
@@ -113,6 +117,27 @@ class TareDesk:
             self._keep(self._history.ended({entry.id for entry in chosen}, end))
             self._tell(Event.TARE_UNDONE, {"tare_ids": [entry.id for entry in chosen], "by": by})
             return self.told()
+
+    def _believed(self) -> TareHistory:
+        """What the file tells; nothing where it cannot be believed."""
+        try:
+            return load_tares(self._path)
+        except ConfigurationError as fault:
+            broken = str(fault)
+        self._has_broken_file = True
+        try:
+            aside = f"is set aside as {self._set_broken_aside()}"
+        except OSError as refusal:
+            aside = f"cannot be set aside: {refusal}"
+        self.fault = f"{self._path} cannot be believed: the factory zero is in use (it {aside})"
+        self._tell(Event.TARE_SET_ASIDE, {"fault": broken, "set_aside": aside}, level=logging.ERROR)
+        return TareHistory()
+
+    def _set_broken_aside(self) -> str:
+        """The new name. Raises OSError."""
+        aside = KeptFiles(self._path.parent).set_aside(self._path.name)
+        self._has_broken_file = False
+        return aside
 
     def _active(self) -> TareEntry | None:
         return self._history.active(self._subject.calibration_id, self._subject.estimator)
@@ -164,6 +189,8 @@ class TareDesk:
     def _keep(self, history: TareHistory) -> None:
         """On disk, then in use. Raises TareRefusedError where the disk refuses; then nothing has changed."""
         try:
+            if self._has_broken_file:  # it is never written over
+                self._set_broken_aside()
             save_tares(self._path, history)
         except OSError as fault:
             raise TareRefusedError(
@@ -172,9 +199,9 @@ class TareDesk:
         self._history = history
         self._use()
 
-    def _tell(self, event: Event, fields: Mapping[str, Any]) -> None:
+    def _tell(self, event: Event, fields: Mapping[str, Any], level: int = logging.INFO) -> None:
         """To the log, and to whoever keeps what happened."""
-        log_event(event, **fields)
+        log_event(event, level=level, **fields)
         self._on_event(event.value.replace(" ", "_"), fields)
 
     def _use(self) -> None:

@@ -1,9 +1,10 @@
 """The shapes of the answers, for the API's description; the bytes themselves come ready from board and store."""
 
+import json
 from types import GenericAlias
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, SPECTRA, EstimateField, Presence
 
@@ -77,6 +78,23 @@ class Ready(BaseModel):
 
     is_ready: bool = True
     state: str = Field(examples=["estimating"])
+    warnings: list[str] = Field([], description="what is broken beside the weighing")
+
+
+class Body(BaseModel):
+    """What a request may say in JSON: an unknown key is refused, and so is text that no answer could repeat."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_utf8(cls, said: Any) -> Any:
+        """JSON can escape half of a character (a lone surrogate): that is no text, and UTF-8 cannot hold it."""
+        try:
+            json.dumps(said, ensure_ascii=False, default=str).encode()
+        except UnicodeEncodeError:
+            raise ValueError("holds half a character (a lone surrogate), which is no text") from None
+        return said
 
 
 class Fault(BaseModel):

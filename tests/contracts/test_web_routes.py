@@ -201,7 +201,7 @@ def test_every_state_has_its_words(state: State) -> None:
 
 
 def test_ready_follows_the_service(gateway: Gateway, client: Client) -> None:
-    assert client.get("/health/ready").json() == {"is_ready": True, "state": "collecting"}
+    assert client.get("/health/ready").json() == {"is_ready": True, "state": "collecting", "warnings": []}
     gateway.status = gateway.status.model_copy(update={"is_ready": False, "not_ready_reason": "the bus is silent"})
     answer = client.get("/health/ready")
     assert (answer.status_code, answer.json()["detail"]) == (503, "the bus is silent")

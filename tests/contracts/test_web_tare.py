@@ -1,15 +1,23 @@
 """Who may re-zero, what is answered, and what a page from elsewhere cannot do."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from fastapi import FastAPI
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from support.tare import FakePipeline, tare_desk
 from support.web import Client, Gateway
 
+from gateway.calibration.tare_file import load_tares
 from gateway.service.tare_desk import TareDesk
 from gateway.web import Scope, TokenFile
+from gateway.web.door import problems
+from gateway.web.routes import tare_router
+from gateway.web.schemas import Body
 
 URL = "/api/v1/calibration/tare"
 EMPTY = {"is_empty": True}
@@ -104,6 +112,58 @@ def test_an_undo_that_is_not_understood_undoes_nothing(local: Client, query: str
 def test_the_claim_must_be_made_in_full(local: Client, body: Any) -> None:
     assert local.request("POST", URL, json=body).status_code == 422
     assert local.get(URL).json()["active"] is None
+
+
+# what JSON can say and UTF-8 cannot, in every place of a body; the text is what goes over the wire
+NO_TEXT = [
+    r'{"is_empty": true, "note": "\ud83d"}',
+    r'{"is_empty": true, "note": "a\udc00b"}',
+    r'{"is_empty": true, "\ud83d": 1}',
+    r'{"is_empty": "\ud83d"}',
+    r'"\ud83d"',
+    r'[[{"a": ["\udfff"]}]]',
+    r'{"is_empty": true, "note": null}',
+]
+
+
+@pytest.mark.parametrize("body", NO_TEXT)
+def test_text_that_is_none_is_a_problem_and_leaves_no_trace(local: Client, tmp_path: Path, body: str) -> None:
+    refused = local.request("POST", URL, content=body, headers={"Content-Type": "application/json"})
+    assert (refused.status_code, refused.headers["content-type"]) == (422, "application/problem+json")
+    assert local.get(URL).json()["history"] == []
+    assert list(tmp_path.glob("*tare.json*")) == []
+
+
+_TEXT = st.text(st.characters(codec=None, categories=["L", "N", "P", "Cs", "Cc", "So"]), max_size=8)
+_ANY = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | _TEXT,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(_TEXT, inner, max_size=3),
+    max_leaves=6,
+)
+_CLAIM = st.fixed_dictionaries({}, optional={"is_empty": st.just(True) | _ANY, "note": _TEXT | _ANY, "x": _ANY})
+
+
+@settings(max_examples=150)
+@given(body=_CLAIM | _ANY)
+def test_no_body_is_met_with_an_error_of_ours_or_spoils_the_next_start(
+    tmp_path_factory: pytest.TempPathFactory, body: Any
+) -> None:
+    directory = tmp_path_factory.mktemp("fuzzed")
+    desk = tare_desk(directory, FakePipeline())
+    app = FastAPI()
+    problems.install(app)
+    app.include_router(tare_router(desk))
+    said = {"Content-Type": "application/json"}
+    answer = Client(app).request("POST", "/api/v1/calibration/tare", content=json.dumps(body), headers=said)
+    assert answer.status_code in {201, 400, 422}
+    load_tares(directory / "tare.json")
+
+
+def test_every_body_that_a_route_takes_is_checked_so(local: Client) -> None:
+    operations = [one for path in local.app.openapi()["paths"].values() for one in path.values()]
+    bodies = [one["requestBody"]["content"]["application/json"] for one in operations if "requestBody" in one]
+    checked = {kind.__name__ for kind in Body.__subclasses__()}
+    assert {body["schema"]["$ref"].rpartition("/")[2] for body in bodies} == checked
 
 
 def test_reading_needs_scope_read_and_changing_needs_operate(guarded: Client, tokens: TokenFile) -> None:

@@ -12,6 +12,7 @@ import sys
 import threading
 from pathlib import Path
 
+import httpx
 import pytest
 from support.bus_drive import bus_drive
 from support.patience import PATIENCE_S, wait_until
@@ -210,6 +211,50 @@ def test_a_database_that_cannot_even_be_read_at_the_start_does_not_keep_the_serv
 
     Gateway(settings, setup_of(settings), on_started=on_started).run()
     assert started
+
+
+PATHS = ("/health/live", "/health/ready", "/api/v1/estimates/latest")
+BROKEN = [b"", b"{", b"\xff\xfe", b'{"note": "\\ud83d"}', b"[" * 5000, None]
+
+
+@pytest.mark.parametrize("content", BROKEN, ids=repr)
+@pytest.mark.parametrize("name", ["tare.json", "tokens.json"])
+def test_a_broken_side_file_is_told_and_set_aside_while_the_weighing_begins(
+    config: Path, name: str, content: bytes | None
+) -> None:
+    state = config.parent / "state"
+    state.mkdir()
+    if content is None:
+        (state / name).symlink_to("/etc/passwd")
+    else:
+        (state / name).write_bytes(content)
+    settings = load_settings(config)
+    told: list[tuple[list[int], tuple[str, ...]]] = []
+
+    def on_started(gateway: Gateway) -> None:
+        loop = asyncio.get_running_loop()
+
+        def ask() -> None:
+            try:
+                answers = [httpx.get(gateway.url + path, trust_env=False).status_code for path in PATHS]
+                told.append((answers, gateway.status().warnings))
+            finally:
+                loop.call_soon_threadsafe(gateway.request_stop)
+
+        threading.Thread(target=ask, daemon=True).start()
+
+    def start() -> tuple[list[int], tuple[str, ...]]:
+        Gateway(settings, setup_of(settings), on_started=on_started).run()
+        return told[-1]
+
+    seen, (warning,) = start()
+    (aside,) = state.glob(f"{name}.broken-*")
+    assert aside.name in warning
+    assert aside.is_symlink() if content is None else aside.read_bytes() == content
+    is_closed = name == "tokens.json"
+    assert seen == ([200, 401, 401] if is_closed else [200, 200, 200])
+    again, warnings = start()  # without tokens nobody gets in until new ones are made
+    assert (again, bool(warnings)) == (seen, is_closed)
 
 
 def test_it_runs_on_the_fast_loop_and_tells_its_status_where_no_file_can_be_opened(

@@ -77,7 +77,7 @@ class Client:
     """Asks the application itself, without a server in between; an error in it is an answer, not an exception."""
 
     def __init__(self, app: FastAPI, address: str = "127.0.0.1") -> None:
-        self._app = app
+        self.app = app
         self._client = (address, 12345)
 
     def get(self, url: str, **options: Any) -> httpx.Response:
@@ -87,7 +87,7 @@ class Client:
         return asyncio.run(self._ask(method, url, **options))
 
     async def _ask(self, method: str, url: str, **options: Any) -> httpx.Response:
-        transport = httpx.ASGITransport(self._app, raise_app_exceptions=False, client=self._client)
+        transport = httpx.ASGITransport(self.app, raise_app_exceptions=False, client=self._client)
         async with httpx.AsyncClient(transport=transport, base_url="http://localhost:8000") as client:
             return await client.request(method, url, **options)
 

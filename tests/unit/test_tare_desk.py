@@ -1,5 +1,6 @@
 """Setting and undoing tares at a service's desk: refusals, history, what is on disk, what is in use."""
 
+import errno
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,6 +15,7 @@ from support.tare import FakePipeline
 from gateway.calibration.tare_file import FILE_NAME, MOST_ENTRIES, load_tares
 from gateway.core.tare import Refusal
 from gateway.errors import ConfigurationError, TareRefusedError
+from gateway.files.kept import KeptFiles
 from gateway.log import Event
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.units import NS_PER_S
@@ -204,16 +206,52 @@ SPOILT: list[tuple[Callable[[str], str], str]] = [
 
 
 @pytest.mark.parametrize(("spoil", "said"), SPOILT)
-def test_a_file_that_cannot_be_believed_is_refused_and_says_what_to_do(
-    tmp_path: Path, spoil: Callable[[str], str], said: str
+def test_a_file_that_cannot_be_believed_is_set_aside_and_the_weighing_goes_on(
+    tmp_path: Path, spoil: Callable[[str], str], said: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     Desk(tmp_path).desk.tare("a", None)
     path = tmp_path / FILE_NAME
     path.write_text(spoil(path.read_text()))
+    spoilt = path.read_bytes()
     with pytest.raises(ConfigurationError, match=said) as fault:
-        Desk(tmp_path)
+        load_tares(path)
     assert str(path) in str(fault.value)
     assert "remove it to go on from the factory zero" in str(fault.value)
+
+    desk = Desk(tmp_path)
+    assert desk.in_use is None
+    assert desk.events == ["broken_tares_set_aside"]
+    (aside,) = tmp_path.glob("tare.json.broken-*")
+    assert aside.read_bytes() == spoilt
+    assert desk.desk.fault is not None
+    assert aside.name in desk.desk.fault
+    assert said in fields_of(caplog, Event.TARE_SET_ASIDE)["fault"]
+    desk.desk.tare("b", None)
+    assert desk.desk.fault is None
+    assert Desk(tmp_path).in_use is not None
+
+
+def test_a_broken_file_that_cannot_be_moved_is_not_written_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / FILE_NAME).write_text("{")
+
+    def refuse(_self: KeptFiles, _name: str) -> str:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(KeptFiles, "set_aside", refuse)
+        desk = Desk(tmp_path)
+        assert desk.refusal(lambda: desk.desk.tare("a", None)) == Refusal.NOT_STORED
+        assert (tmp_path / FILE_NAME).read_text() == "{"
+    desk.desk.tare("a", None)
+    assert [aside.read_text() for aside in tmp_path.glob("tare.json.broken-*")] == ["{"]
+
+
+def test_a_note_that_is_no_text_is_neither_stored_nor_used(desk: Desk) -> None:
+    with pytest.raises(UnicodeEncodeError):
+        desk.desk.tare("a", "\ud83d")
+    assert (desk.in_use, desk.path.exists()) == (None, False)
 
 
 def test_the_log_tells_of_every_change_of_the_zero(desk: Desk, caplog: pytest.LogCaptureFixture) -> None:

@@ -2,13 +2,17 @@
 
 import json
 import stat
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.log import names
 
 from gateway.errors import ConfigurationError
+from gateway.log import Event
 from gateway.web import Scope, TokenFile
 
 
@@ -99,6 +103,84 @@ def test_a_file_that_cannot_be_read_lets_nobody_in(path: Path, content: str) -> 
     assert tokens.verify(text) is None
     with pytest.raises(ConfigurationError, match="no token file"):
         tokens.tokens()
+
+
+NOT_UTF8 = b'{"format": "springscale-tokens", "version": 1, "tokens": [{"name": "caf\xe9"}]}'
+
+
+def test_a_broken_file_closes_the_door_and_keeps_it_closed(path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    assert not TokenFile(path).are_in_use()
+    lost = TokenFile(path).create("fleet", Scope.READ)
+    path.write_bytes(NOT_UTF8)
+    service = TokenFile(path)
+    assert service.are_in_use()
+    assert names(caplog) == [Event.TOKENS_SET_ASIDE]
+    (aside,) = path.parent.glob("tokens.json.broken-*")
+    assert aside.read_bytes() == NOT_UTF8
+    assert service.verify(lost) is None
+    assert TokenFile(path).are_in_use()  # the next start, without the file
+    assert aside.name in (service.fault or "")
+
+    new = TokenFile(path).create("fleet", Scope.READ)
+    assert service.verify(new) is not None
+    assert service.fault is None
+    assert aside.exists()
+
+
+def test_the_command_line_sets_a_broken_file_aside_and_asks_once_more(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_bytes(NOT_UTF8)
+    with pytest.raises(ConfigurationError, match=r"set aside as tokens\.json\.broken-"):
+        TokenFile(path).create("fleet", Scope.READ)
+    assert TokenFile(path).create("fleet", Scope.READ)
+
+
+@pytest.mark.parametrize(
+    "name", ["", " fleet", "fleet ", "fl\neet", "caf\udce9", "\ud83d", "a\0b", "x" * 65, "\x1b[2J", "a\u202eb"]
+)
+def test_a_name_that_cannot_be_shown_is_refused_and_destroys_nothing(path: Path, name: str) -> None:
+    tokens = TokenFile(path)
+    text = tokens.create("first", Scope.READ)
+    kept = path.read_bytes()
+    with pytest.raises(ConfigurationError, match="a token's name has"):
+        tokens.create(name, Scope.READ)
+    assert path.read_bytes() == kept
+    assert tokens.verify(text) is not None
+
+
+@given(name=st.text(st.characters(codec=None), max_size=70))
+def test_whatever_the_name_the_file_stays_good(tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
+    path = tmp_path_factory.mktemp("tokens") / "tokens.json"
+    tokens = TokenFile(path)
+    first = tokens.create("first", Scope.READ)
+    with suppress(ConfigurationError):
+        tokens.create(name, Scope.READ)
+    assert TokenFile(path).verify(first) is not None
+
+
+def test_creating_and_revoking_at_once_loses_nothing(path: Path) -> None:
+    doomed = [TokenFile(path).create(f"old {n}", Scope.READ) for n in range(6)]
+    with ThreadPoolExecutor(12) as pool:
+        made = [pool.submit(TokenFile(path).create, f"new {n}", Scope.READ) for n in range(12)]
+        gone = [pool.submit(TokenFile(path).revoke, f"old {n}") for n in range(6)]
+        texts = [one.result() for one in made]
+        assert [one.result() for one in gone] == [None] * 6
+    service = TokenFile(path)
+    assert all(service.verify(text) for text in texts)
+    assert not any(service.verify(text) for text in doomed)
+    assert {token.name for token in service.tokens()} == {f"new {n}" for n in range(12)}
+
+
+def test_a_token_that_ends_is_not_judged_by_a_clock_that_was_never_set(path: Path) -> None:
+    clock = Clock()
+    clock.now_s = 1_790_000_000.0
+    tokens = TokenFile(path, clock)
+    ends, endless = tokens.create("ends", Scope.READ, lifetime_s=60.0), tokens.create("endless", Scope.READ)
+    clock.now_s += 3600.0
+    assert tokens.verify(ends) is None
+    clock.now_s = 5.0  # 1970: no clock battery, no date yet
+    assert tokens.verify(ends) is None
+    assert tokens.verify(endless) is not None
 
 
 def test_an_edited_scope_must_be_a_scope(path: Path) -> None:

@@ -4,22 +4,31 @@ import hashlib
 import hmac
 import json
 import logging
-import os
 import secrets
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from gateway.errors import ConfigurationError
+from gateway.files.kept import KeptFiles
 from gateway.log import Event, log_event
 
 _PREFIX: Final = "spr"  # lets secret scanners recognise a token that leaked
+MOST_NAME: Final = 64
+
+
+def _named(name: str) -> str:
+    """A name that a terminal, the journal and the file can show as it is."""
+    if not name or len(name) > MOST_NAME or not name.isprintable() or name != name.strip():
+        raise ValueError(f"a token's name has 1 to {MOST_NAME} printable characters and no blank at either end")
+    return name
 
 
 class Scope(StrEnum):
@@ -39,14 +48,15 @@ class Token(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     id: str
-    name: str
+    name: Annotated[str, AfterValidator(_named)]
     scope: Scope
     sha256: str = Field(repr=False)
     created_s: int
     expires_s: int | None = None
 
     def is_expired(self, now_s: float) -> bool:
-        return self.expires_s is not None and now_s >= self.expires_s
+        """True also by a clock that stands before the token was made: it was never set, and can judge no age."""
+        return self.expires_s is not None and not self.created_s <= now_s < self.expires_s
 
     def expiry(self) -> str:
         """When it ends, for people."""
@@ -78,42 +88,99 @@ class TokenFile:
 
     def __init__(self, path: Path, clock_s: Callable[[], float] = time.time) -> None:
         self._path = path
+        self._files = KeptFiles(path.parent)
         self._clock_s = clock_s
         self._read = _Read(None, {})
+        self.fault: str | None = None  # why no token is accepted, for the status
 
     def create(self, name: str, scope: Scope, lifetime_s: float | None = None) -> str:
-        """A new token, to be shown this once. Raises ConfigurationError where the name is taken."""
-        tokens = self.tokens()
-        if any(token.name == name for token in tokens):
-            raise ConfigurationError(f"{self._path}: there is a token {name!r} already: revoke it or take another name")
-        token_id, secret, now_s = secrets.token_hex(4), secrets.token_urlsafe(32), int(self._clock_s())
-        made = Token(
-            id=token_id,
-            name=name,
-            scope=scope,
-            sha256=_hashed(secret),
-            created_s=now_s,
-            expires_s=None if lifetime_s is None else now_s + int(lifetime_s),
-        )
-        self._write((*tokens, made))
+        """A new token, to be shown this once. Raises ConfigurationError where the name is taken or no name.
+
+        A broken file is set aside first, and said; then the next try begins a new one.
+        """
+        try:
+            _named(name)
+        except ValueError as fault:
+            raise ConfigurationError(f"{name!r}: {fault}") from None
+        with self._alone():
+            tokens = self._tokens_or_set_aside()
+            if any(token.name == name for token in tokens):
+                raise ConfigurationError(
+                    f"{self._path}: there is a token {name!r} already: revoke it or take another name"
+                )
+            token_id, secret, now_s = secrets.token_hex(4), secrets.token_urlsafe(32), int(self._clock_s())
+            made = Token(
+                id=token_id,
+                name=name,
+                scope=scope,
+                sha256=_hashed(secret),
+                created_s=now_s,
+                expires_s=None if lifetime_s is None else now_s + int(lifetime_s),
+            )
+            self._write((*tokens, made))
         return f"{_PREFIX}_{token_id}_{secret}"
 
     def revoke(self, name: str) -> None:
         """Forget the token of this name or id. Raises ConfigurationError where there is none."""
-        tokens = self.tokens()
-        kept = tuple(token for token in tokens if name not in (token.name, token.id))
-        if len(kept) == len(tokens):
-            raise ConfigurationError(f"{self._path}: there is no token {name!r}: `springscale token list` shows them")
-        self._write(kept)
+        with self._alone():
+            tokens = self.tokens()
+            kept = tuple(token for token in tokens if name not in (token.name, token.id))
+            if len(kept) == len(tokens):
+                raise ConfigurationError(
+                    f"{self._path}: there is no token {name!r}: `springscale token list` shows them"
+                )
+            self._write(kept)
 
     def tokens(self) -> tuple[Token, ...]:
         """All tokens, oldest first. Raises ConfigurationError for a file that cannot be read."""
         try:
-            return _Content.model_validate_json(self._path.read_bytes()).tokens
+            return _Content.model_validate_json(self._files.read(self._path.name)).tokens
         except FileNotFoundError:
             return ()
         except (OSError, ValidationError) as fault:
             raise ConfigurationError(f"{self._path} is no token file: {fault}") from None
+
+    def are_in_use(self) -> bool:
+        """Whether a token is asked for, as the file is now; a broken one is set aside here, and ``fault`` tells.
+
+        A broken file closes the door, and its absence keeps it closed: whoever breaks it must not open the API to
+        all of this machine.
+        """
+        try:
+            tokens = self._tokens_or_set_aside()
+        except ConfigurationError as broken:
+            self.fault = str(broken)
+            return True
+        earlier = self._files.set_aside_earlier(self._path.name)
+        if earlier and self._files.stamp(self._path.name) is None:
+            self.fault = (
+                f"{self._path} was broken and is now {earlier[-1]}: no token is accepted until "
+                "`springscale token create` has made new ones, or that file is moved away"
+            )
+            return True
+        return bool(tokens)
+
+    def _tokens_or_set_aside(self) -> tuple[Token, ...]:
+        """The tokens. Raises ConfigurationError saying where a broken file lies now."""
+        try:
+            return self.tokens()
+        except ConfigurationError as fault:
+            broken = str(fault)
+        try:
+            aside = f"set aside as {self._files.set_aside(self._path.name)}"
+        except OSError as refusal:
+            aside = f"and cannot be set aside: {refusal}"
+        log_event(Event.TOKENS_SET_ASIDE, level=logging.ERROR, fault=broken, set_aside=aside)
+        raise ConfigurationError(f"{broken}; {aside}: `springscale token create` begins a new one")
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Whoever changes the file reads it first and is alone from then on."""
+        try:
+            with self._files.locked():
+                yield
+        except OSError as fault:  # a lock that is not let go is a TimeoutError, which is one
+            raise ConfigurationError(f"{self._path} cannot be changed: {fault}") from None
 
     def verify(self, text: str) -> Token | None:
         """The token this text is, None for any other text, or one that is revoked or expired."""
@@ -127,38 +194,21 @@ class TokenFile:
 
     def _known(self) -> dict[str, Token]:
         """The tokens by id, read again whenever the file has changed. An unreadable file lets nobody in."""
-        stamp = self._stamp()
+        stamp = self._files.stamp(self._path.name)
         if stamp != self._read.stamp:
             try:
                 self._read = _Read(stamp, {token.id: token for token in self.tokens()})
+                self.fault = None if self._read.by_id else self.fault
             except ConfigurationError as fault:
                 log_event(Event.TOKENS_UNREADABLE, level=logging.ERROR, fault=str(fault))
                 self._read = _Read(stamp, {})
+                self.fault = f"no token is accepted: {fault}"
         return self._read.by_id
 
-    def _stamp(self) -> tuple[int, int, int] | None:
-        try:
-            status = self._path.stat()
-        except OSError:
-            return None
-        return status.st_ino, status.st_mtime_ns, status.st_size
-
     def _write(self, tokens: tuple[Token, ...]) -> None:
-        """Replace the file in one step, readable by its owner alone.
-
-        The owner is the directory's: an administrator makes tokens as root, the service reads them as itself.
-        """
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = self._path.with_name(f".{self._path.name}.{os.getpid()}")
-        descriptor = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with os.fdopen(descriptor, "w") as file:
-            if os.geteuid() == 0:
-                owner = self._path.parent.stat()
-                os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
-            file.write(json.dumps(_Content(tokens=tokens).model_dump(mode="json"), indent=1) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(self._path)
+        """Replace the file in one step, readable by its owner alone."""
+        text = json.dumps(_Content(tokens=tokens).model_dump(mode="json"), indent=1) + "\n"
+        self._files.write(self._path.name, text.encode())
 
 
 def _hashed(secret: str) -> str:

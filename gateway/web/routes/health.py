@@ -26,7 +26,7 @@ def health_router(status: Callable[[], Status], registry: CollectorRegistry) -> 
         now = status()
         if not now.is_ready:
             return problem_response(503, now.not_ready_reason or now.sentence(), request.url.path)
-        return JSONResponse(Ready(state=now.state).model_dump())
+        return JSONResponse(Ready(state=now.state, warnings=list(now.warnings)).model_dump())
 
     @router.get(
         "/metrics",

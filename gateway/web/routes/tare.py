@@ -6,13 +6,12 @@ from typing import Annotated, Any, Final, Literal, Protocol
 
 from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
-from pydantic.json_schema import SkipJsonSchema
 from starlette.responses import Response
 
 from gateway.errors import TareRefusedError
 from gateway.records import json_line
 from gateway.web.door.problems import problem_response
-from gateway.web.schemas import problem_responses
+from gateway.web.schemas import Body, problem_responses
 
 TARE_PATH: Final = "/calibration/tare"
 LOCAL: Final = "local"  # who asks where no tokens are in use
@@ -58,15 +57,18 @@ class NoTareDesk:
         return "there is no calibration, and so nothing to correct"
 
 
-class TareRequest(BaseModel):
+class TareRequest(Body):
     """The claim that makes a tare, and a word on it."""
-
-    model_config = ConfigDict(extra="forbid")
 
     is_empty: Literal[True] = Field(
         description="you know that the vehicle is empty, and was so while it was last weighed (`offer` tells when)"
     )
-    note: str | SkipJsonSchema[None] = Field(None, max_length=200, description="kept in the history")
+    note: str = Field("", max_length=200, description="kept in the history; left out: none is")
+
+    @property
+    def told_note(self) -> str | None:
+        """None where nothing was said."""
+        return self.note if "note" in self.model_fields_set else None
 
 
 class TareEnd(BaseModel):
@@ -150,7 +152,7 @@ def tare_router(desk: TareDesk) -> APIRouter:
     @router.post(TARE_PATH, status_code=201, response_model=Tare, responses={**refusals, **problem_responses(400, 422)})
     async def set_tare(request: Request, claim: TareRequest) -> Response:
         """Make the last weighing the zero of the empty vehicle, from the next batch on. On disk when answered."""
-        return await _answered(request, lambda: desk.tare(_who(request), claim.note), 201)
+        return await _answered(request, lambda: desk.tare(_who(request), claim.told_note), 201)
 
     @router.delete(TARE_PATH, response_model=TareState, responses={**refusals, **problem_responses(422)})
     async def undo_tare(request: Request, query: Annotated[UndoQuery, Query()]) -> Response:

@@ -1,0 +1,93 @@
+"""The service's own directory, made hostile: nothing in it leads whoever works there elsewhere."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from support.patience import PATIENCE_S
+
+from gateway.files.kept import KeptFiles
+
+NOBODY = 65_534
+
+
+def link(path: Path) -> None:
+    path.with_name("target").write_text("not yours")
+    path.symlink_to(path.with_name("target"))
+
+
+@pytest.mark.parametrize("lay", [link, os.mkfifo, Path.mkdir, lambda path: path.symlink_to("nowhere")])
+def test_what_is_no_plain_file_is_not_read(tmp_path: Path, lay: Callable[[Path], None]) -> None:
+    lay(tmp_path / "kept")
+    with pytest.raises(OSError, match=r"'kept'"):
+        KeptFiles(tmp_path).read("kept")
+
+
+@pytest.mark.parametrize("name", ["kept", ".kept.new"])
+def test_a_link_is_replaced_and_its_target_left_alone(tmp_path: Path, name: str) -> None:
+    link(tmp_path / name)
+    KeptFiles(tmp_path).write("kept", b"mine")
+    assert (tmp_path / "target").read_text() == "not yours"
+    assert not (tmp_path / "kept").is_symlink()
+    assert KeptFiles(tmp_path).read("kept") == b"mine"
+    assert {entry.name for entry in tmp_path.iterdir()} == {"kept", "target"}
+
+
+def test_what_is_set_aside_keeps_its_bytes_each_under_a_name_of_its_own(tmp_path: Path) -> None:
+    files = KeptFiles(tmp_path)
+    for n in range(3):
+        files.write("kept", b"%d" % n)
+        files.set_aside("kept")
+    asides = files.set_aside_earlier("kept")
+    assert [files.read(aside) for aside in asides] == [b"0", b"1", b"2"]
+
+
+def test_a_lock_that_is_not_let_go_is_waited_for_no_longer_than_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.files.kept.LOCK_TIMEOUT_S", 0.05)
+    with (
+        KeptFiles(tmp_path).locked(),
+        pytest.raises(TimeoutError, match="another process"),
+        KeptFiles(tmp_path).locked(),
+    ):
+        pass
+
+
+@pytest.fixture
+def of_nobody() -> Iterator[Path]:
+    """A service's directory that belongs to a user without rights, in a place that it can reach."""
+    place = Path(tempfile.mkdtemp(dir="/tmp"))
+    place.chmod(0o755)
+    state = place / "state"
+    state.mkdir(mode=0o750)
+    os.chown(state, NOBODY, NOBODY)
+    (place / "springscale.toml").write_text(f'signals = "springscale:reference"\n[store]\ndirectory = "{state}"\n')
+    yield place
+    shutil.rmtree(place)
+
+
+def token(place: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "gateway", "token", *arguments, "--config", str(place / "springscale.toml")]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root has rights to give up")
+@pytest.mark.parametrize("name", ["tokens.json", ".tokens.json.new"])
+def test_root_makes_a_token_with_the_rights_of_the_directorys_owner(of_nobody: Path, name: str) -> None:
+    target, state = of_nobody / "of root", of_nobody / "state"
+    target.write_text("of root")
+    target.chmod(0o644)
+    (state / name).symlink_to(target)
+    token(of_nobody, "create", "fleet")  # a linked token file is no token file: set aside and said
+    made = token(of_nobody, "create", "fleet")
+    assert (target.read_text(), target.stat().st_uid) == ("of root", 0)
+    assert (made.returncode, made.stderr) == (0, "") or "already" in made.stderr
+    kept = state / "tokens.json"
+    assert not kept.is_symlink()
+    assert (kept.stat().st_uid, kept.stat().st_mode & 0o777) == (NOBODY, 0o600)
