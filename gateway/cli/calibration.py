@@ -49,14 +49,14 @@ def show(file: Path, as_json: bool) -> None:
 def diff(one: Path, other: Path, as_json: bool) -> None:
     """In what two files differ; fitted figures in combined standard deviations, the most different first."""
     ours, theirs = load_calibration(one), load_calibration(other)
-    found = differences(ours, theirs)
+    changes = differences(ours, theirs)
     if as_json:
-        listed = [asdict(each) | {"n_std": _finite(each.n_std)} for each in found]
-        click.echo(json_line({"ids": [ours.id, theirs.id], "is_identical": not found, "differences": listed}))
-    elif not found:
+        listed = [asdict(each) | {"n_std": _finite(each.n_std)} for each in changes]
+        click.echo(json_line({"ids": [ours.id, theirs.id], "is_identical": not changes, "differences": listed}))
+    elif not changes:
         click.echo(f"identical: {ours.id}" if ours.id == theirs.id else "identical but for the ids")
     else:
-        click.echo("\n".join(map(_difference, found)))
+        click.echo("\n".join(map(_difference, changes)))
 
 
 @calibration_commands.command("verify")
@@ -104,9 +104,9 @@ def sprung(
     """
     body = sprung_of(AxleWeights(front_axle_kg, rear_axle_kg, unsprung_front_kg, unsprung_rear_kg), division_kg)
     if as_json:
-        found = asdict(body)
-        del found["weights"]
-        click.echo(json_line({"vehicle": body.vehicle_keys(), **found}))
+        record = asdict(body)
+        del record["weights"]
+        click.echo(json_line({"vehicle": body.vehicle_keys(), **record}))
     else:
         click.echo(vehicle_block(body))
 
@@ -121,14 +121,14 @@ def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:
     )
 
 
-def _difference(found: Difference) -> str:
-    apart = "" if found.n_std is None else f"   ({found.n_std:.2g} standard deviations)"
-    return f"{found.where}: {_shown(found.one)} -> {_shown(found.other)}{apart}"
+def _difference(difference: Difference) -> str:
+    apart = "" if difference.n_std is None else f"   ({difference.n_std:.2g} standard deviations)"
+    return f"{difference.where}: {_plain(difference.one)} -> {_plain(difference.other)}{apart}"
 
 
-def _shown(fact: Any) -> str:
+def _plain(fact: Any) -> str:
     if isinstance(fact, list):
-        return f"[{', '.join(map(_shown, fact))}]"
+        return f"[{', '.join(map(_plain, fact))}]"
     return f"{fact:.6g}" if isinstance(fact, float) else "absent" if fact is None else str(fact)
 
 

@@ -139,8 +139,8 @@ def _asked(service: _Service, method: str, query: str = "", body: dict[str, Any]
     request = urllib.request.Request(address + query, content, headers, method=method)
     try:
         with _opener(service).open(request, timeout=TIMEOUT_S) as answer:
-            found: dict[str, Any] = json.load(answer)
-            return found
+            record: dict[str, Any] = json.load(answer)
+            return record
     except urllib.error.HTTPError as refusal:
         raise SpringscaleError(f"{address}: {_said(refusal)}") from None
     except (OSError, ValueError) as fault:  # not there, not trusted, or not JSON

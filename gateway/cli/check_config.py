@@ -24,7 +24,7 @@ def check_config(config: Path, as_json: bool) -> None:
     if os.access(tares, os.R_OK):  # the service's own; others may not be allowed to see it
         setup = setup.with_tare_of(tares)
     forwarding = uplink_settings(settings.uplink, settings.vehicle)
-    found = {
+    summary = {
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
         "calibration_id": setup.calibration.id if setup.calibration else None,
@@ -35,7 +35,7 @@ def check_config(config: Path, as_json: bool) -> None:
         "uplink": forwarding.broker if forwarding else None,
     }
     if as_json:
-        click.echo(json_line(found))
+        click.echo(json_line(summary))
         return
     click.echo(f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {settings.bus.channel}.")
     if setup.calibration is None:

@@ -43,8 +43,8 @@ def estimate(
     setup, settings, state = _prepared(config_path, signals, calibration, estimator, window_s)
     if not no_tare:
         setup = _tared(setup, tare, state)
-    for found in estimates_of_logs(logs, setup, settings):
-        record = estimate_to_json(found)
+    for weighed in estimates_of_logs(logs, setup, settings):
+        record = estimate_to_json(weighed)
         click.echo(json_line(record) if as_json else sentence(record))
 
 
@@ -73,10 +73,10 @@ def _tared(setup: Setup, named: Path | None, state: Path | None) -> Setup:
     """With the tare of a file that was named, which must have one for this calibration; else with the service's."""
     if named is None:
         return setup if state is None else setup.with_tare_of(state / FILE_NAME)
-    found = setup.with_tare_of(named)
-    if found.tare is None:
+    zeroed = setup.with_tare_of(named)
+    if zeroed.tare is None:
         calibration_id = setup.calibration.id if setup.calibration else "none"
         raise ConfigurationError(
             f"{named}: has no tare in use for the estimator {setup.estimator} and the calibration {calibration_id}"
         )
-    return found
+    return zeroed

@@ -8,7 +8,7 @@ import click
 from gateway.cli.options import FILE, as_json
 from gateway.cli.progress import counted
 from gateway.records import json_line
-from gateway.reports.paper.evidence import N_STEPS, Scope
+from gateway.reports.paper.experiments import N_STEPS, Extent
 from gateway.reports.paper.reproduce import reproduce as write_report
 
 QUICK_WINDOW_S: Final = 100.0
@@ -29,15 +29,15 @@ def reproduce(output: Path, seed: int, quick: bool, workers: int, as_json: bool)
     """The paper's figures and tables, its numbers beside ours, as report.html with all it is made of."""
     with counted("starting") as on_step:
         report = write_report(
-            output, scope_of(seed, workers, quick=quick), lambda what, done, of: on_step(done, of, what)
+            output, extent_of(seed, workers, quick=quick), lambda what, done, of: on_step(done, of, what)
         )
         on_step(N_STEPS, N_STEPS)
     written = {"report": report, "results": output / "results.json", "accuracy": output / "accuracy.md"}
     click.echo(json_line({name: str(path) for name, path in written.items()}) if as_json else str(report))
 
 
-def scope_of(seed: int, workers: int, *, quick: bool) -> Scope:
-    """The paper's scope, or a quick one."""
+def extent_of(seed: int, workers: int, *, quick: bool) -> Extent:
+    """The paper's extent, or a quick one."""
     if quick:
-        return Scope(seed, QUICK_WINDOW_S, QUICK_LONGEST_S, workers)
-    return Scope(seed, workers=workers)
+        return Extent(seed, QUICK_WINDOW_S, QUICK_LONGEST_S, workers)
+    return Extent(seed, workers=workers)

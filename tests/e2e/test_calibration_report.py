@@ -14,7 +14,7 @@ from support.known_load_logs import write_known_loads
 
 from gateway.calibration.file import load_calibration
 from gateway.cli import main, springscale
-from gateway.reports.calibration.text import percent, shown
+from gateway.reports.calibration.text import decimal, percent
 
 WINDOW = ("--window-s", "100")
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -134,13 +134,13 @@ def test_the_tables_say_what_the_numbers_say(page: Page, numbers: Mapping[str, A
     errors = numbers["errors"][estimator][part]
     payload = errors["payload"]
     in_short = [
-        shown(payload["mean_abs_kg"], " kg"), shown(payload["bias_kg"], " kg"), shown(payload["std_kg"], " kg"),
-        shown(payload["max_abs_kg"], " kg"), shown(payload["mean_abs_pct"]),
+        decimal(payload["mean_abs_kg"], " kg"), decimal(payload["bias_kg"], " kg"), decimal(payload["std_kg"], " kg"),
+        decimal(payload["max_abs_kg"], " kg"), decimal(payload["mean_abs_pct"]),
     ]  # fmt: skip
     assert any(in_short == row[3:8] for table in page.tables for row in table)
     for one in errors["runs"]:
-        cells = [shown(one["payload"]["mean_abs_kg"], " kg"), shown(one["payload"]["bias_kg"], " kg")]
-        cells += [shown(one["payload"]["max_abs_kg"], " kg"), percent(one["payload"]["coverage95"])]
+        cells = [decimal(one["payload"]["mean_abs_kg"], " kg"), decimal(one["payload"]["bias_kg"], " kg")]
+        cells += [decimal(one["payload"]["max_abs_kg"], " kg"), percent(one["payload"]["coverage95"])]
         rows = [row for table in page.tables for row in table if row[0] == str(one["run"]) and row[4:8] == cells]
         assert rows
 

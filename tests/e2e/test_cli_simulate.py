@@ -15,7 +15,7 @@ from gateway.cli import reproduce as reproduce_command
 from gateway.cli.progress import StatusLine, counted
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.reports.paper.evidence import Scope
+from gateway.reports.paper.experiments import Extent
 from gateway.workbench import demo_drive, frames_of
 from gateway.workbench.demo_drive import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS
 
@@ -129,25 +129,25 @@ def test_usage_faults_exit_with_2_and_failed_work_with_1(tmp_path: Path, capsys:
 
 
 @pytest.mark.parametrize(
-    ("options", "scope"),
+    ("options", "extent"),
     [
-        (("--seed", "4"), Scope(seed=4)),
-        (("--quick", "--workers", "2"), Scope(seed=1, window_s=100.0, longest_s=155.0, workers=2)),
+        (("--seed", "4"), Extent(seed=4)),
+        (("--quick", "--workers", "2"), Extent(seed=1, window_s=100.0, longest_s=155.0, workers=2)),
     ],
 )
 def test_reproduce_drives_what_was_asked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], scope: Scope
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], extent: Extent
 ) -> None:
     asked = []
 
-    def written(output: Path, scope: Scope, on_step: object) -> Path:
-        asked.append((output, scope))
+    def written(output: Path, extent: Extent, on_step: object) -> Path:
+        asked.append((output, extent))
         return output / "report.html"
 
     monkeypatch.setattr(reproduce_command, "write_report", written)
     done = run("reproduce", "--output", str(tmp_path / "new"), *options, "--json")
     assert done.exit_code == 0, done.output
-    assert asked == [(tmp_path / "new", scope)]
+    assert asked == [(tmp_path / "new", extent)]
     assert json.loads(done.stdout)["report"] == str(tmp_path / "new" / "report.html")
 
 

@@ -10,14 +10,14 @@ import pytest
 
 from gateway.calibration.file import load_calibration
 from gateway.errors import ConfigurationError
-from gateway.reports.paper.evidence import CAMPAIGNS, Scope
+from gateway.reports.paper.experiments import CAMPAIGNS, Extent
 from gateway.reports.paper.page import PLATES
 from gateway.reports.paper.reproduce import reproduce
 from gateway.reports.paper.table import PAPER_PCT, accuracy_page
 from gateway.workbench import simulate
 from gateway.workbench.campaigns import Plan, plan_of
 
-SMALL = Scope(seed=3, window_s=80.0, longest_s=125.0)  # two thirds of an experiment's drive make one batch
+SMALL = Extent(seed=3, window_s=80.0, longest_s=125.0)  # two thirds of an experiment's drive make one batch
 THINNED = ("load-sweep", "share-sweep", "ident", "speeds")
 
 

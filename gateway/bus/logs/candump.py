@@ -69,8 +69,8 @@ class IdPattern:
 
     def matches(self, words: NDArray[np.uint64]) -> Bool:
         """Which words (n,), in lower case, have the text."""
-        found: Bool = (words & self._mask) == self._text
-        return found
+        is_hit: Bool = (words & self._mask) == self._text
+        return is_hit
 
 
 class _Reader:
@@ -140,14 +140,16 @@ class _Reader:
         return hits[~fits]
 
     def _read_exactly(self, block: LineBlock, hit: int, line: bytes, places: list[I64], parts: list[Frames]) -> None:
-        found = read_line(line)
-        if isinstance(found, LogReject):
-            self._report.reject(found, self._line_number(block, hit) if self._report.keeps_lines_of(found) else None)
-        elif found is NotData.REMOTE_FRAME:
+        content = read_line(line)
+        if isinstance(content, LogReject):
+            self._report.reject(
+                content, self._line_number(block, hit) if self._report.keeps_lines_of(content) else None
+            )
+        elif content is NotData.REMOTE_FRAME:
             self._report.remote_frames += 1
-        elif isinstance(found, LineFrame) and self._is_ours(found.channel, 1):
+        elif isinstance(content, LineFrame) and self._is_ours(content.channel, 1):
             places.append(np.array([hit]))
-            parts.append(_one_frame(found, self._width))
+            parts.append(_one_frame(content, self._width))
 
     def _is_ours(self, channel: bytes, n_frames: int) -> bool:
         """Whether frames of this channel are handed on; if not, they are counted."""
@@ -177,8 +179,8 @@ class _Reader:
             start = block.start if i == 0 else int(ends[i - 1]) + 1
             line = block.text[start : min(int(ends[i]), start + LONGEST_LINE)].tobytes()
             if line.strip():
-                found = read_line(line)
-                reason = found if isinstance(found, LogReject) else LogReject.GARBLED
+                content = read_line(line)
+                reason = content if isinstance(content, LogReject) else LogReject.GARBLED
                 self._report.reject(reason, self._report.lines + int(i) + 1)
 
 

@@ -59,8 +59,8 @@ def closest(name: str, known: Iterable[str]) -> str:
     """A hint for a misspelt name."""
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-    return f"did you mean {near[0]!r}?" if near else f"there are {shown or 'none'}"
+    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    return f"did you mean {near[0]!r}?" if near else f"there are {listed or 'none'}"
 
 
 def _load(map_path: Path, path: Path) -> list[CantoolsMessage]:

@@ -47,21 +47,21 @@ class Entry(Protocol):
 
 def resolve_signal(where: str, signal: Signal, entry: Entry, message: DatabaseMessage, j1939: bool) -> MappedSignal:
     """The signal an entry means. ``where`` begins every SignalMapError."""
-    found = _find(f"{where}.signal", entry.signal, message)
-    _require_decodable(f"{where}.signal", found, message)
-    to_si = entry.sign * _unit_factor(f"{where}.unit", signal, entry, found)
-    minimum, maximum = _valid_range(where, entry, found, to_si)
+    named = _find(f"{where}.signal", entry.signal, message)
+    _require_decodable(f"{where}.signal", named, message)
+    to_si = entry.sign * _unit_factor(f"{where}.unit", signal, entry, named)
+    minimum, maximum = _valid_range(where, entry, named, to_si)
     return MappedSignal(
         signal=signal,
-        dbc_signal=found.name,
-        field=found.field,
+        dbc_signal=named.name,
+        field=named.field,
         to_si=to_si,
         minimum=minimum,
         maximum=maximum,
         latency_s=entry.latency_s,
-        multiplexed_by=_multiplexers(where, found, message),
+        multiplexed_by=_multiplexers(where, named, message),
         valid_when=tuple(_condition(where, name, allowed, message) for name, allowed in entry.valid_when.items()),
-        rejects_j1939_codes=(j1939 and bool(message.frame_id & EXTENDED_ID) and found.field.coding is Coding.UNSIGNED),
+        rejects_j1939_codes=(j1939 and bool(message.frame_id & EXTENDED_ID) and named.field.coding is Coding.UNSIGNED),
     )
 
 
@@ -93,18 +93,18 @@ def _loses_integers(field: BitField) -> bool:
     return is_integer and max(map(abs, (*field.raw_range, *field.physical_range))) > _EXACT_INTEGERS
 
 
-def _unit_factor(where: str, signal: Signal, entry: Entry, found: DatabaseSignal) -> float:
+def _unit_factor(where: str, signal: Signal, entry: Entry, named: DatabaseSignal) -> float:
     try:
-        return si_factor(QUANTITIES[signal], found.unit if entry.unit is None else entry.unit)
+        return si_factor(QUANTITIES[signal], named.unit if entry.unit is None else entry.unit)
     except SignalMapError as fault:
         raise SignalMapError(f"{where}: {fault}") from None
 
 
-def _valid_range(where: str, entry: Entry, found: DatabaseSignal, to_si: float) -> tuple[float, float]:
+def _valid_range(where: str, entry: Entry, named: DatabaseSignal, to_si: float) -> tuple[float, float]:
     """Least and greatest valid SI: the entry's word, else the database's, else what the bits can carry."""
-    low, high = found.field.physical_range
-    if found.minimum is not None and found.maximum is not None and found.minimum < found.maximum:
-        low, high = float(found.minimum), float(found.maximum)
+    low, high = named.field.physical_range
+    if named.minimum is not None and named.maximum is not None and named.minimum < named.maximum:
+        low, high = float(named.minimum), float(named.maximum)
     ends = sorted((low * to_si, high * to_si))
     minimum = ends[0] if entry.minimum is None else entry.minimum
     maximum = ends[1] if entry.maximum is None else entry.maximum

@@ -42,11 +42,11 @@ def _run(run: RunPart, campaign: Campaign) -> Check:
         return Check(what, Verdict.FAULT, f"{run.log}: the campaign has {len(campaign.runs)} runs only")
     stated = campaign.runs[run.number - 1]
     log = campaign.log_of(stated)
-    found = _hash_of(log)
-    if found is None:
+    sha256 = _hash_of(log)
+    if sha256 is None:
         return Check(what, Verdict.FAULT, f"{log}: cannot be read")
-    if found != run.sha256:
-        return Check(what, Verdict.FAULT, f"{log}: not the log it was calibrated from (sha256 {found[:12]}...)")
+    if sha256 != run.sha256:
+        return Check(what, Verdict.FAULT, f"{log}: not the log it was calibrated from (sha256 {sha256[:12]}...)")
     if stated.payload_kg != run.payload_kg or campaign.front_share_pct(stated) != run.front_share_pct:
         return Check(
             what,

@@ -27,7 +27,7 @@ class Difference:
 
 def differences(one: CalibrationFile, other: CalibrationFile) -> tuple[Difference, ...]:
     """All of them: plain facts in the order of the file, then fitted figures, the most different first."""
-    fitted = sorted(_fitted(one, other), key=lambda found: -(found.n_std or 0.0))
+    fitted = sorted(_fitted(one, other), key=lambda difference: -(difference.n_std or 0.0))
     return (*_plain(one, other), *fitted)
 
 

@@ -35,15 +35,15 @@ class Figure:
 
 def figures_of(file: CalibrationFile) -> dict[str, tuple[Figure, ...]]:
     """By part of the file: half-car parameters of cross_spectrum, regressions of ratio_index (constant first)."""
-    found = {}
+    figures = {}
     if file.cross_spectrum is not None:
-        found["cross_spectrum"] = _half_car(file.cross_spectrum)
+        figures["cross_spectrum"] = _half_car(file.cross_spectrum)
     if file.ratio_index is not None:
         for target in ("payload", "front_share"):
             model = getattr(file.ratio_index, target)
             if model is not None:
-                found[f"ratio_index.{target}"] = _regression(model)
-    return found
+                figures[f"ratio_index.{target}"] = _regression(model)
+    return figures
 
 
 def _half_car(part: CrossSpectrumPart) -> tuple[Figure, ...]:

@@ -16,10 +16,10 @@ from gateway.records import F64
 
 
 def _array(numbers: Any) -> F64:
-    found = np.asarray(numbers, dtype=float)
-    if not np.all(np.isfinite(found)):
+    array = np.asarray(numbers, dtype=float)
+    if not np.all(np.isfinite(array)):
         raise ValueError("holds a number that is not finite")
-    return found
+    return array
 
 
 Array = Annotated[

@@ -152,10 +152,10 @@ def phases(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Phases:
     return Phases(upright, turned)
 
 
-def _likeliest(found: Sequence[Agreement]) -> Agreement:
+def _likeliest(agreements: Sequence[Agreement]) -> Agreement:
     """The best agreement, with the most usual of the scales."""
-    best = max(found, key=lambda one: one.best)
-    return replace(best, scale=min((one.scale for one in found), key=lambda scale: abs(np.log(scale))))
+    best = max(agreements, key=lambda one: one.best)
+    return replace(best, scale=min((one.scale for one in agreements), key=lambda scale: abs(np.log(scale))))
 
 
 def likeliest_speed(as_read: Phases, misread: Mapping[str, Phases]) -> tuple[str | None, Phases]:

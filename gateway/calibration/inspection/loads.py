@@ -64,11 +64,11 @@ class _Labelled:
         self.known = known
         self.vehicle = vehicle
         self._prior = prior_of(vehicle)
-        self.found = fit_half_car(known, self._prior, self._prior.start(0.0, 0.0))
+        self.fitted = fit_half_car(known, self._prior, self._prior.start(0.0, 0.0))
 
     def costs(self) -> F64:
         """(n, n) cost of run i with the load of run j."""
-        points = [k.at(self.found.x) for k in self.known]
+        points = [k.at(self.fitted.x) for k in self.known]
         return np.array([[k.whittle.cost(point) for point in points] for k in self.known])
 
     def swapped_pair(self) -> tuple[int, int, float] | None:
@@ -85,7 +85,7 @@ class _Labelled:
             likely = [pair for pair in pairs[:PAIRS_TRIED] if gains[pair] > 0.0]
         else:
             likely = pairs if self._is_strained() else pairs[:PAIRS_OF_FEW]
-        tried = [(i, j, self.found.cost - self._with_exchanged(i, j).cost) for i, j in likely]
+        tried = [(i, j, self.fitted.cost - self._with_exchanged(i, j).cost) for i, j in likely]
         evident = sorted((one for one in tried if one[2] > LEAST_EVIDENCE), key=lambda one: -one[2])
         return next((one for one in evident if self._is_confirmed(one[0], one[1])), None)
 
@@ -105,7 +105,7 @@ class _Labelled:
 
     def _is_strained(self) -> bool:
         """True where no half-car explains some run with its label."""
-        misfits = [k.whittle.misfit(k.at(self.found.x)) for k in self.known]
+        misfits = [k.whittle.misfit(k.at(self.fitted.x)) for k in self.known]
         return float(np.nanmax(misfits)) > STRAINED_MISFIT
 
     def _differ(self, i: int, j: int) -> bool:
@@ -115,7 +115,7 @@ class _Labelled:
         one, other = self.known[i], self.known[j]
         runs = list(self.known)
         runs[i], runs[j] = self._carrying(one, other.run), self._carrying(other, one.run)
-        return fit_half_car(runs, self._prior, self.found.x)
+        return fit_half_car(runs, self._prior, self.fitted.x)
 
     def _carrying(self, one: KnownSpectra, other: KnownRun) -> KnownSpectra:
         run = replace(one.run, payload_kg=other.payload_kg, front_share_pct=other.front_share_pct)
@@ -124,8 +124,8 @@ class _Labelled:
     def weighed_by_others(self, i: int, left_out: Sequence[int]) -> tuple[Point, F64]:
         """Run i by a half-car that has not seen the runs left out: the load, and its (payload, share) deviations."""
         others = [k for n, k in enumerate(self.known) if n not in left_out]
-        refound = fit_half_car(others, self._prior, self.found.x)
-        located = locate(self.known[i].spectra, half_car_calibration(others, self.vehicle, refound))
+        refitted = fit_half_car(others, self._prior, self.fitted.x)
+        located = locate(self.known[i].spectra, half_car_calibration(others, self.vehicle, refitted))
         return located.point, np.sqrt(np.diag(located.load_covariance))
 
 

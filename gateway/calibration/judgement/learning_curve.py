@@ -232,16 +232,16 @@ def curve_of(
     triples = triples_at_different_positions(runs, vehicle)
     subsets = [subset for size in sizes for subset in subsets_to_drive(runs, size, most_subsets, seed)]
     asked = [(numbers, estimator) for numbers in dict.fromkeys((*triples, *subsets)) for estimator in estimators]
-    found: dict[tuple[tuple[int, ...], str], Trial] = {}
+    trials: dict[tuple[tuple[int, ...], str], Trial] = {}
     for done, (numbers, estimator) in enumerate(asked):
         on_trial(done, len(asked))
-        found[numbers, estimator] = trial_of(split, vehicle, numbers, estimator)
+        trials[numbers, estimator] = trial_of(split, vehicle, numbers, estimator)
     on_trial(len(asked), len(asked))
     return LearningCurve(
         campaign=name,
         seed=seed,
-        trials=tuple(found[numbers, estimator] for numbers in subsets for estimator in estimators),
-        triples=tuple(found[numbers, estimator] for numbers in triples for estimator in estimators),
+        trials=tuple(trials[numbers, estimator] for numbers in subsets for estimator in estimators),
+        triples=tuple(trials[numbers, estimator] for numbers in triples for estimator in estimators),
     )
 
 

@@ -21,7 +21,7 @@ from gateway.calibration.judgement import (
 )
 from gateway.records import F64
 from gateway.reports.calibration.error_tables import batches_table, runs_table, summary_table
-from gateway.reports.calibration.text import estimator_name, percent, shown
+from gateway.reports.calibration.text import decimal, estimator_name, percent
 from gateway.reports.charts import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
 
 _MARKERS: Final[Mapping[Part, Marker]] = {Part.LEFT_OUT: "circle", Part.VALIDATION: "diamond"}
@@ -94,8 +94,8 @@ _PLAIN: Final = {"payload": "payload", "front_share": "front share"}
 
 def _summary(judgement: Judgement) -> str:
     return " ".join(
-        f"{PART_NAMES[part].capitalize()}: mean error {shown(table.errors.payload.mean_abs, ' kg')} and "
-        f"{shown(table.errors.front_share.mean_abs, ' pp')}."
+        f"{PART_NAMES[part].capitalize()}: mean error {decimal(table.errors.payload.mean_abs, ' kg')} and "
+        f"{decimal(table.errors.front_share.mean_abs, ' pp')}."
         for part, table in judgement.tables.items()
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from gateway.calibration.ratio_index import BandMap, FamilyTrial, FittedRegression, RatioIndexFit, Selection, band_maps
 from gateway.core.ratio_index.index import Band
-from gateway.reports.calibration.text import NONE, shown
+from gateway.reports.calibration.text import NONE, decimal
 from gateway.reports.charts import Axis, Cells, Chart, Marker, Panel, Points, Table
 
 _NAMES: Final = (("J_L", "kg"), ("J_D", "% front"))  # of acceleration, of pitch rate
@@ -96,7 +96,7 @@ def _pairs(trial: FamilyTrial) -> str:
 
 def _rms(trial: FamilyTrial) -> tuple[str, str]:
     payload_kg, share_pct = (None if np.isnan(rms) else rms for rms in trial.nested_rms)
-    return shown(payload_kg, " kg", 1), shown(share_pct, " pp")
+    return decimal(payload_kg, " kg", 1), decimal(share_pct, " pp")
 
 
 def steps_table(target: str, selection: Selection) -> Table:

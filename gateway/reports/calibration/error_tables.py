@@ -5,7 +5,7 @@ from typing import Final
 
 from gateway.calibration.judgement import PART_NAMES, TARGETS, Comparison, Judged, Judgement, Part, TargetErrors
 from gateway.records import iso_utc
-from gateway.reports.calibration.text import NONE, percent, shown
+from gateway.reports.calibration.text import NONE, decimal, percent
 from gateway.reports.charts import Table
 
 _COLUMNS: Final = ("mean |e|", "bias", "std", "max", "mean |e| %", "with misses %", "of gross %", "95 % covers")
@@ -29,10 +29,10 @@ def summary_table(judgement: Judgement) -> Table:
 
 def _cells(errors: TargetErrors) -> tuple[str, ...]:
     return (
-        *(shown(e, f" {errors.unit}") for e in (errors.mean_abs, errors.bias, errors.std, errors.max_abs)),
-        shown(errors.mean_abs_pct),
-        shown(errors.mean_abs_pct_with_misses),
-        shown(errors.mean_abs_pct_of_gross),
+        *(decimal(e, f" {errors.unit}") for e in (errors.mean_abs, errors.bias, errors.std, errors.max_abs)),
+        decimal(errors.mean_abs_pct),
+        decimal(errors.mean_abs_pct_with_misses),
+        decimal(errors.mean_abs_pct_of_gross),
         percent(errors.coverage95),
     )
 
@@ -64,7 +64,7 @@ def runs_table(judgement: Judgement, part: Part) -> Table:
 
 def _run_cells(errors: TargetErrors) -> tuple[str, ...]:
     figures = (errors.mean_abs, errors.bias, errors.max_abs)
-    return (*(shown(figure, f" {errors.unit}") for figure in figures), percent(errors.coverage95))
+    return (*(decimal(figure, f" {errors.unit}") for figure in figures), percent(errors.coverage95))
 
 
 def batches_table(judgement: Judgement, part: Part) -> Table:
@@ -99,5 +99,5 @@ def _batch_row(one: Judged) -> tuple[str, ...]:
 
 def _answer_cells(compared: Comparison, unit: str) -> tuple[str, str]:
     is_told = math.isfinite(compared.estimated)
-    interval = f"{shown(compared.low)} to {shown(compared.high)}" if math.isfinite(compared.low) else NONE
-    return shown(compared.estimated if is_told else None, unit), interval
+    interval = f"{decimal(compared.low)} to {decimal(compared.high)}" if math.isfinite(compared.low) else NONE
+    return decimal(compared.estimated if is_told else None, unit), interval

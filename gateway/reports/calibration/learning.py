@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gateway.calibration.judgement import LearningCurve, Rung, Spread
-from gateway.reports.calibration.text import NONE, estimator_name, percent, shown
+from gateway.reports.calibration.text import NONE, decimal, estimator_name, percent
 from gateway.reports.charts import Axis, Chart, Marker, Panel, Points, Rule, Section, Table
 
 _MARKERS: tuple[Marker, ...] = ("circle", "diamond", "square", "x")
@@ -35,7 +35,7 @@ def learning_section(curve: LearningCurve) -> Section:
 
 
 def _points(curve: LearningCurve, names: Sequence[str], sizes: Sequence[int], quantity: str) -> list[Points]:
-    found = []
+    points = []
     for colour, name in enumerate(names):
         rows = [
             (sizes.index(rung.n_runs), *_mean_and_std(rung.left_out, quantity))
@@ -46,8 +46,8 @@ def _points(curve: LearningCurve, names: Sequence[str], sizes: Sequence[int], qu
         if len(known):
             place, mean, std = known.T
             x = place + 0.06 * colour  # beside one another
-            found.append(Points(x, mean, estimator_name(name), colour, _MARKERS[colour], mean - std, mean + std))
-    return found
+            points.append(Points(x, mean, estimator_name(name), colour, _MARKERS[colour], mean - std, mean + std))
+    return points
 
 
 def _mean_and_std(spread: Spread, quantity: str) -> tuple[float | None, float | None]:
@@ -58,7 +58,7 @@ def _mean_and_std(spread: Spread, quantity: str) -> tuple[float | None, float | 
 
 def _in_words(curve: LearningCurve) -> str:
     return " ".join(
-        f"{rung.n_runs} runs, {estimator_name(rung.estimator)}: {shown(rung.left_out.payload_mean_pct, ' %', 1)}."
+        f"{rung.n_runs} runs, {estimator_name(rung.estimator)}: {decimal(rung.left_out.payload_mean_pct, ' %', 1)}."
         for rung in curve.rungs
         if rung.left_out.payload_mean_pct is not None
     )
@@ -88,9 +88,9 @@ def _cells(spread: Spread) -> tuple[str, ...]:
     )
     return (
         payload,
-        shown(spread.payload_worst_pct, " %", 1),
+        decimal(spread.payload_worst_pct, " %", 1),
         percent(spread.payload_coverage95),
         share,
-        shown(spread.front_share_worst_pct, " %", 1),
+        decimal(spread.front_share_worst_pct, " %", 1),
         percent(spread.front_share_coverage95),
     )

@@ -84,14 +84,14 @@ def _mark(grade: Grade) -> str:
 
 def _section(section: Section, live: dict[str, str]) -> str:
     paragraphs = "".join(f"<p>{prose(text)}</p>" for text in section.paragraphs)
-    shown: list[Chart | Table] = [*section.charts, *section.tables]
-    items = "".join(_item(item, live) for item in shown)
+    items: list[Chart | Table] = [*section.charts, *section.tables]
+    body = "".join(_item(item, live) for item in items)
     folded = "".join(
         f"<details><summary>{escape(summary)}</summary>{''.join(_item(item, live) for item in inside)}</details>"
         for summary, inside in section.folded
     )
     heading = f"<h2>{escape(section.heading)}</h2>"
-    return f'<section id="{section.anchor}">{heading}{paragraphs}{items}{folded}</section>'
+    return f'<section id="{section.anchor}">{heading}{paragraphs}{body}{folded}</section>'
 
 
 def _item(item: Chart | Table, live: dict[str, str]) -> str:

@@ -31,7 +31,7 @@ from gateway.reports.calibration.page import Page, page_html
 from gateway.reports.calibration.ratio_index import ratio_index_section
 from gateway.reports.calibration.runs import best_next, plan_section, provenance_section, runs_section
 from gateway.reports.calibration.spectra import spectra_section
-from gateway.reports.calibration.text import shown, span
+from gateway.reports.calibration.text import decimal, span
 from gateway.reports.charts import Chart, Section
 from gateway.reports.charts.live import plotly_json, plotly_script
 from gateway.reports.charts.still import save_still
@@ -144,9 +144,9 @@ def _in_short(assessment: Assessment, best: Verdict) -> str:
     errors = judgement.tables[judgement.unseen].errors
     payload, share = errors.payload, errors.front_share
     return (
-        f"Over the {PART_NAMES[judgement.unseen]} it weighs payloads to {shown(payload.mean_abs, ' kg', 1)} on "
-        f"average and {shown(payload.max_abs, ' kg', 1)} at worst, front shares to "
-        f"{shown(share.mean_abs, ' pp')} and {shown(share.max_abs, ' pp')}."
+        f"Over the {PART_NAMES[judgement.unseen]} it weighs payloads to {decimal(payload.mean_abs, ' kg', 1)} on "
+        f"average and {decimal(payload.max_abs, ' kg', 1)} at worst, front shares to "
+        f"{decimal(share.mean_abs, ' pp')} and {decimal(share.max_abs, ' pp')}."
     )
 
 

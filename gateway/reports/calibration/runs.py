@@ -5,7 +5,7 @@ from gateway.calibration.inspection import Finding, RunVerdict, SplitRun
 from gateway.calibration.judgement import Assessment
 from gateway.calibration.plan import Advice, Expected, LoadPlan
 from gateway.records import Why
-from gateway.reports.calibration.text import NONE, percent, shown, span
+from gateway.reports.calibration.text import NONE, decimal, percent, span
 from gateway.reports.charts import Section, Table
 
 
@@ -47,9 +47,10 @@ def _spoken(finding: Finding) -> str:
 
 
 def _findings_table(outcome: Outcome) -> Table | None:
-    found = [("all", finding) for finding in outcome.inspection.findings]
-    found += [(str(verdict.number), finding) for verdict in outcome.inspection.verdicts for finding in verdict.findings]
-    rows = tuple((run, str(one.severity), _spoken(one), one.text, one.advice) for run, one in found)
+    findings = [("all", finding) for finding in outcome.inspection.findings]
+    for verdict in outcome.inspection.verdicts:
+        findings += [(str(verdict.number), finding) for finding in verdict.findings]
+    rows = tuple((run, str(one.severity), _spoken(one), one.text, one.advice) for run, one in findings)
     columns = ("Run", "weight", "what", "as found", "what to do")
     return Table("What was found of the runs", columns, rows) if rows else None
 
@@ -114,7 +115,7 @@ def provenance_section(assessment: Assessment) -> Section:
         ("campaign file", f"sha256:{provenance.campaign_sha256}"),
     )
     runs = tuple(
-        (str(run.number), run.log, f"{run.payload_kg:g} kg", shown(run.front_share_pct, " %", 1), run.sha256)
+        (str(run.number), run.log, f"{run.payload_kg:g} kg", decimal(run.front_share_pct, " %", 1), run.sha256)
         for run in provenance.runs
     )
     logs = Table("Logs it was made from", ("Run", "log", "payload", "front share", "sha256"), runs)

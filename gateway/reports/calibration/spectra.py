@@ -61,11 +61,11 @@ def spectra_section(runs: Sequence[KnownRun], ratio_index: RatioIndexCalibration
     """Acceleration by payload and pitch rate by front share; None where there is no spectrum at all."""
     bands_a = ratio_index.acceleration_bands if ratio_index else None
     bands_g = ratio_index.pitch_rate_bands if ratio_index else None
-    found = (
+    drawn = (
         _panel(runs, ACCELERATION, [(f"{kg:g} kg", kg) for kg in sorted({run.payload_kg for run in runs})], bands_a),
         _panel(runs, PITCH_RATE, [(f"{pct:.1f} %", pct) for pct in sorted({_share(run) for run in runs})], bands_g),
     )
-    panels = tuple(panel for panel in found if panel is not None)
+    panels = tuple(panel for panel in drawn if panel is not None)
     if not panels:
         return None
     chart = Chart(
@@ -102,8 +102,10 @@ def _panel(
 
 
 def _spans(bands: tuple[Band, Band] | None) -> tuple[Span, ...]:
+    if bands is None:
+        return ()
     names = ("numerator of the index", "denominator")
     return tuple(
         Span(band.centre_hz - 0.5 * band.width_hz, band.centre_hz + 0.5 * band.width_hz, name, colour)
-        for band, name, colour in zip(bands or (), names, (6, 7), strict=False)
+        for band, name, colour in zip(bands, names, (6, 7), strict=True)
     )

@@ -6,7 +6,7 @@ NONE: Final = "–"
 _DIGITS: Final = 2
 
 
-def shown(number: float | None, unit: str = "", digits: int = _DIGITS) -> str:
+def decimal(number: float | None, unit: str = "", digits: int = _DIGITS) -> str:
     """Two digits after the point; a dash where there is none."""
     return NONE if number is None else f"{number:.{digits}f}{unit}"
 

@@ -27,19 +27,25 @@ def save_still(chart: Chart, directory: Path) -> None:
 def draw(chart: Chart) -> Figure:
     """The chart with one legend for all its panels below them."""
     figure, axes_of = panels(chart.n_rows, chart.n_columns, chart.row_height_px * _INCHES_PER_PX)
-    for panel, axes in zip(chart.panels, axes_of, strict=False):
+    n_drawn = len(chart.panels)
+    for panel, axes in zip(chart.panels, axes_of[:n_drawn], strict=True):
         _draw_panel(axes, panel)
-    for axes in axes_of[len(chart.panels) :]:
+    for axes in axes_of[n_drawn:]:
         axes.set_axis_off()
-    shown = {
+    marks = {
         label: handle
         for axes in axes_of
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }  # fmt: skip
-    if shown:
-        n_columns = min(len(shown), _LEGEND_COLUMNS)
+    if marks:
+        n_columns = min(len(marks), _LEGEND_COLUMNS)
         figure.legend(
-            list(shown.values()), list(shown), loc="outside lower center", ncols=n_columns, fontsize=7, frameon=False
+            list(marks.values()),
+            list(marks),
+            loc="outside lower center",
+            ncols=n_columns,
+            fontsize=7,
+            frameon=False,
         )
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # laid out once, not again for every format
@@ -83,7 +89,7 @@ def _with_plain_ticks(axis: XAxis | YAxis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _shown(label: str) -> str:
+def _legend(label: str) -> str:
     return label or "_"  # matplotlib leaves names that begin so out of the legend
 
 
@@ -95,7 +101,7 @@ def _draw_mark(mark: object, axes: Axes, order: int) -> None:
 @_draw_mark.register
 def _(mark: Line, axes: Axes, order: int) -> None:
     axes.plot(mark.x, mark.y, color=COLOURS[mark.colour], linestyle=_DASHES[mark.dash], linewidth=1.2,
-              label=_shown(mark.label), zorder=order)  # fmt: skip
+              label=_legend(mark.label), zorder=order)  # fmt: skip
 
 
 @_draw_mark.register
@@ -103,13 +109,15 @@ def _(mark: Points, axes: Axes, order: int) -> None:
     colour = COLOURS[mark.colour]
     if mark.low is not None and mark.high is not None:
         axes.vlines(mark.x, mark.low, mark.high, color=colour, linewidth=0.8, alpha=0.6, zorder=order)
-    axes.plot(mark.x, mark.y, _MARKERS[mark.marker], color=colour, markersize=4, label=_shown(mark.label), zorder=order)
+    axes.plot(
+        mark.x, mark.y, _MARKERS[mark.marker], color=colour, markersize=4, label=_legend(mark.label), zorder=order
+    )
 
 
 @_draw_mark.register
 def _(mark: Ribbon, axes: Axes, order: int) -> None:
     axes.fill_between(mark.x, mark.low, mark.high, color=COLOURS[mark.colour], alpha=0.18, linewidth=0.0,
-                      label=_shown(mark.label), zorder=order)  # fmt: skip
+                      label=_legend(mark.label), zorder=order)  # fmt: skip
 
 
 @_draw_mark.register
@@ -124,10 +132,10 @@ def _(mark: Cells, axes: Axes, order: int) -> None:
 @_draw_mark.register
 def _(mark: Rule, axes: Axes, order: int) -> None:
     across = axes.axvline if mark.is_vertical else axes.axhline
-    across(mark.at, color=COLOURS[mark.colour], linestyle=_DASHES[mark.dash], linewidth=1.0, label=_shown(mark.label),
+    across(mark.at, color=COLOURS[mark.colour], linestyle=_DASHES[mark.dash], linewidth=1.0, label=_legend(mark.label),
            zorder=order)  # fmt: skip
 
 
 @_draw_mark.register
 def _(mark: Span, axes: Axes, order: int) -> None:
-    axes.axvspan(mark.low, mark.high, color=COLOURS[mark.colour], alpha=0.3, linewidth=0.0, label=_shown(mark.label))
+    axes.axvspan(mark.low, mark.high, color=COLOURS[mark.colour], alpha=0.3, linewidth=0.0, label=_legend(mark.label))

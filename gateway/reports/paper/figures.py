@@ -1,4 +1,4 @@
-"""The figures of the paper's section 4, drawn from our evidence."""
+"""The figures of the paper's section 4, drawn from our experiments."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, me
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64
 from gateway.reports.charts.figures import COLOURS, panels
-from gateway.reports.paper.evidence import Evidence, Method
+from gateway.reports.paper.experiments import Experiments, Method
 from gateway.units import NS_PER_S
 
 ACCELERATION = "acceleration"
@@ -34,63 +34,65 @@ def spectrum_of(run: KnownRun, sensor: str) -> tuple[F64, F64]:
     return freq_hz, total / n if n else np.full(len(freq_hz), np.nan)
 
 
-def figure_1(evidence: Evidence) -> Figure:
+def figure_1(experiments: Experiments) -> Figure:
     """Spectra of acceleration for several loads, and of pitch rate for several shares."""
     figure, (left, right) = panels(1, 2)
-    for run in evidence.driven["load-sweep"].runs[::3]:
+    for run in experiments.driven["load-sweep"].runs[::3]:
         left.plot(*spectrum_of(run, ACCELERATION), label=f"{run.payload_kg:.0f} kg", linewidth=1.0)
-    for run in evidence.driven["share-sweep"].runs[::4]:
+    for run in experiments.driven["share-sweep"].runs[::4]:
         right.plot(*spectrum_of(run, PITCH_RATE), label=f"{run.front_share_pct:.0f} %", linewidth=1.0)
     for axes, sensor in ((left, ACCELERATION), (right, PITCH_RATE)):
         _label(axes, "frequency [Hz]", f"{NAME[sensor]} [{UNIT[sensor]}]")
     return figure
 
 
-def band_differences(evidence: Evidence, sensor: str, width_hz: float) -> tuple[F64, F64]:
+def band_differences(experiments: Experiments, sensor: str, width_hz: float) -> tuple[F64, F64]:
     """(4) or (5): frequencies (m,), J (m,) between the extremes of the sweep that concerns the sensor."""
-    runs = evidence.driven["load-sweep" if sensor == ACCELERATION else "share-sweep"].runs
+    runs = experiments.driven["load-sweep" if sensor == ACCELERATION else "share-sweep"].runs
     (freq_hz, low), (_, high) = spectrum_of(runs[0], sensor), spectrum_of(runs[-1], sensor)
     n = max(round(width_hz / (freq_hz[1] - freq_hz[0])), 1)
     return freq_hz, np.convolve(high - low, np.full(n, 1.0 / n), mode="same")
 
 
-def figure_bands(evidence: Evidence) -> Figure:
+def figure_bands(experiments: Experiments) -> Figure:
     """J_L and J_D over frequency with the bands that calibration chose, and the paper's."""
     figure, axes_of = panels(1, 2)
-    own = evidence.ratio_index
+    own = experiments.ratio_index
     chosen = {ACCELERATION: own.acceleration_bands, PITCH_RATE: own.pitch_rate_bands}
     for axes, sensor, name in zip(axes_of, (ACCELERATION, PITCH_RATE), ("J_L", "J_D"), strict=True):
         for width_hz, colour in ((0.05, "#bbbbbb"), (0.5, COLOURS[0])):
-            axes.plot(*band_differences(evidence, sensor, width_hz), color=colour, label=f"{name}, w = {width_hz:g} Hz")
+            axes.plot(
+                *band_differences(experiments, sensor, width_hz), color=colour, label=f"{name}, w = {width_hz:g} Hz"
+            )
         for bands, colour, label in ((chosen[sensor], COLOURS[2], "ours"), (PAPER_BANDS[sensor], COLOURS[1], "paper")):
-            for band, style, part in zip(bands or (), ("-", "--"), ("over", "under"), strict=False):
+            for band, (style, part) in zip(bands, (("-", "over"), ("--", "under")), strict=True) if bands else ():
                 axes.axvline(band.centre_hz, color=colour, linestyle=style, linewidth=1.0, label=f"{label}, {part}")
         axes.axhline(0.0, color="black", linewidth=0.6)
         _label(axes, "frequency [Hz]", f"{name} [{UNIT[sensor]}]")
     return figure
 
 
-def figure_2(evidence: Evidence) -> Figure:
+def figure_2(experiments: Experiments) -> Figure:
     """Empty and full, whole and through the two band-passes (6)."""
     figure, axes_of = panels(1, 2)
-    runs = evidence.driven["load-sweep"].runs
-    bands = evidence.ratio_index.acceleration_bands or PAPER_BANDS[ACCELERATION]
+    runs = experiments.driven["load-sweep"].runs
+    bands = experiments.ratio_index.acceleration_bands or PAPER_BANDS[ACCELERATION]
     for axes, run in zip(axes_of, (runs[0], runs[-1]), strict=True):
         freq_hz, spectrum = spectrum_of(run, ACCELERATION)
         axes.plot(freq_hz, spectrum, color="#999999", label=f"{run.payload_kg:.0f} kg")
-        for band, colour in zip(bands, COLOURS, strict=False):
+        for band, colour in zip(bands, COLOURS[:2], strict=True):
             axes.plot(freq_hz, band_pass_gain(freq_hz, band) * spectrum, color=colour, label=_band_name(band))
         _label(axes, "frequency [Hz]", f"{NAME[ACCELERATION]} [{UNIT[ACCELERATION]}]")
     return figure
 
 
-def figure_3_4(evidence: Evidence) -> Figure:
+def figure_3_4(experiments: Experiments) -> Figure:
     """R_a against the load alone with (9), R_g against the share alone with (10)."""
     figure, (left, right) = panels(1, 2)
-    rows = index_rows(evidence.driven["load-sweep"].runs, evidence.ratio_index)
+    rows = index_rows(experiments.driven["load-sweep"].runs, experiments.ratio_index)
     _index_and_fit(left, rows, rows.ra, rows.payload_kg, MODEL_9_PAYLOAD)
     _label(left, "R_a", LOAD)
-    rows = index_rows(evidence.driven["share-sweep"].runs, evidence.ratio_index)
+    rows = index_rows(experiments.driven["share-sweep"].runs, experiments.ratio_index)
     _index_and_fit(right, rows, rows.rg, rows.front_share_pct, MODEL_10_FRONT_SHARE)
     _label(right, "R_g", SHARE)
     return figure
@@ -104,10 +106,10 @@ def _index_and_fit(axes: Axes, rows: IndexRows, index: F64, target: F64, terms: 
     axes.plot(along, fitted, color=COLOURS[1], label=f"{' + '.join(terms)}, residual {model.residual_std:.2g}")
 
 
-def figure_5_6(evidence: Evidence) -> Figure:
+def figure_5_6(experiments: Experiments) -> Figure:
     """The conditions explored, and the two indexes over them."""
     figure, (left, middle, right) = panels(1, 3)
-    rows = index_rows(evidence.driven["ident"].runs, evidence.ratio_index)
+    rows = index_rows(experiments.driven["ident"].runs, experiments.ratio_index)
     left.plot(rows.payload_kg, rows.front_share_pct, "o", color=COLOURS[0])
     _label(left, LOAD, SHARE)
     by_share = middle.scatter(rows.payload_kg, rows.ra, c=rows.front_share_pct, s=14, cmap="viridis")
@@ -119,22 +121,22 @@ def figure_5_6(evidence: Evidence) -> Figure:
     return figure
 
 
-def figure_7(evidence: Evidence) -> Figure:
+def figure_7(experiments: Experiments) -> Figure:
     """The joint model (11) and the other estimators on the grid they were calibrated on."""
-    runs = evidence.driven["ident"].runs
-    return _estimated_over_true([(method.label, method.judge(runs), "o") for method in evidence.simulated])
+    runs = experiments.driven["ident"].runs
+    return _estimated_over_true([(method.label, method.judge(runs), "o") for method in experiments.simulated])
 
 
-def figure_8_9(evidence: Evidence) -> Figure:
+def figure_8_9(experiments: Experiments) -> Figure:
     """Spectra for two roughnesses; the road's low-pass (1) for several speeds, without and with the wheelbase."""
     figure, (left, right) = panels(1, 2)
     for iri in ("iri2", "iri8"):
-        run = evidence.driven["sensitivity"].run_named(iri)
+        run = experiments.driven["sensitivity"].run_named(iri)
         left.plot(*spectrum_of(run, ACCELERATION), label=f"IRI {iri[3:]}", linewidth=1.0)
     _label(left, "frequency [Hz]", f"{NAME[ACCELERATION]} [{UNIT[ACCELERATION]}]")
     freq_hz = np.linspace(0.05, 10.0, 800)
-    wheelbase_m = evidence.driven["ident"].campaign.vehicle.wheelbase_m
-    for kmh, colour in zip((30.0, 50.0, 90.0), COLOURS, strict=False):
+    wheelbase_m = experiments.driven["ident"].campaign.vehicle.wheelbase_m
+    for kmh, colour in zip((30.0, 50.0, 90.0), COLOURS[:3], strict=True):
         speed_mps = kmh / 3.6
         road = 1.0 / np.abs(2j * np.pi * freq_hz + 0.15 * speed_mps)
         both_axles = road * np.abs(np.cos(np.pi * freq_hz * wheelbase_m / speed_mps))
@@ -145,12 +147,13 @@ def figure_8_9(evidence: Evidence) -> Figure:
     return figure
 
 
-def figure_sensitivity(evidence: Evidence) -> Figure:
+def figure_sensitivity(experiments: Experiments) -> Figure:
     """What each method answers for one load at other speeds and on other roads; the ratio index's gate lifted."""
     figure, (top, bottom) = panels(2, 1, height_in=2.6)
-    runs = evidence.driven["sensitivity"].runs
+    runs = experiments.driven["sensitivity"].runs
     places = np.arange(len(runs))
-    for method, colour in zip(evidence.simulated, COLOURS, strict=False):
+    for n, method in enumerate(experiments.simulated):
+        colour = COLOURS[n]
         errors = np.array([mean_errors(run, method) for run in runs])
         for axes, column in ((top, 0), (bottom, 1)):
             axes.plot(places, errors[:, column], "o-", color=colour, label=method.label, linewidth=0.7)
@@ -187,12 +190,13 @@ def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
     return (float(np.mean(errors[:, 0])), float(np.mean(errors[:, 1]))) if len(errors) else (np.nan, np.nan)
 
 
-def figure_test(evidence: Evidence, kind: str) -> Figure:
+def figure_test(experiments: Experiments, kind: str) -> Figure:
     """Payload and share over time: the truth as a line, each method's batches with their 95 % intervals."""
     figure, (top, bottom) = panels(2, 1, height_in=2.4)
-    runs = evidence.driven[kind].runs
+    runs = experiments.driven[kind].runs
     start_ns = runs[0].batches[0].t_start_ns
-    for method, colour in zip(evidence.simulated, COLOURS, strict=False):
+    for n, method in enumerate(experiments.simulated):
+        colour = COLOURS[n]
         counted = [one for one in method.judge(runs) if one.estimate.counted]
         _with_intervals(top, counted, start_ns, colour, method.label, is_payload=True)
         _with_intervals(bottom, counted, start_ns, colour, method.label, is_payload=False)
@@ -205,10 +209,10 @@ def figure_test(evidence: Evidence, kind: str) -> Figure:
     return figure
 
 
-def figure_drive(evidence: Evidence, kind: str, method: Method) -> Figure:
+def figure_drive(experiments: Experiments, kind: str, method: Method) -> Figure:
     """One method's answer over a drive with changing loads: truth behind the 95 % band."""
     figure, (top, bottom) = panels(2, 1, height_in=2.2)
-    runs = evidence.driven[kind].runs
+    runs = experiments.driven[kind].runs
     start_ns = runs[0].batches[0].t_start_ns
     for n, run in enumerate(runs):
         counted = [one.estimate for one in method.judge([run]) if one.estimate.counted]
@@ -218,30 +222,30 @@ def figure_drive(evidence: Evidence, kind: str, method: Method) -> Figure:
             axes.plot(edges, [truth] * 2, color="black", linewidth=2.5, label="truth" if n == 0 else None)
             for k, e in enumerate(counted):
                 when = [(t - start_ns) / NS_PER_S / 60.0 for t in (e.t_start_ns, e.t_end_ns)]
-                found = e.payload if is_payload else e.front_share
-                shown = n == 0 and k == 0
-                axes.fill_between(when, *found.interval95, color=COLOURS[0], alpha=0.25, linewidth=0.0,
-                                  label="estimate, 95 % interval" if shown else None)  # fmt: skip
-                axes.plot(when, [found.number] * 2, color=COLOURS[0], linewidth=1.5)
+                quantity = e.payload if is_payload else e.front_share
+                is_first = n == 0 and k == 0
+                axes.fill_between(when, *quantity.interval95, color=COLOURS[0], alpha=0.25, linewidth=0.0,
+                                  label="estimate, 95 % interval" if is_first else None)  # fmt: skip
+                axes.plot(when, [quantity.number] * 2, color=COLOURS[0], linewidth=1.5)
     _label(top, "", LOAD)
     _label(bottom, "time [min]", SHARE)
     return figure
 
 
-def figure_13(evidence: Evidence) -> Figure:
+def figure_13(experiments: Experiments) -> Figure:
     """The experimental grid."""
     figure, (axes,) = panels(1, 1)
-    runs = evidence.driven["experiment"].identification
+    runs = experiments.driven["experiment"].identification
     axes.plot([run.payload_kg for run in runs], [run.front_share_pct for run in runs], "s", color=COLOURS[0])
     _label(axes, LOAD, SHARE)
     return figure
 
 
-def figure_14(evidence: Evidence) -> Figure:
+def figure_14(experiments: Experiments) -> Figure:
     """The experiment: estimates over truth, identification hollow, validation filled."""
-    experiment = evidence.driven["experiment"]
+    experiment = experiments.driven["experiment"]
     series = []
-    for method in evidence.experimental:
+    for method in experiments.experimental:
         series.append((f"{method.label}, identification", method.judge(experiment.identification), "o"))
         series.append((f"{method.label}, validation", method.judge(experiment.validation), "s"))
     return _estimated_over_true(series)
@@ -270,9 +274,9 @@ def _with_intervals(
 ) -> None:
     estimates = [one.estimate for one in counted]
     middle_min = [((e.t_start_ns + e.t_end_ns) / 2.0 - start_ns) / NS_PER_S / 60.0 for e in estimates]
-    found = [e.payload if is_payload else e.front_share for e in estimates]
-    centre = np.array([one.number for one in found])
-    reach = np.abs(np.array([one.interval95 for one in found]).reshape(-1, 2) - centre[:, None]).T
+    quantities = [e.payload if is_payload else e.front_share for e in estimates]
+    centre = np.array([one.number for one in quantities])
+    reach = np.abs(np.array([one.interval95 for one in quantities]).reshape(-1, 2) - centre[:, None]).T
     axes.errorbar(middle_min, centre, yerr=reach, fmt="o", color=colour, label=label, markersize=3.5, linewidth=0.8)
 
 

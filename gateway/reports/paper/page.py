@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from gateway.core.ratio_index.index import PAPER_BANDS, Band
 from gateway.reports.paper import figures as draw
-from gateway.reports.paper.evidence import Evidence, Method
+from gateway.reports.paper.experiments import Experiments, Method
 from gateway.reports.paper.table import COLUMNS, Row
 
 
@@ -21,7 +21,7 @@ class Plate:
     name: str
     heading: str
     text: str
-    drawn: Callable[[Evidence], Figure]
+    drawn: Callable[[Experiments], Figure]
 
 
 PLATES: Final = (
@@ -70,7 +70,7 @@ PLATES: Final = (
             f"fig{10 + n}_{kind}",
             f"Fig. {10 + n}: test {n + 1}",
             "Black: the truth. Points: batches with their 95 % intervals. The load changes at a stop.",
-            lambda evidence, kind=kind: draw.figure_test(evidence, kind),  # type: ignore[misc] # the default binds kind
+            lambda experiments, kind=kind: draw.figure_test(experiments, kind),  # type: ignore[misc] # the default binds kind
         )
         for n, kind in enumerate(("test1", "test2", "test3"))
     ),
@@ -93,7 +93,7 @@ OTHER_CONDITIONS: Final = {
 }
 
 
-def page(evidence: Evidence, rows: Sequence[Row], drawings: Sequence[tuple[Plate, str]]) -> str:
+def page(experiments: Experiments, rows: Sequence[Row], drawings: Sequence[tuple[Plate, str]]) -> str:
     """The whole page; each drawing is an SVG element."""
     head = "".join(f"<th>{escape(column)}</th>" for column in COLUMNS)
     body = "".join(
@@ -110,20 +110,20 @@ def page(evidence: Evidence, rows: Sequence[Row], drawings: Sequence[tuple[Plate
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Section 4, reproduced</title>'
         f"<style>{_STYLE}</style></head><body><h1>Section 4, reproduced</h1>"
         f"<p>The simulations and the experiment of Bottelli, Tanelli, Boniolo and Savaresi, driven again with our own "
-        f"simulator (seed {evidence.scope.seed}, batches of {evidence.scope.window_s:g} s). Nothing here is measured "
-        f"on a real vehicle. Errors are (12): percent of 450 kg and of 20 percentage points.</p>"
+        f"simulator (seed {experiments.extent.seed}, batches of {experiments.extent.window_s:g} s). Nothing here is "
+        f"measured on a real vehicle. Errors are (12): percent of 450 kg and of 20 percentage points.</p>"
         f"<h2>The paper's numbers beside ours</h2><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        f"{_findings(evidence)}{_bands_table(evidence)}{plates}</body></html>\n"
+        f"{_findings(experiments)}{_bands_table(experiments)}{plates}</body></html>\n"
     )
 
 
-def _findings(evidence: Evidence) -> str:
+def _findings(experiments: Experiments) -> str:
     """Where our physics contradicts the paper's section 3.3: what leaving 50 km/h and IRI 4 does to each method."""
     lines = "".join(
         f"<tr><td>{escape(method.label)}</td><td>{what}</td><td>{payload_kg:.0f} kg</td><td>{share_pp:.1f}</td></tr>"
-        for method in evidence.simulated
+        for method in experiments.simulated
         for what, part in OTHER_CONDITIONS.items()
-        for payload_kg, share_pp in [worst_errors(evidence, method, part)]
+        for payload_kg, share_pp in [worst_errors(experiments, method, part)]
     )
     return (
         "<h2>Speed and roughness do not drop out</h2><p>The paper's section 3.3 expects the ratio to cancel them. "
@@ -133,20 +133,20 @@ def _findings(evidence: Evidence) -> str:
     )
 
 
-def worst_errors(evidence: Evidence, method: Method, part: str) -> tuple[float, float]:
+def worst_errors(experiments: Experiments, method: Method, part: str) -> tuple[float, float]:
     """Largest mean error of payload [kg] and share [points] over the sensitivity runs whose name contains ``part``."""
-    runs = [run for run in evidence.driven["sensitivity"].runs if part in run.name]
+    runs = [run for run in experiments.driven["sensitivity"].runs if part in run.name]
     errors = np.abs([draw.mean_errors(run, method) for run in runs])
     answered = errors[np.isfinite(errors).all(axis=1)]
     return (float(np.max(answered[:, 0])), float(np.max(answered[:, 1]))) if len(answered) else (np.nan, np.nan)
 
 
-def _bands_table(evidence: Evidence) -> str:
-    """Table 2: the paper's bands and those found for our van."""
-    own = evidence.ratio_index
+def _bands_table(experiments: Experiments) -> str:
+    """Table 2: the paper's bands and those ours for our van."""
+    own = experiments.ratio_index
     lines = "".join(
-        f"<tr><td>{name}</td><td>{_bands(PAPER_BANDS[key])}</td><td>{_bands(found)}</td></tr>"
-        for name, key, found in (
+        f"<tr><td>{name}</td><td>{_bands(PAPER_BANDS[key])}</td><td>{_bands(ours)}</td></tr>"
+        for name, key, ours in (
             ("vertical acceleration", "acceleration", own.acceleration_bands),
             ("pitch rate", "pitch_rate", own.pitch_rate_bands),
         )

@@ -8,12 +8,12 @@ from typing import Any
 from gateway.errors import ConfigurationError
 from gateway.reports.charts.figures import save
 from gateway.reports.paper import figures as draw
-from gateway.reports.paper.evidence import N_STEPS, Evidence, Method, OnStep, Scope, gather
+from gateway.reports.paper.experiments import N_STEPS, Experiments, Extent, Method, OnStep, gather
 from gateway.reports.paper.page import PLATES, page
 from gateway.reports.paper.table import accuracy_page, rows_of, tables_of
 
 
-def reproduce(output: Path, scope: Scope, on_step: OnStep = lambda what, done, of: None) -> Path:
+def reproduce(output: Path, extent: Extent, on_step: OnStep = lambda what, done, of: None) -> Path:
     """Write report.html, figures/, accuracy.md, results.json, the calibrations and campaigns; the report's path.
 
     Raises ConfigurationError where the directory holds a reproduction already.
@@ -22,34 +22,34 @@ def reproduce(output: Path, scope: Scope, on_step: OnStep = lambda what, done, o
     if report.exists() or (output / "campaigns").exists():
         raise ConfigurationError(f"{output}: there is a reproduction already; name another directory or remove it")
     output.mkdir(parents=True, exist_ok=True)
-    evidence = gather(output, scope, on_step)
+    experiments = gather(output, extent, on_step)
     on_step("judging and drawing", N_STEPS - 1, N_STEPS)
-    results = results_of(evidence)
-    drawings = [(plate, save(plate.drawn(evidence), output / "figures", plate.name)) for plate in PLATES]
-    save(draw.figure_drive(evidence, "test3", best_method(evidence)), output / "figures", "drive")
+    results = results_of(experiments)
+    drawings = [(plate, save(plate.drawn(experiments), output / "figures", plate.name)) for plate in PLATES]
+    save(draw.figure_drive(experiments, "test3", best_method(experiments)), output / "figures", "drive")
     text = json.dumps(results, indent=1, allow_nan=False)
     (output / "results.json").write_text(text + "\n", encoding="utf-8")
     (output / "accuracy.md").write_text(accuracy_page(results), encoding="utf-8")
-    report.write_text(page(evidence, rows_of(results["tables"]), drawings), encoding="utf-8")
+    report.write_text(page(experiments, rows_of(results["tables"]), drawings), encoding="utf-8")
     return report
 
 
-def best_method(evidence: Evidence) -> Method:
+def best_method(experiments: Experiments) -> Method:
     """The method with the least payload error over test 3, misses counted."""
 
     def error(method: Method) -> float:
-        error_pct = evidence.errors("test3", "validation", method).payload.mean_abs_pct_with_misses
+        error_pct = experiments.errors("test3", "validation", method).payload.mean_abs_pct_with_misses
         return math.inf if error_pct is None else error_pct
 
-    return min(evidence.simulated, key=error)
+    return min(experiments.simulated, key=error)
 
 
-def results_of(evidence: Evidence) -> dict[str, Any]:
+def results_of(experiments: Experiments) -> dict[str, Any]:
     """Everything as numbers: what results.json holds."""
     return {
-        "seed": evidence.scope.seed,
-        "window_s": evidence.scope.window_s,
-        "tables": tables_of(evidence),
+        "seed": experiments.extent.seed,
+        "window_s": experiments.extent.window_s,
+        "tables": tables_of(experiments),
         "sensitivity": [
             {
                 "condition": draw.condition_of(run),
@@ -57,8 +57,8 @@ def results_of(evidence: Evidence) -> dict[str, Any]:
                 "payload_error_kg": _known(payload_kg),
                 "share_error_pp": _known(share_pp),
             }
-            for run in evidence.driven["sensitivity"].runs
-            for method in evidence.simulated
+            for run in experiments.driven["sensitivity"].runs
+            for method in experiments.simulated
             for payload_kg, share_pp in [draw.mean_errors(run, method)]
         ],
     }

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.reports.paper.evidence import Evidence
+from gateway.reports.paper.experiments import Experiments
 
 PAPER_PCT: Final = {  # mean |error| of payload and of share, percent of 450 kg and of 20 points: the paper's section 4
     ("test1", "validation"): (5.46, 6.02),
@@ -39,14 +39,14 @@ class Row:
     is_paper: bool = False
 
 
-def tables_of(evidence: Evidence) -> list[dict[str, Any]]:
+def tables_of(experiments: Experiments) -> list[dict[str, Any]]:
     """(12) over every drive by every method."""
     tables = []
     for kind, split in TITLES:
-        methods = evidence.simulated if kind.startswith("test") else evidence.experimental
+        methods = experiments.simulated if kind.startswith("test") else experiments.experimental
         for method in methods:
             named = {"drive": kind, "split": split, "method": method.label, "estimator": method.estimator}
-            tables.append(named | evidence.errors(kind, split, method).to_json())
+            tables.append(named | experiments.errors(kind, split, method).to_json())
     return tables
 
 
@@ -90,17 +90,17 @@ def _row(title: str, table: Mapping[str, Any]) -> Row:
     payload, share = table["payload"], table["front_share"]
     cells = (
         title, table["method"], str(table["n_batches"]), str(table["n_rejected"]),
-        _shown(payload["mean_abs_pct"], 2), _shown(payload["std_pct"], 2), _shown(payload["mean_abs_kg"], 1),
-        _share_shown(payload["coverage95"]),
-        _shown(share["mean_abs_pct"], 2), _shown(share["std_pct"], 2), _shown(share["mean_abs_pp"], 2),
-        _share_shown(share["coverage95"]),
+        _decimal(payload["mean_abs_pct"], 2), _decimal(payload["std_pct"], 2), _decimal(payload["mean_abs_kg"], 1),
+        _percent(payload["coverage95"]),
+        _decimal(share["mean_abs_pct"], 2), _decimal(share["std_pct"], 2), _decimal(share["mean_abs_pp"], 2),
+        _percent(share["coverage95"]),
     )  # fmt: skip
     return Row(cells)
 
 
-def _shown(number: float | None, digits: int) -> str:
+def _decimal(number: float | None, digits: int) -> str:
     return "none" if number is None else f"{number:.{digits}f}"
 
 
-def _share_shown(share: float | None) -> str:
+def _percent(share: float | None) -> str:
     return "none" if share is None else f"{100.0 * share:.0f} %"

@@ -29,7 +29,7 @@ N_STEPS: Final = 2 * len(CAMPAIGNS) + 3  # drive and read each, calibrate twice,
 
 
 @dataclass(frozen=True, slots=True)
-class Scope:
+class Extent:
     """How much is driven. The defaults are the paper's; less is for trying it out."""
 
     seed: int = 1
@@ -79,10 +79,10 @@ class Method:
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class Experiments:
     """Campaigns by kind; the methods calibrated on the paper's simulated grid, and those on the experiment."""
 
-    scope: Scope
+    extent: Extent
     driven: Mapping[str, Driven]
     simulated: tuple[Method, ...]
     experimental: tuple[Method, ...]
@@ -101,32 +101,32 @@ class Evidence:
 
 def ratio_index_of(method: Method) -> RatioIndexCalibration:
     """The method's ratio index calibration, which every campaign here carries."""
-    found = method.calibrated.ratio_index
-    if found is None:
+    calibration = method.calibrated.ratio_index
+    if calibration is None:
         raise ValueError(f"{method.label}: holds no ratio index")
-    return found
+    return calibration
 
 
-def gather(output: Path, scope: Scope, on_step: OnStep = lambda what, done, of: None) -> Evidence:
+def gather(output: Path, extent: Extent, on_step: OnStep = lambda what, done, of: None) -> Experiments:
     """Simulate every campaign into output/campaigns, calibrate, and cut all drives into batches."""
     driven = {}
     for number, kind in enumerate(CAMPAIGNS):
         on_step(f"driving {kind}", 2 * number, N_STEPS)
-        bench = bench_of(kind, seed=scope.seed, longest_s=scope.longest_s)
-        path = write_campaign(bench, output / "campaigns" / kind, workers=scope.workers)
+        bench = bench_of(kind, seed=extent.seed, longest_s=extent.longest_s)
+        path = write_campaign(bench, output / "campaigns" / kind, workers=extent.workers)
         on_step(f"reading {kind}", 2 * number + 1, N_STEPS)
         campaign = load_campaign(path)
-        driven[kind] = Driven(campaign, tuple(split_runs(campaign, scope.settings)))
+        driven[kind] = Driven(campaign, tuple(split_runs(campaign, extent.settings)))
     on_step("calibrating on the simulated grid", N_STEPS - 3, N_STEPS)
-    simulated = _methods(driven["ident"], scope, output / "vehicle_simulated.json")
+    simulated = _methods(driven["ident"], extent, output / "vehicle_simulated.json")
     on_step("calibrating on the experiment", N_STEPS - 2, N_STEPS)
-    experimental = _methods(driven["experiment"], scope, output / "vehicle_experiment.json")
-    return Evidence(scope, driven, simulated, experimental)
+    experimental = _methods(driven["experiment"], extent, output / "vehicle_experiment.json")
+    return Experiments(extent, driven, simulated, experimental)
 
 
-def _methods(driven: Driven, scope: Scope, path: Path) -> tuple[Method, ...]:
+def _methods(driven: Driven, extent: Extent, path: Path) -> tuple[Method, ...]:
     """Every estimator calibrated on the identification part, and the ratio index with the bands of Table 2."""
-    outcome = calibrate(driven.campaign, scope.settings, estimators=ESTIMATOR_NAMES, command="springscale reproduce")
+    outcome = calibrate(driven.campaign, extent.settings, estimators=ESTIMATOR_NAMES, command="springscale reproduce")
     held = outcome.file
     path.write_text(held.to_json(), encoding="utf-8")
     calibrated = held.for_core()
