@@ -44,6 +44,7 @@ dbc = ["springscale_reference.dbc"]
 message = "IMU_ACCEL"
 signal = "AccelZ"
 valid_when = { AccelValid = 1 }
+counter = "AccelCounter"              # late frames are told from lost ones
 
 [signals.pitch_rate]
 message = "IMU_GYRO"
@@ -94,6 +95,10 @@ signal = "WheelBasedVehicleSpeed"
 one in `springscale.toml` ([settings](settings.md)).
 
 **latency_s.** Samples are moved back by it, so that a late speed stands beside the motion it belongs to.
+
+**counter.** Most sensors number their messages. Where stamps come late or in heaps (USB adapters, a busy computer), the
+counter tells a late frame from a lost one, and the batch is timed by the sensor's own clock. Two bits at least; what
+goes round within a heap, or is contradicted by the stamps, is passed over. Good stamps stay as they are.
 
 **unit.** The database's unit counts. Where it says none or a wrong one, `unit` stands instead:
 

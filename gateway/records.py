@@ -6,8 +6,8 @@ integer nanoseconds since 1970-01-01 UTC.
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import Any, Final
@@ -92,12 +92,14 @@ class Frames:
 class Motion:
     """Decoded samples in order of arrival: one row a frame, one column a signal, NaN where it says nothing.
 
-    t_ns (n,); columns (n, len(signals)) in SI and vehicle axes (ISO 8855), gravity still in.
+    t_ns (n,); columns (n, len(signals)) in SI and vehicle axes (ISO 8855), gravity still in. counters: the
+    message counter (n,) of the frames that carry a signal, where the signal map names one.
     """
 
     signals: tuple[Signal, ...]
     t_ns: I64
     columns: F64
+    counters: Mapping[Signal, F64] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -110,19 +112,46 @@ class Motion:
         known = np.isfinite(column)
         return self.t_ns[known], column[known]
 
+    def counter_of(self, signal: Signal) -> I64 | None:
+        """Message counters (m,) of the samples that ``of`` gives; None where the signal has none."""
+        if signal not in self.signals or signal not in self.counters:
+            return None
+        known = np.isfinite(self.columns[:, self.signals.index(signal)])
+        return self.counters[signal][known].astype(np.int64)
+
+    def rows(self, chosen: Bool | slice) -> "Motion":
+        """The chosen rows, in the order they have."""
+        counters = {signal: counter[chosen] for signal, counter in self.counters.items()}
+        return Motion(self.signals, self.t_ns[chosen], self.columns[chosen], counters)
+
     def part(self, begin: int, end: int) -> "Motion":
         """Rows begin to end (exclusive)."""
-        return Motion(self.signals, self.t_ns[begin:end], self.columns[begin:end])
+        return self.rows(slice(begin, end))
+
+
+def joined(parts: Sequence[Motion]) -> Motion:
+    """Rows of one signal map (at least one part), one part after the other."""
+    first = parts[0]
+    return Motion(
+        first.signals,
+        np.concatenate([part.t_ns for part in parts]),
+        np.concatenate([part.columns for part in parts]),
+        {signal: np.concatenate([part.counters[signal] for part in parts]) for signal in first.counters},
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class SensorTraits:
-    """What the signal map and its DBC tell of one signal. SI; NaN where the DBC does not say."""
+    """What the signal map and its DBC tell of one signal. SI; NaN where the DBC does not say.
+
+    The message counter, where the map names one, counts modulo ``counter_modulus``.
+    """
 
     latency_s: float = 0.0
     minimum: float = math.nan
     maximum: float = math.nan
     resolution: float = math.nan
+    counter_modulus: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from gateway.core.sample_clock import retimed
 from gateway.core.settings import BatchSettings
-from gateway.core.timeline import onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
+from gateway.core.timeline import in_order_of_time, onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
 from gateway.records import F64, I64, Batch, Bool, Motion, SensorTraits, Signal, Why
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 
@@ -34,7 +34,7 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
     """Rows of one window -> Batch. Only rows within [t_start, t_end) count; their order does not matter."""
     n = round((window.t_end_ns - window.t_start_ns) * settings.rate_hz / NS_PER_S)
     inside = (rows.t_ns >= window.t_start_ns) & (rows.t_ns < window.t_end_ns)
-    rows = Motion(rows.signals, rows.t_ns[inside], rows.columns[inside])
+    rows = rows.rows(inside)
     acceleration = _sensed(rows, Signal.VERTICAL_ACCELERATION, window, n, settings, traits)
     pitch_rate = _sensed(rows, Signal.PITCH_RATE, window, n, settings, traits)
     speed, frozen = _speed(rows, window, n, settings, traits)
@@ -83,8 +83,12 @@ def _sensed(rows: Motion, signal: Signal, window: Window, n: int, settings: Batc
         return _Sensed(np.full(n, np.nan), {}, 0.0)
     missing, stuck, saturated = _NAMES[signal]
     trait = traits.get(signal, SensorTraits())
-    stamps_ns, x = sort_by_time(*rows.of(signal))
-    t_ns, is_believed = retimed(stamps_ns - round(trait.latency_s * NS_PER_S), x)
+    arrived_ns, arrived = rows.of(signal)
+    counter = rows.counter_of(signal)
+    order = in_order_of_time(arrived_ns)
+    stamps_ns, x = arrived_ns[order] - round(trait.latency_s * NS_PER_S), arrived[order]
+    counter = None if counter is None else counter[order]
+    t_ns, is_believed = retimed(stamps_ns, x, counter, trait.counter_modulus)
     on_grid = onto_grid(t_ns[is_believed], x[is_believed], window.t_start_ns, n, settings.rate_hz, settings.gap_s)
     stuck_ns = settings.stuck_s * NS_PER_S
     untimed = _spans_onto_grid(_spans_of(t_ns, ~is_believed), window, n, settings.rate_hz)

@@ -3,6 +3,8 @@
     sample_times(t_ns)  -> Timing, or None where no steady clock can be believed
     retimed(t_ns, x)    -> times of samples x, by the clock where that shows them smoother, and which can be believed
 
+Both take the message counter as well, where there is one: it tells lost frames from late ones whatever the delays.
+
 A sensor samples at a steady rate. A stamp is later than its sample by what bus, driver and computer took, and
 that is never less than a certain least: delays come and go, but a lost frame shifts all that follow by one period
 for good. So the number of a sample is its place in the row, plus as many periods as the least delay of the samples
@@ -39,6 +41,10 @@ SHORT_PIECE: Final = 200
 MOST_SHORT_PIECES: Final = 16
 USUAL_WITHIN: Final = 0.1  # of the median interval: jitter moves it no further
 PIECE: Final = 1000  # samples of one piece of the line
+OFTEN_ROUND: Final = 20  # a counter that would have gone round so often has shown its highest number
+MOSTLY: Final = 0.5  # of the intervals: a message counter goes on by one same step where no frame is lost
+OFF_S: Final = 0.25  # no frame is so late by rule: stamps and counter contradict each other
+FEW_OFF_SHARE: Final = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,16 +111,17 @@ def _off_neighbours(t_ns: I64, x: F64) -> F64:
 def sample_times(t_ns: I64, counter: I64 | None = None, modulus: int = 0) -> Timing | None:
     """When samples were taken whose frames were stamped t_ns (n,), in order of arrival and never falling.
 
-    ``counter`` (n,) counts messages modulo ``modulus``. None where no steady clock is behind the stamps, and
-    where lost and late frames cannot be told apart.
+    ``counter`` (n,) counts messages modulo ``modulus``; one that the stamps contradict is passed over. None where no
+    steady clock is behind the stamps, and where lost and late frames cannot be told apart.
     """
     if len(t_ns) < LEAST_SAMPLES:
         return None
     t_s = (t_ns - t_ns[0]) / NS_PER_S
     lag = min(LAG, len(t_s) // 2)
     mean_s = float(np.median(t_s[lag:] - t_s[:-lag])) / lag
-    if counter is not None:
-        return _timing(t_ns, _counted(t_s, mean_s, counter, modulus)) if mean_s > 0.0 else None
+    counted = _timing_by(counter, modulus, t_ns, mean_s) if counter is not None and mean_s > 0.0 else None
+    if counted is not None:
+        return counted
     heaped = _numbered(t_s, mean_s) if mean_s > 0.0 else None
     if heaped is not None and _lost_share(heaped) < FEW_LOST_SHARE:
         return _timing(t_ns, heaped)
@@ -176,11 +183,31 @@ def _least_ahead(late_s: F64) -> F64:
     return np.asarray(minimum_filter1d(late_s, AHEAD, mode="nearest", origin=-(AHEAD // 2)), float)
 
 
-def _counted(t_s: F64, period_s: float, counter: I64, modulus: int) -> I64:
-    """Numbers (n,) by the message counter; stamps tell only how often it went round meanwhile."""
-    ahead = np.diff(counter) % modulus
-    ahead[ahead == 0] = modulus
-    rounds = np.maximum(0, np.rint((np.diff(t_s) / period_s - ahead) / modulus))
+def _timing_by(counter: I64, modulus: int, t_ns: I64, mean_s: float) -> Timing | None:
+    """The clock by the message counter; None where it is none, or goes round too fast for stamps so late."""
+    if len(counter) >= OFTEN_ROUND * modulus:
+        modulus = int(np.max(counter)) + 1  # four bits often count from 0 to 14 only
+    ahead = np.diff(counter) % modulus if modulus > 1 else np.zeros(len(counter) - 1, np.int64)
+    steps, n_times = np.unique(ahead, return_counts=True)
+    if steps[np.argmax(n_times)] == 0 or np.max(n_times) < MOSTLY * len(ahead):
+        return None
+    usual = int(steps[np.argmax(n_times)])
+    wait_s = np.diff(t_ns) / NS_PER_S
+    is_sure = wait_s / mean_s * usual < 0.5 * modulus
+    waits = wait_s * (np.sum(ahead[is_sure]) / max(np.sum(wait_s[is_sure]), mean_s))
+    if float(np.mean(waits - ahead > 0.5 * modulus)) > FEW_OFF_SHARE:
+        return None
+    timing = _timing(t_ns, _unrolled(ahead, modulus, waits))
+    is_off = np.abs(timing.delay_s) > OFF_S
+    return timing if float(np.mean(is_off)) < FEW_OFF_SHARE else None
+
+
+def _unrolled(ahead: I64, modulus: int, waits: F64) -> I64:
+    """Numbers (n + 1,) from steps of the counter; ``waits`` (n,) in steps tell how often it went round meanwhile.
+
+    A frame sent twice makes no step, and one that was overtaken a step back.
+    """
+    rounds = np.rint((waits - ahead) / modulus)
     numbers: I64 = np.r_[0, np.cumsum(ahead + modulus * rounds)].astype(np.int64)
     return numbers
 
@@ -193,5 +220,11 @@ def _clock(t_s: F64, numbers: I64) -> tuple[F64, float]:
     edges = np.linspace(0, len(t_s), max(1, round(len(t_s) / PIECE)) + 1).astype(int)
     pieces = [slice(a, b) for a, b in pairwise(edges.tolist())]
     middles = [float(np.mean(numbers[piece])) for piece in pieces]
-    bends_s = np.interp(numbers, middles, [float(np.median(off_s[piece])) for piece in pieces])
+    bends_s = np.interp(numbers, middles, [_midmean(off_s[piece]) for piece in pieces])
     return line_s + bends_s, float(slope_s)
+
+
+def _midmean(x: F64) -> float:
+    """Mean of the middle half: as firm as a median, and steady where heaps leave only a few delays there are."""
+    quarter = len(x) // 4
+    return float(np.mean(np.sort(x)[quarter : len(x) - quarter]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from gateway.core.batch import Traits, Window, build_batch
 from gateway.core.settings import BatchSettings
-from gateway.records import I64, Batch, Bool, Motion, Signal, Why
+from gateway.records import I64, Batch, Bool, Motion, Signal, Why, joined
 from gateway.units import NS_PER_S
 
 _MOVING = np.iinfo(np.int64).max  # "standing since never"
@@ -163,13 +163,8 @@ class Scheduler:
         return int(moving[0])
 
     def _build(self, t_end_ns: int, ended_by: Why | None = None, *, is_provisional: bool = False) -> Batch:
-        rows = Motion(
-            self._rows[0].signals,
-            np.concatenate([part.t_ns for part in self._rows]),
-            np.concatenate([part.columns for part in self._rows]),
-        )
         window = Window(self._window_start_ns, t_end_ns, self._drive_start_ns, ended_by, is_provisional)
-        return build_batch(rows, window, self._settings, self._traits)
+        return build_batch(joined(self._rows), window, self._settings, self._traits)
 
     @staticmethod
     def _ns(duration_s: float) -> int:

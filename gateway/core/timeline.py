@@ -12,9 +12,14 @@ PASSBAND_HZ = 16.0  # the estimators read up to 14 Hz
 STOPBAND_DB = 70.0
 
 
+def in_order_of_time(t_ns: I64) -> I64:
+    """Rows (n,) of samples in order of time, those of equal stamps in order of arrival."""
+    return np.argsort(t_ns, kind="stable")
+
+
 def sort_by_time(t_ns: I64, x: F64) -> tuple[I64, F64]:
     """Samples in order of time, those of equal stamps in order of arrival."""
-    order = np.argsort(t_ns, kind="stable")
+    order = in_order_of_time(t_ns)
     return t_ns[order], x[order]
 
 

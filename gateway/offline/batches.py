@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from gateway.bus.logs import LogReport, motion_of_log
 from gateway.bus.signals import SignalMap
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.records import Batch, Motion
+from gateway.records import Batch, Motion, joined
 from gateway.units import NS_PER_S
 
 
@@ -18,12 +16,7 @@ def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]
     motions, report, _ = motion_of_log(log, signal_map)
     parts = list(motions)
     report.require_frames()
-    motion = Motion(
-        parts[0].signals,
-        np.concatenate([part.t_ns for part in parts]),
-        np.concatenate([part.columns for part in parts]),
-    )
-    return motion, report
+    return joined(parts), report
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +33,7 @@ def rows_within(motion: Motion, stretch: Stretch) -> Motion:
     inside = since_ns >= round(stretch.start_s * NS_PER_S)
     if stretch.end_s is not None:
         inside &= since_ns < round(stretch.end_s * NS_PER_S)
-    return Motion(motion.signals, motion.t_ns[inside], motion.columns[inside])
+    return motion.rows(inside)
 
 
 def batches_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSettings) -> tuple[Batch, ...]:

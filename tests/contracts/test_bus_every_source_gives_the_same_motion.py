@@ -7,6 +7,7 @@ import os
 import sqlite3
 import time
 from contextlib import closing
+from dataclasses import replace
 
 import can
 import numpy as np
@@ -22,7 +23,7 @@ from gateway.bus.messages import message_of
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.sink import BusSink, replay
 from gateway.errors import LogUnreadableError
-from gateway.records import EXTENDED_ID, Frames, Motion, Signal
+from gateway.records import EXTENDED_ID, Frames, Motion, Signal, joined
 
 START_NS = 1_760_146_908_000_000_000
 CHANNELS = itertools.count()
@@ -119,6 +120,8 @@ def read(path, signal_map):
 def assert_same(motion: Motion, truth: Motion, *, stamp_tolerance_ns: int = 0) -> None:
     assert motion.signals == truth.signals
     np.testing.assert_array_equal(motion.columns, truth.columns)
+    for signal in truth.counters:
+        np.testing.assert_array_equal(motion.counters[signal], truth.counters[signal])
     assert np.abs(motion.t_ns - truth.t_ns).max() <= stamp_tolerance_ns
 
 
@@ -147,7 +150,7 @@ def test_an_in_process_bus_gives_the_same_motion_and_stamps(drive, truth, signal
     with BusSink("virtual", channel) as sink:
         sink.send(exact)
     motion = collect(source, len(truth), signal_map)
-    assert_same(motion, Motion(truth.signals, truth.t_ns + 1, truth.columns))
+    assert_same(motion, replace(truth, t_ns=truth.t_ns + 1))
     assert source.counts().dropped_inbox == 0
 
 
@@ -173,7 +176,7 @@ def collect(source, n_rows, signal_map) -> Motion:
             parts.append(decoder.decode(frames))
             n += len(parts[-1])
     source.stop()
-    return Motion(decoder.signals, np.concatenate([p.t_ns for p in parts]), np.concatenate([p.columns for p in parts]))
+    return joined(parts)
 
 
 @pytest.mark.parametrize("suffix", TEXT_FORMATS)

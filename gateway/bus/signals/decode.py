@@ -30,6 +30,7 @@ class Decoder:
     def __init__(self, signal_map: SignalMap) -> None:
         self.signals = signal_map.signals
         self._messages = [_MessageReader(message, self.signals) for message in signal_map.messages]
+        self._counted = tuple(s for s in self.signals if signal_map.traits[s].counter_modulus)
 
     @property
     def counts(self) -> dict[Signal, SignalCounts]:
@@ -47,11 +48,13 @@ class Decoder:
         rows = np.flatnonzero(message_of >= 0)
         message_of = message_of[rows]
         columns = np.full((len(rows), len(self.signals)), np.nan)
+        counters = {signal: np.full(len(rows), np.nan) for signal in self._counted}
         for i, message in enumerate(self._messages):
             ours = np.flatnonzero(message_of == i)
             if len(ours):
                 message.fill(columns, ours, frames, rows[ours])
-        return Motion(self.signals, frames.t_ns[rows], columns)
+                message.count(counters, ours, frames, rows[ours])
+        return Motion(self.signals, frames.t_ns[rows], columns, counters)
 
 
 class _MessageReader:
@@ -61,6 +64,7 @@ class _MessageReader:
         self.id_filter: IdFilter = message.id_filter
         self._length = message.length
         self._readers = [(m.signal, signals.index(m.signal), SampleReader(m)) for m in message.signals]
+        self._counters = {m.signal: m.counter for m in message.signals if m.counter is not None}
         self._n_frames = 0
         self._rejected: dict[Signal, Counter[Rejected]] = {m.signal: Counter() for m in message.signals}
 
@@ -84,3 +88,8 @@ class _MessageReader:
         for signal, column, reader in self._readers:
             columns[ours, column], refused = reader.read(payload)
             self._rejected[signal].update(refused)
+
+    def count(self, counters: Mapping[Signal, F64], ours: I64, frames: Frames, rows: I64) -> None:
+        """Message counters of the same frames into the same rows; what is too short to tell is no sample either."""
+        for signal, field in self._counters.items():
+            counters[signal][ours] = field.bits(frames.payload[rows])

@@ -44,7 +44,7 @@ class MappedSignal:
     """One of our signals: SI = (number x scale + offset) x to_si; the factor carries unit and sign.
 
     ``minimum`` and ``maximum`` are SI, NaN where nothing limits. ``rejects_j1939_codes`` is true where
-    SAE J1939-71 reserves the highest raw numbers for "error" and "not available".
+    SAE J1939-71 reserves the highest raw numbers for "error" and "not available". ``counter`` counts the frames.
     """
 
     signal: Signal
@@ -57,6 +57,7 @@ class MappedSignal:
     multiplexed_by: tuple[Condition, ...]
     valid_when: tuple[Condition, ...]
     rejects_j1939_codes: bool
+    counter: BitField | None = None
 
     @property
     def resolution(self) -> float:
@@ -66,7 +67,8 @@ class MappedSignal:
     @property
     def traits(self) -> SensorTraits:
         """What the rooms beyond the bus need to know of it."""
-        return SensorTraits(self.latency_s, self.minimum, self.maximum, self.resolution)
+        modulus = 0 if self.counter is None else 1 << self.counter.length
+        return SensorTraits(self.latency_s, self.minimum, self.maximum, self.resolution, modulus)
 
 
 @dataclass(frozen=True, slots=True)

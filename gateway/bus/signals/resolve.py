@@ -21,6 +21,8 @@ QUANTITIES: Final[Mapping[Signal, str]] = {
     Signal.AMBIENT_TEMPERATURE: "temperature",
     Signal.AXLE_WEIGHT: "mass",
 }
+FEWEST_COUNTER_BITS: Final = 2
+MOST_COUNTER_BITS: Final = 32  # and no frames are lost round a longer one
 _EXACT_INTEGERS: Final = 1 << 53  # a double holds every integer up to here
 
 Accepted = int | float | str
@@ -39,6 +41,8 @@ class Entry(Protocol):
     def latency_s(self) -> float: ...
     @property
     def valid_when(self) -> Mapping[str, Accepted | list[Accepted]]: ...
+    @property
+    def counter(self) -> str | None: ...
     @property
     def minimum(self) -> float | None: ...
     @property
@@ -62,7 +66,24 @@ def resolve_signal(where: str, signal: Signal, entry: Entry, message: DatabaseMe
         multiplexed_by=_multiplexers(where, named, message),
         valid_when=tuple(_condition(where, name, allowed, message) for name, allowed in entry.valid_when.items()),
         rejects_j1939_codes=(j1939 and bool(message.frame_id & EXTENDED_ID) and named.field.coding is Coding.UNSIGNED),
+        counter=None if entry.counter is None else _counter(f"{where}.counter", entry.counter, message),
     )
+
+
+def _counter(where: str, name: str, message: DatabaseMessage) -> BitField:
+    """The field that counts the frames of the message."""
+    counter = _find(where, name, message)
+    _require_decodable(where, counter, message)
+    field = counter.field
+    if field.coding is Coding.FLOAT or not FEWEST_COUNTER_BITS <= field.length <= MOST_COUNTER_BITS:
+        kind = "a float" if field.coding is Coding.FLOAT else "an integer"
+        raise SignalMapError(
+            f"{where}: {name!r} is {kind} of {field.length} bits; "
+            f"a message counter is an integer of {FEWEST_COUNTER_BITS} to {MOST_COUNTER_BITS} bits"
+        )
+    if counter.multiplexer is not None:
+        raise SignalMapError(f"{where}: {name!r} is not in every frame of {message.name!r} (it is multiplexed)")
+    return field
 
 
 def _find(where: str, name: str, message: DatabaseMessage) -> DatabaseSignal:

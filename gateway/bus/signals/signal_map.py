@@ -34,6 +34,9 @@ class SignalEntry(BaseModel):
     valid_when: dict[str, Accepted | list[Accepted]] = Field(
         default_factory=dict, description="signals of the same message and the values under which this one counts"
     )
+    counter: str | None = Field(
+        None, description="signal of the same message that counts its frames: late frames are then told from lost ones"
+    )
     minimum: Finite | None = Field(None, description="least valid value in SI; overrides the DBC's range")
     maximum: Finite | None = Field(None, description="greatest valid value in SI; overrides the DBC's range")
 
