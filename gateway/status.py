@@ -104,6 +104,7 @@ class StoreStatus:
     n_duplicates: int = 0
     n_pruned: Annotated[int, Field(description="rows removed by age or size")] = 0
     size_bytes: int = 0
+    n_bad_records: Annotated[int, Field(description="records that failed their checksum and were set aside")] = 0
     set_aside: Annotated[str | None, Field(description="damaged database that was renamed out of the way")] = None
 
 

@@ -6,6 +6,7 @@ device is never opened, new files are made where nothing was, and root becomes t
 
 import errno
 import fcntl
+import itertools
 import os
 import stat
 import time
@@ -61,8 +62,8 @@ class KeptFiles:
         """Rename what lies under ``name`` out of the way, whatever it is -> the new name."""
         with self._opened() as folder:
             stem = f"{name}.broken-{datetime.now(UTC):%Y%m%dT%H%M%S}"
-            taken = sum(other.startswith(stem) for other in _names(folder))
-            aside = f"{stem}-{taken}" if taken else stem
+            taken = _names(folder)
+            aside = next(one for n in itertools.count() if (one := f"{stem}-{n}" if n else stem) not in taken)
             os.rename(name, aside, src_dir_fd=folder, dst_dir_fd=folder)
             return aside
 
@@ -107,9 +108,9 @@ class KeptFiles:
             os.close(folder)
 
 
-def _names(folder: int) -> list[str]:
+def _names(folder: int) -> set[str]:
     with os.scandir(folder) as entries:
-        return [entry.name for entry in entries]
+        return {entry.name for entry in entries}
 
 
 def become_owner_of(directory: Path) -> None:

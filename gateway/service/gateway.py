@@ -76,7 +76,7 @@ class Gateway:
         tokens = token_file if token_file.are_in_use() else None
         refuse_open_address(settings.web.host, has_tokens=tokens is not None)
         forwarding = uplink_settings(settings.uplink, settings.vehicle)
-        self.store = store_of(settings.store)
+        self.store = store_of(settings.store, forwarding)
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
         self.board = Board(stale_after_s=settings.web.stale_after_s)

@@ -23,13 +23,19 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store) -> Upli
         "estimator": setup.estimator,
         "calibration_id": setup.calibration.id if setup.calibration else None,
     }
-    # the place in the queue belongs to where letters go: another broker or branch begins from the first row
-    return Uplink(wanted, Outbox(store.reader(), store, f"mqtt://{wanted.broker}/{wanted.topic}"), birth)
+    return Uplink(wanted, Outbox(store.reader(), store, _queue_name(wanted)), birth)
 
 
-def store_of(wanted: StoreSection) -> Store:
+def _queue_name(wanted: UplinkSettings) -> str:
+    """The place in the queue belongs to where letters go: another broker or branch begins from the first row."""
+    return f"mqtt://{wanted.broker}/{wanted.topic}"
+
+
+def store_of(wanted: StoreSection, forwarding: UplinkSettings | None) -> Store:
     keep = Retention(
-        max_age_s=wanted.max_age_days * SECONDS_PER_DAY, max_bytes=round(wanted.max_size_mb * BYTES_PER_MB)
+        max_age_s=wanted.max_age_days * SECONDS_PER_DAY,
+        max_bytes=round(wanted.max_size_mb * BYTES_PER_MB),
+        undelivered_to=None if forwarding is None else _queue_name(forwarding),
     )
     return Store.open(wanted.directory, keep)
 

@@ -1,44 +1,32 @@
 """The database file as its one writer sees it: open, add, prune, set aside."""
 
 import fcntl
+import itertools
+import logging
 import os
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 from gateway.errors import StoreError
+from gateway.log import Event, log_event
+from gateway.store.age import AgeClock
+from gateway.store.records import Stored, checksum, is_good, stored_row
+from gateway.store.retention import Retention, remove_old, remove_share
 from gateway.store.rows import EstimateRow, Row, bound
 from gateway.store.schema import connect_writer, pragma
-from gateway.units import NS_PER_S
+
+T = TypeVar("T")
 
 FILE_NAME: Final = "springscale.db"
 LOCK_NAME: Final = "springscale.lock"
 _DAMAGED: Final = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
-_CLOCK_UNSET_NS: Final = 1_577_836_800 * NS_PER_S  # 2020: an earlier clock was never set (no RTC battery)
-_PRUNE_SHARE: Final = 0.05  # of the rows, removed at a time until the size fits
-
-
-@dataclass(frozen=True, slots=True)
-class Retention:
-    """How much is kept.
-
-    max_age_s counts from receipt; max_bytes bounds the database without its write-ahead log (which
-    stays under about 8 MB); max_held bounds the rows kept in memory while the disk refuses.
-    """
-
-    max_age_s: float = 400 * 86_400.0
-    max_bytes: int = 1_000_000_000
-    max_held: int = 2048
-
-    def __post_init__(self) -> None:
-        if self.max_age_s <= 0 or self.max_bytes < 1_000_000 or self.max_held < 1:
-            raise StoreError(
-                f"cannot keep {self}: max_age_s must be positive, max_bytes at least 1000000 and max_held at least 1"
-            )
+MOST_SET_ASIDE: Final = 3  # damaged databases that are kept, the newest
+MOST_BAD_RECORDS: Final = 1000  # likewise records
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +62,19 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
         raise
 
 
-def _identity(path: Path) -> tuple[int, int]:
-    status = path.stat()
+def _identity(path: Path) -> tuple[int, int] | None:
+    """None where there is none, or none that can be seen."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
     return status.st_dev, status.st_ino
+
+
+def _last_number(connection: sqlite3.Connection, table: str) -> int:
+    """The last number that was ever given in a table."""
+    found = connection.execute("SELECT seq FROM sqlite_sequence WHERE name = ?", (table,)).fetchone()
+    return 0 if found is None else int(found[0])
 
 
 class Database:
@@ -86,18 +84,16 @@ class Database:
         self.path = directory / FILE_NAME
         self._retention = retention
         self._connection: sqlite3.Connection | None = None
-        self._opened_identity = (0, 0)
+        self._opened_identity: tuple[tuple[int, int] | None, ...] = ()
+        self._age: AgeClock | None = None
+        self._is_reindexed = False
+        self.n_bad_records = 0
         self._lock_fd: int | None = None
 
     @property
     def is_open(self) -> bool:
-        """True while connected to the very file that lies at ``path``: not to one that was moved or deleted."""
-        if self._connection is None:
-            return False
-        try:
-            return _identity(self.path) == self._opened_identity
-        except OSError:
-            return False
+        """True while connected to the very files that lie at ``path``: not to ones that were moved or deleted."""
+        return self._connection is not None and self._identities() == self._opened_identity
 
     def open(self, new_epoch: str) -> Opened:
         """Open or create the file. Raises StoreError, OSError or sqlite3.Error; then nothing stays open."""
@@ -106,8 +102,12 @@ class Database:
         self._lock()
         self._connection = connect_writer(self.path)
         try:
-            self._opened_identity = _identity(self.path)
-            return self._identify(self._connection, new_epoch)
+            opened = self._identify(self._connection, new_epoch)
+            self._age = AgeClock(self._connection)
+            self.n_bad_records = _last_number(self._connection, "damaged")
+            self._is_reindexed = False
+            self._opened_identity = self._identities()
+            return opened
         except (OSError, sqlite3.Error):
             self.disconnect()
             raise
@@ -118,7 +118,10 @@ class Database:
         n_new = n_known = 0
         with _transaction(connection):
             for row in rows:
-                is_new = connection.execute(row.INSERT, bound(row)).rowcount > 0
+                fields = bound(row)
+                if isinstance(row, EstimateRow):
+                    fields = (*fields, checksum(fields))
+                is_new = connection.execute(row.INSERT, fields).rowcount > 0
                 n_new += is_new
                 n_known += isinstance(row, EstimateRow) and not is_new
         return n_new, n_known
@@ -126,9 +129,11 @@ class Database:
     def prune(self, now_ns: int) -> int:
         """Remove what is too old, then the oldest until the size fits -> rows removed."""
         connection = self._connected()
-        n_removed = self._prune_old(connection, now_ns)
+        n_removed = 0
+        if self._age is not None and self._age.is_believed(now_ns):
+            n_removed = self._mending(lambda: remove_old(connection, self._retention, now_ns))
         while self.size_bytes() > self._retention.max_bytes:
-            n = self._prune_share(connection)
+            n = self._mending(lambda: remove_share(connection))
             if n == 0:
                 break
             n_removed += n
@@ -143,10 +148,51 @@ class Database:
         return n_pages * pragma(connection, "page_size")
 
     def check(self) -> None:
-        """Look through the whole file. Raises DamagedError."""
+        """Look through the whole file, which somebody found damaged, and mend its indexes. Raises DamagedError."""
         verdict = self._connected().execute("PRAGMA quick_check(1)").fetchone()[0]
         if verdict != "ok":
             raise DamagedError(verdict)
+        self._reindex("a reader met damage that a look at the whole file did not find")
+
+    def set_records_aside(self, seqs: Iterable[int], now_ns: int) -> list[int]:
+        """Take those of these rows that fail their sum out of the history and keep what is left of them -> which."""
+        connection = self._connected()
+        rows = [row for seq in sorted(seqs) if (row := stored_row(connection, seq)) is not None and not is_good(row)]
+        if rows:
+            self._mending(lambda: self._move_aside(connection, rows, now_ns))
+            self.n_bad_records = _last_number(connection, "damaged")
+        return [row[0] for row in rows]
+
+    @staticmethod
+    def _move_aside(connection: sqlite3.Connection, rows: Sequence[Stored], now_ns: int) -> None:
+        with _transaction(connection):
+            for seq, record_id, *_, text, _sum in rows:
+                connection.execute(
+                    "INSERT INTO damaged (seq, found_ns, id, text) VALUES (?, ?, ?, ?)", (seq, now_ns, record_id, text)
+                )
+                connection.execute("DELETE FROM estimates WHERE seq = ?", (seq,))
+            newest = _last_number(connection, "damaged")
+            connection.execute("DELETE FROM damaged WHERE n <= ?", (newest - MOST_BAD_RECORDS,))
+
+    def _mending(self, work: Callable[[], T]) -> T:
+        """Do it; where an index does not know a row as it is now, make the indexes anew and do it again."""
+        try:
+            return work()
+        except sqlite3.DatabaseError as error:
+            if not is_damaged(error):
+                raise
+            self._reindex(str(error))
+            return work()
+
+    def _reindex(self, why: str) -> None:
+        """Once an opening: where that did not help, it is more than the indexes. Raises DamagedError."""
+        if self._is_reindexed:
+            raise DamagedError(why)
+        self._is_reindexed = True
+        try:
+            self._connected().execute("REINDEX")
+        except sqlite3.IntegrityError as error:  # two rows of one id: the file tells of one too many
+            raise DamagedError(str(error)) from None
 
     def disconnect(self) -> None:
         """Close the connection and keep the lock."""
@@ -165,13 +211,28 @@ class Database:
         """Rename the file and its companions out of the way -> the new name. Raises OSError."""
         self.disconnect()
         stem = f"{FILE_NAME}.damaged-{datetime.now(UTC):%Y%m%dT%H%M%S}"
-        taken = len(list(self.path.parent.glob(f"{stem}*")))
-        name = f"{stem}-{taken}" if taken else stem
+        names = (f"{stem}-{n}" if n else stem for n in itertools.count())
+        name = next(name for name in names if not self.path.with_name(name).exists())
         for suffix in ("-wal", "-shm", ""):  # the file itself last: until then the next try finds it again
             companion = self.path.with_name(FILE_NAME + suffix)
             if companion.exists():
                 companion.rename(self.path.with_name(name + suffix))
+        self._forget_oldest_aside()
         return name
+
+    def _forget_oldest_aside(self) -> None:
+        """A card that damages files goes on doing so: as many are kept as are worth looking at."""
+        whole = [
+            file for file in self.path.parent.glob(f"{FILE_NAME}.damaged-*") if not file.name.endswith(("-wal", "-shm"))
+        ]
+        for file in sorted(whole, key=lambda file: (file.stat().st_ctime_ns, file.name))[:-MOST_SET_ASIDE]:
+            for suffix in ("-wal", "-shm", ""):
+                file.with_name(file.name + suffix).unlink(missing_ok=True)
+            log_event(Event.STORE_FORGETS, level=logging.WARNING, removed=file.name)
+
+    def _identities(self) -> tuple[tuple[int, int] | None, ...]:
+        """Of the file and its companions: where the log was deleted, readers see the file without what is new."""
+        return tuple(_identity(self.path.with_name(FILE_NAME + suffix)) for suffix in ("", "-wal", "-shm"))
 
     def _connected(self) -> sqlite3.Connection:
         if self._connection is None:
@@ -196,33 +257,4 @@ class Database:
         known = connection.execute("SELECT id FROM epochs").fetchone()
         if known is None:
             connection.execute("INSERT INTO epochs (id) VALUES (?)", (new_epoch,))
-        last = connection.execute("SELECT seq FROM sqlite_sequence WHERE name = 'estimates'").fetchone()
-        return Opened(new_epoch if known is None else known[0], 0 if last is None else last[0])
-
-    def _prune_old(self, connection: sqlite3.Connection, now_ns: int) -> int:
-        """Oldest first, ending at the first row young enough: a row's cost is paid once, not at every look.
-
-        Rows received before the clock was set have no known age: only the limit of size removes them.
-        """
-        cut_ns = now_ns - int(self._retention.max_age_s * NS_PER_S)
-        n_removed = 0
-        for table, stamp in (("estimates", "received_ns"), ("events", "t_ns")):
-            first_kept = connection.execute(
-                f"SELECT seq FROM {table} WHERE {stamp} >= ? ORDER BY seq LIMIT 1", (cut_ns,)
-            ).fetchone()
-            seq = (1 << 62) if first_kept is None else first_kept[0]
-            n_removed += connection.execute(
-                f"DELETE FROM {table} WHERE seq < ? AND {stamp} >= ?", (seq, _CLOCK_UNSET_NS)
-            ).rowcount
-        return n_removed
-
-    @staticmethod
-    def _prune_share(connection: sqlite3.Connection) -> int:
-        n_removed = 0
-        for table in ("estimates", "events"):
-            n_rows = connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
-            n_removed += connection.execute(
-                f"DELETE FROM {table} WHERE seq IN (SELECT seq FROM {table} ORDER BY seq LIMIT ?)",
-                (int(n_rows * _PRUNE_SHARE) + 1,),
-            ).rowcount
-        return n_removed
+        return Opened(new_epoch if known is None else known[0], _last_number(connection, "estimates"))

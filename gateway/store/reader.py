@@ -3,7 +3,7 @@
 import json
 import sqlite3
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any, Final
 from gateway.errors import StoreError
 from gateway.history import Delivery, Page
 from gateway.records import json_line
+from gateway.store import records
 from gateway.store.database import is_damaged
 from gateway.store.rows import EstimateRow
 from gateway.store.schema import connect_reader
@@ -43,29 +44,12 @@ class Event:
     detail: str
 
 
-@dataclass(frozen=True, slots=True)
-class _Window:
-    """Which rows are asked for."""
-
-    after_seq: int | None
-    since_ns: int
-    until_ns: int
-    newest_first: bool
-
-    def holds(self, row: EstimateRow) -> bool:
-        if not self.since_ns <= row.t_end_ns < self.until_ns:
-            return False
-        if self.after_seq is None:
-            return True
-        return row.seq < self.after_seq if self.newest_first else row.seq > self.after_seq
-
-
 class StoreReader:
     """Read-only view of a store, safe in any thread.
 
     Each question opens its own connection, so no handle outlives a database that was set aside. A
     question that takes longer than ``limit_s`` raises TimeoutError; a database that cannot be read
-    raises StoreError.
+    raises StoreError. ``on_damage``, ``on_bad_records`` and ``on_lost`` hear what a question met on its way.
     """
 
     def __init__(
@@ -74,12 +58,16 @@ class StoreReader:
         held: HeldEstimates,
         clock_ns: Callable[[], int],
         on_damage: Callable[[], None],
+        on_bad_records: Callable[[Sequence[int]], None],
+        on_lost: Callable[[], None],
         limit_s: float = QUERY_LIMIT_S,
     ) -> None:
         self._path = path
         self._held = held
         self._clock_ns = clock_ns
         self._on_damage = on_damage
+        self._on_bad_records = on_bad_records
+        self._on_lost = on_lost
         self._limit_s = limit_s
 
     def estimates(
@@ -100,15 +88,17 @@ class StoreReader:
         # What is held must be read before the file: a row that moves to disk meanwhile is then seen twice
         # and merged by its number, instead of not at all.
         epoch, held = self._held()
-        window = _Window(
+        window = records.Window(
             _seq_after(cursor, epoch),
-            _FIRST_NS if since_ns is None else _within_64_bits(since_ns),
-            _LAST_NS if until_ns is None else _within_64_bits(until_ns),
+            None if since_ns is None else _within_64_bits(since_ns),
+            None if until_ns is None else _within_64_bits(until_ns),
             newest_first,
         )
         with self._connection() as connection:
-            rows = {} if connection is None else _stored(connection, window, limit + 1, with_spectra)
+            found = ({}, []) if connection is None else records.page(connection, window, limit + 1, with_spectra)
+            rows, bad = found
             fresh = [row for row in held if window.holds(row) and not _is_stored(connection, row)]
+        self._tell_bad(bad)
         rows |= {row.seq: row.text if with_spectra else _without_spectra(row.text) for row in fresh}
         seqs = sorted(rows, reverse=newest_first)
         shown = seqs[:limit]
@@ -125,8 +115,10 @@ class StoreReader:
         """The last answer and the last rejection ever accepted."""
         _, held = self._held()
         with self._connection() as connection:
-            found = [_newest(connection, held, is_rejected) for is_rejected in (False, True)]
-        answer, rejection = found
+            answer, rejection = (
+                _newest_held(held, is_rejected) or self._newest_stored(connection, is_rejected)
+                for is_rejected in (False, True)
+            )
         return Latest(
             estimate=None if answer is None else answer[1],
             rejection=None if rejection is None else rejection[1],
@@ -152,10 +144,21 @@ class StoreReader:
             found = connection.execute("SELECT seq, n_pruned FROM uplinks WHERE name = ?", (uplink,)).fetchone()
             seq, n_pruned = found or (-1, 0)
             n_waiting, oldest_ns = connection.execute(
-                "SELECT count(*), min(received_ns) FROM estimates WHERE seq > ?", (seq,)
+                "SELECT count(*), CAST(min(received_ns) AS INTEGER) FROM estimates WHERE seq > ?", (seq,)
             ).fetchone()
         age_s = None if oldest_ns is None else max(0.0, (self._clock_ns() - oldest_ns) / NS_PER_S)
         return Delivery(f"{epoch[0]}-{seq}" if found and epoch else None, n_pruned, n_waiting, age_s)
+
+    def _newest_stored(self, connection: sqlite3.Connection | None, is_rejected: bool) -> tuple[int, str] | None:
+        if connection is None:
+            return None
+        answer, bad = records.newest(connection, is_rejected)
+        self._tell_bad(bad)
+        return answer
+
+    def _tell_bad(self, seqs: Sequence[int]) -> None:
+        if seqs:
+            self._on_bad_records(seqs)
 
     def _ask(self, sql: str, parameters: tuple[Any, ...]) -> list[tuple[Any, ...]]:
         with self._connection() as connection:
@@ -184,6 +187,8 @@ class StoreReader:
             return TimeoutError(f"the question took longer than {self._limit_s:g} s: ask for less at a time")
         if is_damaged(error):
             self._on_damage()
+        else:
+            self._on_lost()
         return StoreError(f"{self._path} cannot be read: {error}")
 
 
@@ -201,40 +206,16 @@ def _within_64_bits(t_ns: int) -> int:
     return min(max(t_ns, _FIRST_NS), _LAST_NS)
 
 
-def _stored(connection: sqlite3.Connection, window: _Window, limit: int, with_spectra: bool) -> dict[int, str]:
-    text = "text" if with_spectra else "json_remove(text, '$.spectra')"
-    beyond, order = ("<", "DESC") if window.newest_first else (">", "ASC")
-    is_timed = window.since_ns > _FIRST_NS or window.until_ns < _LAST_NS
-    index = "INDEXED BY estimates_by_time" if is_timed else "NOT INDEXED"
-    start = window.after_seq if window.after_seq is not None else (_LAST_NS if window.newest_first else _FIRST_NS)
-    sql = f"""
-        SELECT seq, {text} FROM estimates WHERE seq IN (
-            SELECT seq FROM estimates {index}
-            WHERE seq {beyond} ? AND t_end_ns >= ? AND t_end_ns < ? ORDER BY seq {order} LIMIT ?
-        )
-        """
-    return dict(connection.execute(sql, (start, window.since_ns, window.until_ns, limit)).fetchall())
-
-
 def _is_stored(connection: sqlite3.Connection | None, row: EstimateRow) -> bool:
     if connection is None:
         return False
     return connection.execute("SELECT 1 FROM estimates WHERE id = ?", (row.id,)).fetchone() is not None
 
 
-def _newest(
-    connection: sqlite3.Connection | None, held: tuple[EstimateRow, ...], is_rejected: bool
-) -> tuple[int, str] | None:
-    """(received_ns, text) of the newest row of one outcome."""
+def _newest_held(held: tuple[EstimateRow, ...], is_rejected: bool) -> tuple[int, str] | None:
+    """(received_ns, text) of the newest row of one outcome that is not on disk yet."""
     of_outcome = [row for row in held if row.is_rejected is is_rejected]
-    if of_outcome:
-        return of_outcome[-1].received_ns, of_outcome[-1].text
-    if connection is None:
-        return None
-    found: tuple[int, str] | None = connection.execute(
-        "SELECT received_ns, text FROM estimates WHERE is_rejected = ? ORDER BY seq DESC LIMIT 1", (is_rejected,)
-    ).fetchone()
-    return found
+    return (of_outcome[-1].received_ns, of_outcome[-1].text) if of_outcome else None
 
 
 def _without_spectra(text: str) -> str:

@@ -10,7 +10,7 @@ class EstimateRow:
 
     INSERT: ClassVar[str] = (
         "INSERT INTO estimates (seq, id, t_end_ns, vehicle_id, estimator, calibration_id, is_rejected, received_ns,"
-        " text) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING"
+        " text, checksum) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING"
     )
 
     seq: int

@@ -50,7 +50,28 @@ MIGRATIONS: Final[tuple[str, ...]] = (
         UPDATE uplinks SET n_pruned = n_pruned + 1 WHERE seq < OLD.seq;
     END;
     """,
+    # a sum for each estimate (null: from before there were sums), a place for those that fail it, and since when the
+    # wall clock is doubted
+    """
+    ALTER TABLE estimates ADD COLUMN checksum INTEGER;
+    CREATE TABLE damaged (
+        n INTEGER PRIMARY KEY AUTOINCREMENT,
+        seq INTEGER NOT NULL,
+        found_ns INTEGER NOT NULL,
+        id BLOB,
+        text BLOB
+    );
+    CREATE INDEX damaged_by_seq ON damaged (seq);
+    CREATE TABLE clock (one INTEGER PRIMARY KEY CHECK (one = 1), doubted_since_ns INTEGER);
+    DROP TRIGGER pruned_before_delivery;
+    CREATE TRIGGER pruned_before_delivery AFTER DELETE ON estimates
+    WHEN NOT EXISTS (SELECT 1 FROM damaged WHERE seq = OLD.seq)
+    BEGIN
+        UPDATE uplinks SET n_pruned = n_pruned + 1 WHERE seq < OLD.seq;
+    END;
+    """,
 )
+FIRST_WITH_SUMS: Final = 3
 
 
 def connect_writer(path: Path, migrations: Sequence[str] = MIGRATIONS) -> sqlite3.Connection:
@@ -77,6 +98,7 @@ def connect_reader(path: Path) -> sqlite3.Connection:
     """A connection that can only read. Raises sqlite3.OperationalError where there is no file."""
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, isolation_level=None, timeout=1.0)
     connection.execute("PRAGMA query_only = ON")
+    connection.text_factory = lambda text: text.decode("utf-8", "replace")  # a flipped bit must not end the question
     return connection
 
 

@@ -5,7 +5,8 @@ import secrets
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,14 +14,16 @@ from gateway.errors import StoreError
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
-from gateway.store.database import FILE_NAME, Database, Retention, is_damaged
+from gateway.store.database import FILE_NAME, Database, is_damaged
 from gateway.store.held import Held
 from gateway.store.reader import StoreReader
+from gateway.store.retention import Retention
 from gateway.store.rows import CalibrationRow, EstimateRow, EventRow
 
 IDLE_S: Final = 60.0  # without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5
 RETRY_LAST_S: Final = 30.0
+PAGE_OF_BAD: Final = 1000  # numbers of bad records that wait to be set aside; readers name them again
 
 
 class Store:
@@ -37,6 +40,8 @@ class Store:
         self._held = Held(retention.max_held, epoch=secrets.token_hex(4))
         self._closing = threading.Event()
         self._suspect = threading.Event()
+        self._lost = threading.Event()
+        self._bad_seqs: deque[int] = deque(maxlen=PAGE_OF_BAD)
         self._reason: str | None = None
         self._set_aside: str | None = None
         self._n_written = self._n_duplicates = self._n_pruned = self._size_bytes = 0
@@ -104,7 +109,14 @@ class Store:
 
     def reader(self) -> StoreReader:
         """Answers questions from any thread, from what is on disk and what is held."""
-        return StoreReader(self._path, self._held.estimates, self._clock_ns, self._suspect_damage)
+        return StoreReader(
+            self._path,
+            self._held.estimates,
+            self._clock_ns,
+            self._suspect_damage,
+            self._suspect_records,
+            self._suspect_loss,
+        )
 
     def health(self) -> StoreStatus:
         return StoreStatus(
@@ -117,6 +129,7 @@ class Store:
             n_pruned=self._n_pruned,
             size_bytes=self._size_bytes,
             set_aside=self._set_aside,
+            n_bad_records=self._database.n_bad_records,
         )
 
     def is_alive(self) -> bool:
@@ -137,6 +150,15 @@ class Store:
         self._suspect.set()
         self._held.wake()
 
+    def _suspect_loss(self) -> None:
+        """A reader found no file it could open: the next attempt looks whether ours is still the one there."""
+        self._lost.set()
+        self._held.wake()
+
+    def _suspect_records(self, seqs: Sequence[int]) -> None:
+        self._bad_seqs.extend(seqs)
+        self._held.wake()
+
     def _write_until_closed(self) -> None:
         pause_s = RETRY_FIRST_S
         while True:
@@ -154,7 +176,7 @@ class Store:
         self._database.close()
 
     def _has_other_work(self) -> bool:
-        return self._closing.is_set() or self._suspect.is_set()
+        return self._closing.is_set() or self._suspect.is_set() or self._lost.is_set() or bool(self._bad_seqs)
 
     def _try(self) -> bool:
         try:
@@ -167,10 +189,12 @@ class Store:
     def _attempt(self) -> bool:
         """Bring to disk what is held; False where the disk refuses, and then it is still held."""
         try:
+            self._lost.clear()
             self._open_if_closed()
             if self._suspect.is_set():
                 self._suspect.clear()
                 self._database.check()
+            self._set_bad_records_aside()
             self._commit()
         except sqlite3.Error as error:
             self._held.give_back()
@@ -187,6 +211,13 @@ class Store:
         if not self._has_numbers:
             self._held.rebase(opened.epoch, opened.last_seq)
             self._has_numbers = True
+
+    def _set_bad_records_aside(self) -> None:
+        seqs = set()
+        while self._bad_seqs:
+            seqs.add(self._bad_seqs.popleft())
+        for seq in self._database.set_records_aside(seqs, self._clock_ns()):
+            log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, seq=seq)
 
     def _commit(self) -> None:
         rows = self._held.take()

@@ -203,7 +203,13 @@ def test_a_question_that_takes_too_long_is_ended(tmp_path: Path) -> None:
         store.write_estimate(make_record(n))
     assert store.flush(PATIENCE_S)
     reader = StoreReader(
-        tmp_path / "springscale.db", held=lambda: ("ab", ()), clock_ns=lambda: 0, on_damage=lambda: None, limit_s=-1.0
+        tmp_path / "springscale.db",
+        held=lambda: ("ab", ()),
+        clock_ns=lambda: 0,
+        on_damage=lambda: None,
+        on_bad_records=lambda seqs: None,
+        on_lost=lambda: None,
+        limit_s=-1.0,
     )
     with pytest.raises(TimeoutError, match="ask for less"):
         reader.estimates(limit=5000, with_spectra=False)
