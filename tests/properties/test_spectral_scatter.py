@@ -4,13 +4,32 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gateway.calibration.ratio_index.band_map import rectangle_weights
 from gateway.calibration.ratio_index.scatter import bin_covariance, integral_covariance
 from gateway.core.ratio_index.index import SpectrumKind, mean_spectrum
 from gateway.records import F64
 
 N_SEGMENT, RATE_HZ, N_DRIVES = 256, 50.0, 400
 CENTRES_HZ = np.arange(1.5, 9.5, 1.0)
+
+
+def rectangle_weights(freq_hz: F64, centres_hz: F64, width_hz: float) -> F64:
+    """Weights (m, k) that average a spectrum (k,) over [f - w/2, f + w/2], as J of (4) and (5) does.
+
+    A bin stands for the frequencies half a bin to either side and counts by what the band covers of them.
+    """
+    bin_hz = freq_hz[1] - freq_hz[0]
+    low, high = centres_hz[:, None] - width_hz / 2.0, centres_hz[:, None] + width_hz / 2.0
+    covered = np.minimum(high, freq_hz + bin_hz / 2.0) - np.maximum(low, freq_hz - bin_hz / 2.0)
+    weights: F64 = np.maximum(covered, 0.0) / width_hz
+    return weights
+
+
+def test_weights_average_a_straight_line_to_its_value_in_the_middle() -> None:
+    freq_hz = np.arange(1, 205) * (50.0 / 1024)
+    for width_hz in (0.05, 0.17, 1.0):
+        weights = rectangle_weights(freq_hz, np.array([2.0, 5.03]), width_hz)
+        np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-9)
+        np.testing.assert_allclose(weights @ freq_hz, [2.0, 5.03], atol=0.03)
 
 
 def spectra_of_noise(kind: SpectrumKind, is_coloured: bool) -> tuple[F64, F64, float]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.reports.charts import Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts import Axis, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
 from gateway.reports.charts.chart import COLOURS
 from gateway.reports.charts.live import live, plotly_json, plotly_script
 from gateway.reports.charts.still import draw, save_still
@@ -50,16 +50,6 @@ def test_every_mark_is_drawn_by_both(mark: Mark) -> None:
     assert len(shown.data) + len(shown.layout.shapes) == 1
     (axes, *_) = draw(one).axes
     assert len(axes.lines) + len(axes.collections) + len(axes.patches) >= 1
-
-
-def test_a_map_is_drawn_by_both_with_a_bar_beside_its_own_panel() -> None:
-    cells = Cells(X, np.arange(2.0), np.arange(10.0).reshape(2, 5), "z", is_about_zero=True)
-    one = chart(panel(Line(X, X)), panel(cells))
-    heat = live(one).data[-1]
-    assert heat.type == "heatmap"
-    assert heat.zmid == 0.0
-    assert heat.colorbar.x == pytest.approx(live(one).layout.xaxis2.domain[1])
-    assert len(draw(one).axes) == 3  # two panels and the bar
 
 
 def test_numbers_reach_plotly_as_they_are() -> None:

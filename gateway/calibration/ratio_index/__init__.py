@@ -4,10 +4,9 @@ The method is whole, for comparison with the cross-spectral estimator: bands cho
 Table 2, the structures (9), (10) and (11), and a stepwise one by partial F-tests. What comes in are inspected
 known runs with their batches; what goes out is a RatioIndexCalibration for the core, with what the other runs
 teach without each run and its errors (``fit_ratio_index``); for the reports, the two indexes of known runs
-(``index_rows``) and J of (4) and (5) over all bands (``band_maps``).
+(``index_rows``).
 """
 
-from gateway.calibration.ratio_index.band_map import BandMap, band_maps
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.choice import Choice
 from gateway.calibration.ratio_index.fit import FamilyTrial, RatioIndexFit, fit_ratio_index
@@ -20,7 +19,6 @@ from gateway.calibration.ratio_index.table import N_SEGMENT
 __all__ = [
     "N_SEGMENT",
     "BandChoice",
-    "BandMap",
     "Choice",
     "FamilyTrial",
     "FittedRegression",
@@ -28,7 +26,6 @@ __all__ = [
     "RatioIndexFit",
     "Selection",
     "StructureChoice",
-    "band_maps",
     "fit_ratio_index",
     "fit_regression",
     "index_rows",

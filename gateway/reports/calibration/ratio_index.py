@@ -1,4 +1,4 @@
-"""The ratio index over load and share: its curves with the fitted model, its bands, and its coefficients."""
+"""The ratio index over load and share: its curves with the fitted model, its bands, and the regressions tried."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -6,12 +6,18 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index import IndexRows, RatioIndexFit, index_rows
+from gateway.calibration.ratio_index import (
+    FamilyTrial,
+    FittedRegression,
+    IndexRows,
+    RatioIndexFit,
+    Selection,
+    index_rows,
+)
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64
-from gateway.reports.calibration.bands import band_chart, model_table, steps_table, trials_table
-from gateway.reports.calibration.text import NONE
+from gateway.reports.calibration.text import NONE, decimal
 from gateway.reports.charts import Axis, Chart, Line, Mark, Marker, Panel, Points, Ribbon, Section, Table
 
 N_ALONG: Final = 60
@@ -23,7 +29,7 @@ QUARTILES: Final = "model, the other index at its quartiles"
 def ratio_index_section(
     fit: RatioIndexFit, identification: Sequence[KnownRun], validation: Sequence[KnownRun]
 ) -> Section:
-    """What every band could tell, R_a and R_g of every batch, the regression through them and how it was chosen."""
+    """R_a and R_g of every batch, the bands and the regression through them, and how both were chosen."""
     calibration = fit.calibration
     fitted, later = index_rows(identification, calibration), index_rows(validation, calibration)
     panels = []
@@ -39,13 +45,12 @@ def ratio_index_section(
         f"Ratio indexes over load and share. {len(fitted.run)} batches identify, {len(later.run)} validate.",
         tuple(panels),
     )
-    maps = band_chart(fit)
     return Section(
         "ratio-index",
         "Ratio index",
         (),
-        (*((maps,) if maps else ()), chart),
-        (_bands_table(calibration), trials_table(fit), *_model_tables(fit)),
+        (chart,),
+        (_bands_table(calibration), _trials_table(fit), *_model_tables(fit)),
     )
 
 
@@ -122,6 +127,63 @@ def _model_tables(fit: RatioIndexFit) -> Iterator[Table]:
     told = zip(("payload [kg]", "front share [%]"), choice.regressions, choice.selections, models, strict=True)
     for target, regression, selection, model in told:
         if regression is not None and model is not None:
-            yield model_table(target, regression, model.residual_std, model.dof)
+            yield _model_table(target, regression, model.residual_std, model.dof)
             if selection.steps:
-                yield steps_table(target, selection)
+                yield _steps_table(target, selection)
+
+
+def _trials_table(fit: RatioIndexFit) -> Table:
+    """Every family of regressions with its errors on runs that took no part in any choice."""
+    rows = tuple(
+        (
+            trial.choice.family + (" (chosen)" if trial is fit.chosen else ""),
+            _pairs(trial),
+            *(", ".join(one.model.terms) if one else NONE for one in trial.choice.regressions),
+            *_rms(trial),
+        )
+        for trial in fit.trials
+    )
+    return Table(
+        "Regressions tried: (9) and (10) single, both logarithms, (11) joint, and chosen stepwise. Errors are root "
+        "mean squares over runs for which bands and terms were chosen anew without them",
+        ("Family", "bands", "terms of payload", "terms of share", "payload", "share"),
+        rows,
+    )
+
+
+def _pairs(trial: FamilyTrial) -> str:
+    chosen = [pair for pair in trial.choice.pairs if pair is not None]
+    return "; ".join(" over ".join(f"{band.centre_hz:g} Hz" for band in pair.bands) for pair in chosen)
+
+
+def _rms(trial: FamilyTrial) -> tuple[str, str]:
+    payload_kg, share_pct = (None if np.isnan(rms) else rms for rms in trial.nested_rms)
+    return decimal(payload_kg, " kg", 1), decimal(share_pct, " pp")
+
+
+def _steps_table(target: str, selection: Selection) -> Table:
+    """How a stepwise choice came about."""
+    rows = tuple(
+        (step.action, step.term, f"{step.test.statistic:.3g}", f"{step.test.p_value:.2g}", f"{step.held_out_rms:.3g}")
+        for step in selection.steps
+    )
+    caption = (
+        f"Stepwise choice for {target}: partial F-tests over run means. The smallest of many p-values is small by "
+        "choice alone: they rank and stop, and prove nothing"
+    )
+    return Table(caption, ("Step", "term", "F", "p", "error on runs left out"), rows)
+
+
+def _model_table(target: str, regression: FittedRegression, residual_std: float, dof: float) -> Table:
+    """Coefficients with their jackknife standard deviations over runs."""
+    model, stds = regression.model, np.sqrt(np.diag(regression.covariance))
+    rows = tuple(
+        (term, f"{coefficient:.4g}", f"{std:.3g}", f"{coefficient / std:.1f}" if std > 0.0 else NONE)
+        for term, coefficient, std in zip(("constant", *model.terms), model.coefficients, stds, strict=True)
+    )
+    return Table(
+        f"Regression of {target}: terms scaled to -1..1 over what was seen, standard deviations by leaving runs out. "
+        f"An answer scatters by {residual_std:.3g} and more ({dof:g} degrees of freedom)",
+        ("Term", "coefficient", "standard deviation", "ratio"),
+        rows,
+    )

@@ -7,7 +7,6 @@ without knowing them: the same record gives the SVG file and the chart that answ
 from gateway.reports.charts.chart import (
     GREY,
     Axis,
-    Cells,
     Chart,
     Line,
     Mark,
@@ -24,7 +23,6 @@ from gateway.reports.charts.chart import (
 __all__ = [
     "GREY",
     "Axis",
-    "Cells",
     "Chart",
     "Line",
     "Mark",

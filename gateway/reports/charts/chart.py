@@ -59,17 +59,6 @@ class Ribbon:
     colour: int = 0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cells:
-    """A map: z (n, m) over x (m,) and y (n,), NaN where nothing is; ``title`` names z and its unit."""
-
-    x: F64
-    y: F64
-    z: F64
-    title: str
-    is_about_zero: bool = False
-
-
 @dataclass(frozen=True, slots=True)
 class Rule:
     """A straight line across the panel at x (vertical) or y."""
@@ -91,7 +80,7 @@ class Span:
     colour: int = GREY
 
 
-Mark = Line | Points | Ribbon | Cells | Rule | Span
+Mark = Line | Points | Ribbon | Rule | Span
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
 
-from gateway.reports.charts.chart import COLOURS, Axis, Cells, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts.chart import COLOURS, Axis, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
 
 _LEGEND_PX: Final = 90
 _GAP_PX: Final = 95
@@ -61,15 +61,12 @@ def _add_panel(figure: go.Figure, chart: Chart, panel: Panel, number: int, seen:
             _add_shape(figure, mark, named, place)
         else:
             figure.add_traces([{**trace, **named} for trace in _traces(mark)], rows=place["row"], cols=place["col"])
-            _place_colour_bar(figure, mark, number)
     figure.update_xaxes(**_axis(panel.x), **place)
     figure.update_yaxes(**_axis(panel.y), **place)
 
 
 def _named(mark: Mark, seen: set[str]) -> dict[str, Any]:
     """A label stands in the legend once and switches what bears it in every panel."""
-    if isinstance(mark, Cells):
-        return {}
     label = mark.label
     is_new = bool(label) and label not in seen
     seen.add(label)
@@ -105,19 +102,6 @@ def _add_shape(figure: go.Figure, mark: Rule | Span, named: dict[str, Any], plac
         add(mark.at, exclude_empty_subplots=False, **drawn, **named, **place)
 
 
-def _place_colour_bar(figure: go.Figure, mark: Mark, number: int) -> None:
-    """Beside its own panel, not all at the figure's right edge."""
-    if not isinstance(mark, Cells):
-        return
-    suffix = "" if number == 0 else str(number + 1)
-    x, y = figure.layout[f"xaxis{suffix}"].domain, figure.layout[f"yaxis{suffix}"].domain
-    middle, height = (y[0] + y[1]) / 2.0, y[1] - y[0]
-    figure.data[-1].colorbar = {
-        "title": {"text": mark.title, "side": "right"},
-        "x": x[1], "y": middle, "len": height, "thickness": 12, "xpad": 4,
-    }  # fmt: skip
-
-
 @singledispatch
 def _traces(mark: object) -> list[dict[str, Any]]:
     raise TypeError(f"no drawing for {type(mark).__name__}")
@@ -151,9 +135,3 @@ def _(mark: Ribbon) -> list[dict[str, Any]]:
     style = {"fill": "toself", "fillcolor": COLOURS[mark.colour], "opacity": _OPACITY, "line": {"width": 0}}
     around_x, around_y = [*mark.x, *mark.x[::-1]], [*mark.high, *mark.low[::-1]]
     return [{"type": "scatter", "mode": "lines", "x": around_x, "y": around_y, "hoverinfo": "skip", **style}]
-
-
-@_traces.register
-def _(mark: Cells) -> list[dict[str, Any]]:
-    middle = {"colorscale": "RdBu", "reversescale": True, "zmid": 0.0} if mark.is_about_zero else {}
-    return [{"type": "heatmap", "x": mark.x, "y": mark.y, "z": mark.z, "colorscale": "Viridis", **middle}]

@@ -4,13 +4,12 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Final
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from gateway.reports.charts.chart import COLOURS, Axis, Cells, Chart, Line, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts.chart import COLOURS, Axis, Chart, Line, Panel, Points, Ribbon, Rule, Span
 from gateway.reports.charts.figures import panels, save
 
 _INCHES_PER_PX: Final = 1.0 / 105.0
@@ -118,15 +117,6 @@ def _(mark: Points, axes: Axes, order: int) -> None:
 def _(mark: Ribbon, axes: Axes, order: int) -> None:
     axes.fill_between(mark.x, mark.low, mark.high, color=COLOURS[mark.colour], alpha=0.18, linewidth=0.0,
                       label=_legend(mark.label), zorder=order)  # fmt: skip
-
-
-@_draw_mark.register
-def _(mark: Cells, axes: Axes, order: int) -> None:
-    reach = float(np.nanmax(np.abs(mark.z))) if np.isfinite(mark.z).any() else 1.0
-    low = -reach if mark.is_about_zero else None
-    drawn = axes.pcolormesh(mark.x, mark.y, mark.z, cmap="RdBu_r" if mark.is_about_zero else "viridis", vmin=low,
-                            vmax=reach if mark.is_about_zero else None, rasterized=True)  # fmt: skip
-    axes.figure.colorbar(drawn, ax=axes, label=mark.title)
 
 
 @_draw_mark.register
