@@ -40,7 +40,7 @@ async function askTruth() {
   if (path) learn({ truth: (await load(path)).items });
 }
 
-const remembered = (record) => [record, ...known.batches.filter((batch) => batch.id !== record.id)].slice(0, MOST_BATCHES);
+const remembered = (record) => [record, ...(known.batches ?? []).filter((batch) => batch.id !== record.id)].slice(0, MOST_BATCHES);
 
 let asking = null;
 

@@ -85,6 +85,7 @@ function rejection(batch, reasons) {
 }
 
 show(({ batches, reasons }) => {
+  if (batches === null) return;
   const rejected = batches.filter((batch) => batch.rejected.length > 0).slice(0, N_SHOWN);
   const items = rejected.map((batch) => rejection(batch, reasons));
   element("rejected").replaceChildren(...(items.length ? items : [made("li", "None.")]));

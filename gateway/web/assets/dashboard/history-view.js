@@ -1,7 +1,7 @@
 // History: every batch with its 95 % band over time, as charts and as a table.
 
 import { known, show } from "/assets/dashboard/known.js";
-import { element, made, row } from "/assets/dashboard/page.js";
+import { element, made, row, write } from "/assets/dashboard/page.js";
 import { colour, plot } from "/assets/dashboard/plot.js";
 import { between, clock, figure, kmh, words } from "/assets/dashboard/words.js";
 
@@ -18,7 +18,7 @@ function local(iso) {
 }
 
 function shownBatches({ batches, hours }) {
-  if (!batches.length) return [];
+  if (!batches?.length) return [];
   const earliest = new Date(batches[0].t_end).getTime() - hours * HOUR_MS;
   return batches.filter((batch) => new Date(batch.t_end).getTime() > earliest).reverse();
 }
@@ -97,6 +97,7 @@ const floor = { overlaying: "y", range: [0, 1], visible: false, fixedrange: true
 function drawCharts() {
   const batches = shownBatches(known);
   element("history").classList.toggle("empty", !batches.length);
+  if (known.batches !== null) write("history-none", "No batch yet.");
   if (!batches.length) return;
   for (const [name, quantity] of Object.entries(QUANTITIES)) {
     element(`${name}-chart-words`).textContent = inWords(batches, quantity);
@@ -109,6 +110,7 @@ function drawCharts() {
 }
 
 function drawTable({ batches }) {
+  if (batches === null) return;
   const rows = batches.map((batch) => {
     const isRejected = batch.rejected.length > 0;
     return row([
@@ -121,7 +123,7 @@ function drawTable({ batches }) {
       isRejected ? `not weighed: ${batch.rejected.map(words).join(", ")}` : "weighed",
     ], isRejected ? "rejected" : "");
   });
-  if (rows.length) element("recent").replaceChildren(...rows);
+  element("recent").replaceChildren(...rows);
 }
 
 function drawLegend({ truth }) {

@@ -10,7 +10,7 @@ export const known = {
   spectra: null,
   tare: null, // GET /calibration/tare
   reasons: new Map(), // reason -> {happened, advice}
-  batches: [], // newest first, rejections included
+  batches: null, // newest first, rejections included
   early: null, // the provisional estimate of the batch under way
   truth: [], // known loads, where somebody knows them
   hours: 24, // how far back the history looks

@@ -6,11 +6,19 @@ import { ago, between, clock, figure, kmh, signed, withStd, words } from "/asset
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : `95 %: ${between(bounds, digits, unit)}`);
 
-function notes(latest) {
+/** What became of the last batch, where none was weighed yet, and what to do about it. */
+function noneYet(refusal, reasons) {
+  if (refusal == null) return "No estimate yet.";
+  const advice = refusal.rejected.map((reason) => reasons.get(reason)?.advice).filter(Boolean).map((text) => `${text.replaceAll("`", "")}.`);
+  const todo = advice.length ? ` What to do: ${advice.join(" ")}` : "";
+  return `No estimate yet. The last batch could not be weighed: ${refusal.rejected.map(words).join(", ")}.${todo}`;
+}
+
+function notes(latest, reasons) {
   const said = [];
   if (latest.is_stale) said.push("This estimate is old: the load may have changed since.");
   if (latest.provisional) said.push("Early value: the batch under way is not complete yet.");
-  if (latest.rejected.includes("no_estimate_yet")) said.push("No estimate yet.");
+  if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons));
   else if (latest.rejected.length) said.push(`No estimate: ${latest.rejected.map(words).join(", ")}.`);
   return said.join(" ");
 }
@@ -58,7 +66,7 @@ function announce(latest) {
   announcedId = latest.id;
 }
 
-show(({ latest, vehicle }) => {
+show(({ latest, vehicle, reasons, isReachable }) => {
   if (latest === null) return;
   const seen = vehicle?.calibration;
   writeNumber("payload", latest.payload_kg, 0, "kg");
@@ -72,11 +80,11 @@ show(({ latest, vehicle }) => {
   write("speed", kmh(latest.mean_speed_mps));
   element("tared").hidden = latest.tare_payload_kg == null;
   if (latest.tare_payload_kg != null) write("tared-by", `${signed(latest.tare_payload_kg, 0, "kg")}, ${signed(latest.tare_front_share_pct, 1, "points")}`);
-  element("latest").classList.toggle("stale", latest.is_stale);
-  say("note", notes(latest));
+  element("latest").classList.toggle("stale", latest.is_stale || isReachable === false);
+  say("note", notes(latest, reasons));
   document.title = latest.payload_kg == null ? "Springscale" : `${figure(latest.payload_kg, 0, "kg")} – Springscale`;
   showAge();
   announce(latest);
-}, "latest", "vehicle");
+}, "latest", "vehicle", "reasons", "isReachable");
 
 setInterval(() => known.latest && showAge(), 1000);

@@ -1,5 +1,6 @@
 // The dashboard: views first, then what fills them.
 
+import "/assets/dashboard/fold.js";
 import "/assets/dashboard/state-view.js";
 import "/assets/dashboard/load-view.js";
 import "/assets/dashboard/van-view.js";

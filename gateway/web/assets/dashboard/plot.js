@@ -66,21 +66,27 @@ function layout({ xaxis, yaxis, ...more }) {
   };
 }
 
-const wanted = new WeakMap(); // place -> what is to be drawn there next
+const wanted = new WeakMap(); // place -> [traces, shape] to be drawn there next
 
-/** Draws or redraws a chart, once numbers are on the page; of several wishes at a time, the last. */
+/** Draws or redraws a chart, once numbers are on the page and there is room for it; of several wishes, the last. */
 export async function plot(place, traces, shape) {
-  wanted.set(place, traces);
+  const wish = [traces, shape];
+  wanted.set(place, wish);
   await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
   try {
+    if (!place.checkVisibility()) return;
     const plotly = await library();
-    if (wanted.get(place) !== traces) return;
+    if (wanted.get(place) !== wish) return;
     await plotly.react(place, traces, layout(shape), CONFIG);
     place.dataset.drawn = "yes";
   } catch (error) {
     console.info(error.message);
   }
 }
+
+document.addEventListener("unfold", ({ target }) => {
+  for (const place of target.querySelectorAll(".chart")) if (wanted.has(place)) plot(place, ...wanted.get(place));
+});
 
 let palette = 0;
 document.addEventListener("themechange", () => learn({ palette: ++palette }));

@@ -107,6 +107,7 @@ function drawLegend(told) {
 }
 
 show(({ spectra: told }) => {
+  if (told !== null && told.id === null) write("spectra-of", "No batch yet.");
   if (!told?.spectra) return;
   if (!element("spectra-charts").children.length) element("spectra-charts").append(...PANELS.map(panel));
   write("spectra-of", caption(told));

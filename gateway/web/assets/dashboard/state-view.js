@@ -29,6 +29,7 @@ show((known) => {
   write("state-name", name);
   write("state-sentence", sentence);
   element("token").hidden = !known.isRefused;
+  element("cards").hidden = known.status === null; // nothing is claimed that nobody told
   if (known.status) {
     write("vehicle", known.status.vehicle_id ?? "");
     write("version", `version ${known.status.version}`);

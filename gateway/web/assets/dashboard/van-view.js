@@ -64,6 +64,9 @@ function inWords(weights) {
   return `Van from above. The load's centre lies ${number(place.position_m, 2)} m behind the front axle.`;
 }
 
+/** Weights and payload come in two answers: the load is drawn only where both are of one estimate. */
+const loadOf = (weights, latest) => (weights?.id === latest?.id ? weights?.load : null);
+
 function draw(vehicle, weights, latest) {
   const figures = vehicle.figures;
   const toX = (metres) => FRONT_X + (metres / figures.wheelbase_m) * (REAR_X - FRONT_X);
@@ -71,7 +74,7 @@ function draw(vehicle, weights, latest) {
   const fullKg = Math.max(vehicle.calibration?.payload_seen_kg[1] ?? 0, 1);
   drawing.append(
     ...body(),
-    ...load(weights?.load, latest?.payload_kg, fullKg, toX),
+    ...load(loadOf(weights, latest), latest?.payload_kg, fullKg, toX),
     ...sensor(figures, toX),
     ...axleLabel(FRONT_X, "front axle", weights?.front_axle),
     ...axleLabel(REAR_X, "rear axle", weights?.rear_axle),
@@ -91,9 +94,9 @@ function overloads(weights) {
   return named.filter(([, weight]) => weight.is_over_limit).map(([name]) => `${name} is over its limit.`).join(" ");
 }
 
-show(({ vehicle, weights, latest }) => {
+show(({ vehicle, weights, latest, isReachable }) => {
   if (vehicle?.figures) element("van").replaceChildren(draw(vehicle, weights, latest));
-  element("van").classList.toggle("stale", Boolean(latest?.is_stale));
+  element("van").classList.toggle("stale", Boolean(latest?.is_stale) || isReachable === false);
   if (!weights) return;
   const place = weights.load;
   element("weights").replaceChildren(
@@ -104,4 +107,4 @@ show(({ vehicle, weights, latest }) => {
   write("gross", weightInWords(weights.gross));
   element("gross").classList.toggle("over", weights.gross.is_over_limit);
   say("overload", overloads(weights));
-}, "vehicle", "weights", "latest");
+}, "vehicle", "weights", "latest", "isReachable");

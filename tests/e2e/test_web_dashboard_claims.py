@@ -1,0 +1,130 @@
+"""What the dashboard may not claim: an old number as new, "no batch" that nobody counted, a load of another batch."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.dashboard import STATUS, Watched, demo_calibration, furnished, weighed
+from support.estimates import make_estimate
+from support.web import Gateway, serving
+
+from gateway.records import Why
+from gateway.status import State
+from gateway.web import TokenFile
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
+expect = playwright.expect
+
+PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+MOST_SCREENS_ON_A_PHONE = 3.0
+
+
+@pytest.fixture
+def gateway(tmp_path: Path) -> Iterator[Gateway]:
+    with Gateway(tmp_path / "store", calibrated=demo_calibration()) as opened:
+        opened.status = STATUS
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Where a gateway with something to look at is; nobody changes it."""
+    with furnished(tmp_path_factory.mktemp("site")) as gateway, serving(gateway.app) as server:
+        yield server.url
+        gateway.board.close()
+
+
+@pytest.mark.parametrize("options", [{"viewport": {"width": 1240, "height": 800}}, PHONE], ids=["laptop", "phone"])
+def test_the_state_stays_in_view(site: str, browser: Any, options: dict[str, Any]) -> None:
+    page = browser.new_page(**options)
+    page.goto(site)
+    expect(page.locator("#calibrated")).to_contain_text("Wheelbase")
+    page.locator("footer").scroll_into_view_if_needed()
+    assert page.evaluate("scrollY") > 400
+    expect(page.locator("#state")).to_be_in_viewport(ratio=1.0)
+    page.close()
+
+
+def test_a_number_that_nobody_confirms_is_grey(gateway: Gateway, watched: Watched) -> None:
+    page = watched.page
+    gateway.publish(weighed(0, 270.0, 48.0, demo_calibration()))
+    with serving(gateway.app) as server:
+        page.goto(server.url)
+        expect(page.locator("#payload")).to_have_text("270 kg")
+        fresh = page.evaluate(NUMBERS_COLOUR)
+        gateway.board.close()
+    expect(page.locator("#state-name")).to_have_text("Offline")
+    assert page.evaluate(NUMBERS_COLOUR) != fresh
+    expect(page.locator("#van")).to_have_class(re.compile("stale"))
+
+
+NUMBERS_COLOUR = "getComputedStyle(document.getElementById('payload')).color"
+
+
+def test_a_locked_page_claims_nothing(tmp_path: Path, watched: Watched) -> None:
+    tokens = TokenFile(tmp_path / "tokens.json")
+    with Gateway(tmp_path / "store", tokens=tokens) as gateway, serving(gateway.app) as server:
+        gateway.publish(make_estimate(0))
+        watched.page.goto(server.url)
+        expect(watched.page.locator("#state-name")).to_have_text("Locked")
+        seen = watched.page.locator("body").inner_text()
+        assert not re.search("no batch|none|unknown|nothing", seen, re.IGNORECASE), seen
+        gateway.board.close()
+
+
+def test_without_scripts_it_shows_where_the_numbers_are_and_claims_nothing(site: str, browser: Any) -> None:
+    page = browser.new_page(java_script_enabled=False)
+    page.goto(site)
+    seen = page.locator("body").inner_text()
+    assert "This page needs JavaScript. The numbers are at /api/v1/estimates/latest." in seen
+    assert not re.search("no batch|none|unknown|loading|connecting|asking", seen, re.IGNORECASE), seen
+    page.close()
+
+
+def test_where_all_was_refused_the_reason_stands_beside_the_missing_number(gateway: Gateway, watched: Watched) -> None:
+    gateway.status = STATUS.model_copy(update={"state": State.COLLECTING})
+    gateway.publish(make_estimate(0, Why.TOO_SLOW))
+    with serving(gateway.app) as server:
+        watched.page.goto(server.url)
+        note = watched.page.locator("#note")
+        expect(note).to_contain_text("No estimate yet. The last batch could not be weighed: too slow.")
+        expect(note).to_contain_text("What to do: nothing; the next open road will do.")
+        gateway.board.close()
+
+
+def test_a_load_is_not_drawn_with_the_payload_of_another_estimate(gateway: Gateway, watched: Watched) -> None:
+    """A negative payload came before its weights did: the radius was the square root of a negative number."""
+    calibrated = demo_calibration()
+    gateway.publish(weighed(0, 270.0, 48.0, calibrated))
+    with serving(gateway.app) as server:
+        watched.page.goto(server.url)
+        expect(watched.page.locator("#van circle.load")).to_have_count(1)
+        gateway.publish(weighed(1, -14.0, 50.0, calibrated))
+        expect(watched.page.locator("#payload")).to_have_text("−14 kg")
+        expect(watched.page.locator("#van circle.load")).to_have_count(0)
+        assert [said for said in watched.complaints if "attribute" in said] == []
+        gateway.board.close()
+
+
+def test_a_phone_shows_the_load_and_folds_the_rest(site: str, browser: Any) -> None:
+    watched = Watched(browser, **PHONE)
+    page = watched.page
+    page.goto(site)
+    expect(page.locator("#payload-chart[data-drawn]")).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollHeight / innerHeight") < MOST_SCREENS_ON_A_PHONE
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["viewport"]["width"]
+    fold = page.get_by_role("button", name="What the springs say")
+    expect(fold).to_have_attribute("aria-expanded", "false")
+    expect(page.locator("#spectra-charts")).to_be_hidden()
+    fold.click()
+    expect(page.locator("#spectra-phase_rad[data-drawn]")).to_be_visible()
+    assert page.evaluate("document.querySelector('#spectra-phase_rad .main-svg').clientWidth") > 250
+    fold.click()
+    expect(page.locator("#spectra-charts")).to_be_hidden()
+    page.set_viewport_size({"width": 1240, "height": 800})
+    expect(page.locator("#spectra-charts")).to_be_visible()
+    expect(fold).to_have_count(0)
+    assert watched.complaints == []
+    page.close()
