@@ -1,10 +1,13 @@
 """Columns of frames: taken apart, put together."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
 
 import numpy as np
 
 from gateway.records import I64, Bool, Frames
+
+LAST_SECOND: Final = 9_223_372_035  # int64 nanoseconds reach no further
 
 
 def empty_frames(width: int) -> Frames:

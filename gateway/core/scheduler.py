@@ -13,15 +13,20 @@ from gateway.core.settings import BatchSettings
 from gateway.records import I64, Batch, Bool, Motion, Signal, Why, joined
 from gateway.units import NS_PER_S
 
-_MOVING = np.iinfo(np.int64).max  # "standing since never"
+_NEVER_NS = int(np.iinfo(np.int64).max)  # later than any stamp
+_MOVING = _NEVER_NS  # "standing since never"
 _SPEEDS = (Signal.SPEED, Signal.WHEEL_SPEED)
+_MOST_ROWS_PER_S = 3000  # of a window: no bus carries more of an inertial sensor; stamps that stand still would
+_MOST_ROWS = 1_500_000
+_LOOSE = 512  # rows come in small parts; so many become one, for a part costs more than the row in it
 
 
 class Scheduler:
     """Feed it rows in order of arrival; it yields a Batch whenever a window ends.
 
     A drive begins with the first row and ends after ``standstill_s`` of standstill, ``silence_s``
-    without a row, or a step back of the clock. Windows follow one another from its first row. After
+    without a row, a step back of the clock, or when its stamps stand all but still: a window holds no
+    more rows than a bus can carry in its time. Windows follow one another from its first row. After
     a standstill the next drive begins when the vehicle moves again. Rows that come later than their
     window are counted in ``n_late_rows``.
     """
@@ -30,6 +35,9 @@ class Scheduler:
         self._settings = settings
         self._traits = traits
         self._rows: list[Motion] = []
+        self._loose: list[Motion] = []
+        self._n_rows = 0
+        self._most_rows = min(_MOST_ROWS, round(settings.window_s * _MOST_ROWS_PER_S))
         self._drive_start_ns = 0
         self._window_start_ns = 0
         self._provisional_ns = 0
@@ -113,19 +121,24 @@ class Scheduler:
         while begin < len(rows):
             mark_ns = self._next_mark_ns()
             end = int(np.searchsorted(newest_ns, mark_ns, side="left"))
+            end = min(end, begin + self._most_rows - self._n_rows)
             if end > begin:
                 self._keep(rows.part(begin, end))
                 self._newest_ns = int(newest_ns[end - 1])
                 begin = end
             if begin < len(rows):
-                yield self._reach(mark_ns)
+                yield self._reach(mark_ns) if newest_ns[begin] >= mark_ns else self._overflow()
 
     def _keep(self, part: Motion) -> None:
         self.n_late_rows += int(np.count_nonzero(part.t_ns < self._window_start_ns))
-        self._rows.append(part)
+        self._n_rows += len(part)
+        self._loose.append(part)
+        if len(self._loose) == _LOOSE:
+            self._rows.append(joined(self._loose))
+            self._loose = []
 
     def _next_mark_ns(self) -> int:
-        window_end_ns = self._window_start_ns + self._ns(self._settings.window_s)
+        window_end_ns = min(self._window_start_ns + self._ns(self._settings.window_s), _NEVER_NS)
         return min(window_end_ns, self._provisional_ns) if self._settings.provisional_every_s else window_end_ns
 
     def _reach(self, mark_ns: int) -> Batch:
@@ -137,21 +150,29 @@ class Scheduler:
         self._begin_window(mark_ns)
         return batch
 
+    def _overflow(self) -> Batch:
+        """A window that holds all it may ends where it stands, by a nanosecond at least."""
+        t_end_ns = max(self._newest_ns or 0, self._window_start_ns + 1)
+        batch = self._build(t_end_ns, Why.TIME_STAMPS)
+        self._begin_window(t_end_ns)
+        return batch
+
     def _begin_drive(self, t_ns: int) -> None:
         self._drive_start_ns = self._newest_ns = t_ns
         self._still_since_ns = _MOVING
         self._begin_window(t_ns)
 
     def _begin_window(self, t_ns: int) -> None:
-        self._rows = [part.part(0, 0) for part in self._rows[:1]]  # a window without a row still has its signals
+        self._rows = [part.part(0, 0) for part in (*self._rows, *self._loose)[:1]]  # one without rows has signals too
+        self._loose, self._n_rows = [], 0
         self._window_start_ns = t_ns
         self._provisional_ns = t_ns + self._ns(self._settings.provisional_every_s)
 
     def _end_drive(self, t_end_ns: int, ended_by: Why | None = None) -> Iterator[Batch]:
-        t_end_ns = min(t_end_ns, self._window_start_ns + self._ns(self._settings.window_s))
+        t_end_ns = min(t_end_ns, self._window_start_ns + self._ns(self._settings.window_s), _NEVER_NS)
         if t_end_ns > self._window_start_ns:
             yield self._build(t_end_ns, ended_by)
-        self._rows = []
+        self._rows, self._loose, self._n_rows = [], [], 0
         self._newest_ns = None
 
     def _skip_until_moving(self, motion: Motion) -> int:
@@ -163,8 +184,9 @@ class Scheduler:
         return int(moving[0])
 
     def _build(self, t_end_ns: int, ended_by: Why | None = None, *, is_provisional: bool = False) -> Batch:
+        self._rows, self._loose = [joined([*self._rows, *self._loose])], []
         window = Window(self._window_start_ns, t_end_ns, self._drive_start_ns, ended_by, is_provisional)
-        return build_batch(joined(self._rows), window, self._settings, self._traits)
+        return build_batch(self._rows[0], window, self._settings, self._traits)
 
     @staticmethod
     def _ns(duration_s: float) -> int:

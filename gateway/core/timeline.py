@@ -4,12 +4,14 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
 
 from gateway.records import F64, I64, Bool
 from gateway.units import NS_PER_S
 
 PASSBAND_HZ = 16.0  # the estimators read up to 14 Hz
 STOPBAND_DB = 70.0
+FINEST_HZ = 1000.0  # no vehicle's inertial sensor is faster; stamps that say so must not cost memory for it
 
 
 def in_order_of_time(t_ns: I64) -> I64:
@@ -45,7 +47,7 @@ def onto_grid(t_ns: I64, x: F64, t_start_ns: int, n: int, rate_hz: float, gap_s:
     if len(t_ns) < 4:
         return np.full(n, np.nan)
     raw_rate_hz = sample_rate_hz(t_ns)
-    step = max(1, int(np.ceil(0.95 * raw_rate_hz / rate_hz)))
+    step = max(1, int(np.ceil(0.95 * min(raw_rate_hz, FINEST_HZ) / rate_hz)))
     t_s = (t_ns - t_start_ns) / NS_PER_S
     fine_s = np.arange((n - 1) * step + 1) / (rate_hz * step)
     fine = np.where(
@@ -95,7 +97,7 @@ def _low_pass(fine: F64, step: int, rate_hz: float) -> F64:
     known = np.where(unknown, 0.0, fine)
     padded = np.concatenate([2 * known[0] - known[half:0:-1], known, 2 * known[-1] - known[-2 : -half - 2 : -1]])
     smooth = np.convolve(padded, taps, mode="valid")
-    touched = np.convolve(unknown.astype(float), np.ones(2 * half + 1), mode="same") > 0.5
+    touched = maximum_filter1d(unknown.astype(np.uint8), 2 * half + 1, mode="constant")
     return np.where(touched, np.nan, smooth)
 
 

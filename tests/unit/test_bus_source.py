@@ -252,12 +252,13 @@ def test_options_an_interface_does_not_take_are_told():
     source.stop()
 
 
-def test_frames_without_a_stamp_are_stamped_on_receipt_and_counted():
+@pytest.mark.parametrize("stamp", [0.0, 1e300, float("nan"), float("inf")])
+def test_frames_without_a_stamp_are_stamped_on_receipt_and_counted(stamp):
     source = LiveSource("virtual", "unstamped", MAP)
     source.start()
     before_ns = time.time_ns()
     with can.Bus(interface="virtual", channel="unstamped", preserve_timestamps=True, ignore_config=True) as bus:
-        bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, data=bytes(4), timestamp=0.0))
+        bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, data=bytes(4), timestamp=stamp))
     received = source.inbox.drain(PATIENCE_S)
     source.stop()
     assert before_ns <= int(received.t_ns[0]) <= time.time_ns()

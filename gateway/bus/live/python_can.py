@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import can
 
+from gateway.bus.frames import LAST_SECOND
 from gateway.bus.live.receiver import Burst
 from gateway.bus.messages import ExactStamp, frames_of
 from gateway.bus.signals import IdFilter
@@ -45,7 +46,7 @@ class PythonCanReceiver:
     def _burst(self, messages: Sequence[can.Message]) -> Burst:
         data = [m for m in messages if not (m.is_error_frame or m.is_remote_frame)]
         errors = [m for m in messages if m.is_error_frame]
-        unstamped = [m for m in data if m.timestamp == 0.0]
+        unstamped = [m for m in data if not 0.0 < m.timestamp <= LAST_SECOND]
         for message in unstamped:
             message.timestamp = ExactStamp(time.time_ns())
         return Burst(

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Final
 
+from gateway.bus.frames import LAST_SECOND
 from gateway.bus.logs.report import LogReject
 from gateway.records import EXTENDED_ID
 from gateway.units import NS_PER_S
 
-LAST_SECOND: Final = 9_223_372_035  # int64 nanoseconds reach no further
 _TIME = re.compile(rb"\((\d{1,15})\.(\d{1,9})\)\s")
 _LINE = re.compile(
     rb"\((?P<seconds>\d{1,15})\.(?P<fraction>\d{1,9})\)\s+(?P<channel>[!-~]+)\s+(?P<id>[0-9A-Fa-f]+)"
@@ -62,7 +62,7 @@ def read_line(line: bytes) -> LineFrame | NotData | LogReject:
 
 
 def stamp_ns(seconds: bytes, fraction: bytes) -> int | None:
-    """Digits before and after the point as integer nanoseconds, exactly; None beyond the year 2262."""
+    """Digits before and after the point as integer nanoseconds, exactly; None beyond LAST_SECOND."""
     whole = int(seconds)
     return None if whole > LAST_SECOND else whole * NS_PER_S + int(fraction.ljust(9, b"0"))
 

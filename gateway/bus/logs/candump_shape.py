@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.bus.logs.candump_line import LAST_SECOND
+from gateway.bus.frames import LAST_SECOND
 from gateway.records import EXTENDED_ID, F64, I64, U8, U32, Bool, Frames
 from gateway.units import NS_PER_S
 

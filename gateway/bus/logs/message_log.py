@@ -10,6 +10,7 @@ from typing import Any, BinaryIO, Final, TextIO, cast
 import can
 from can.io.generic import MessageReader
 
+from gateway.bus.frames import LAST_SECOND
 from gateway.bus.logs.line_blocks import open_maybe_gzip
 from gateway.bus.logs.report import LogReject, LogReport
 from gateway.bus.messages import frames_of, message_id
@@ -80,6 +81,8 @@ def _ours(
             report.remote_frames += 1
         elif not is_same_channel(message.channel, channel):
             report.other_channel += 1
+        elif not abs(message.timestamp) <= LAST_SECOND:
+            report.reject(LogReject.BAD_TIME)
         else:
             yield message
 
