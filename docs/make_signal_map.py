@@ -37,6 +37,10 @@ A signal map is a TOML file that says which message of a CAN database carries wh
 database knows (bits, scale, unit, range, multiplexing) is taken from there. `springscale check-config` and every
 command that reads a map name each fault with its file and key. Axes and signs: [nomenclature](nomenclature.md).
 
+`springscale look LOG --output signals.toml` drafts one from a recorded drive: it lists who speaks and how often, says
+which shipped maps fit, finds the axis that reads 9.8 m/s² and the one that braking shows, and says what is lacking. It
+reads the databases beside the log, or those that `--dbc` names.
+
 ```toml
 dbc = ["springscale_reference.dbc"]
 

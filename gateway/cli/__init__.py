@@ -27,6 +27,7 @@ _COMMANDS = {
     "demo": ("gateway.cli.demo", "demo", "Run the whole service on a simulated drive: no hardware, no configuration."),
     "estimate": ("gateway.cli.estimate", "estimate", "Weigh from log files, one line per batch."),
     "evaluate": ("gateway.cli.evaluate", "evaluate", "Compare estimates with known loads: the error table."),
+    "look": ("gateway.cli.look", "look", "What an unknown log holds, and a first signal map from it."),
     "replay": ("gateway.cli.replay", "replay", "Send a log to a bus, paced by its time stamps."),
     "reproduce": (
         "gateway.cli.reproduce",

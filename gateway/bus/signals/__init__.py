@@ -4,20 +4,39 @@ A map with its DBC files comes in (``load_signal_map``); a ``Decoder`` turns fra
 and counts what it refuses, an ``Encoder`` goes the other way for the simulator. Units end at this border.
 """
 
+from gateway.bus.signals.bit_field import Coding
+from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, load_messages
 from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.encode import Encoder
-from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES, IdFilter
-from gateway.bus.signals.signal_map import SHIPPED_PREFIX, SignalMap, SignalMapFile, load_signal_map, shipped_map
+from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES, IdFilter, j1939_filter
+from gateway.bus.signals.samples import is_j1939_code
+from gateway.bus.signals.signal_map import (
+    SHIPPED_PREFIX,
+    SignalMap,
+    SignalMapFile,
+    load_signal_map,
+    shipped_databases,
+    shipped_map,
+    shipped_maps,
+)
 
 __all__ = [
     "CAN_FD_BYTES",
     "CLASSIC_BYTES",
     "SHIPPED_PREFIX",
+    "Coding",
+    "DatabaseMessage",
+    "DatabaseSignal",
     "Decoder",
     "Encoder",
     "IdFilter",
     "SignalMap",
     "SignalMapFile",
+    "is_j1939_code",
+    "j1939_filter",
+    "load_messages",
     "load_signal_map",
+    "shipped_databases",
     "shipped_map",
+    "shipped_maps",
 ]

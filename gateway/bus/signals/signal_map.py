@@ -80,6 +80,12 @@ def shipped_maps() -> tuple[str, ...]:
     return tuple(sorted(name.stem for name in names if name.suffix == ".toml"))
 
 
+def shipped_databases() -> tuple[Path, ...]:
+    """Paths of the DBC files that come with the package."""
+    folder = Path(str(files("gateway.dbc")))
+    return tuple(sorted(folder.glob("*.dbc")))
+
+
 def shipped_map(name: str) -> Path:
     """Path of a signal map that comes with the package. Raises SignalMapError naming those there are."""
     if name not in shipped_maps():

@@ -1,0 +1,14 @@
+"""What an unknown log holds, and whether a vehicle can be weighed from it.
+
+A log and databases come in; identifiers with their rates, the shipped signal maps that fit, the axis that carries
+gravity and a first signal map of one's own go out. Nothing is taken for granted but what the databases say.
+"""
+
+from gateway.offline.look.draft import write_draft
+from gateway.offline.look.fits import Fit
+from gateway.offline.look.heard import Heard
+from gateway.offline.look.look import Look, look
+from gateway.offline.look.readings import Described
+from gateway.offline.look.roles import Found
+
+__all__ = ["Described", "Fit", "Found", "Heard", "Look", "look", "write_draft"]

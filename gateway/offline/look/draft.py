@@ -1,0 +1,131 @@
+"""A first signal map: what was found, written down with how it is known, to be checked by a person."""
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from gateway.bus.signals import Coding, DatabaseSignal, load_signal_map, shipped_databases, shipped_map
+from gateway.errors import ConfigurationError, SpringscaleError
+from gateway.offline.look.look import Look
+from gateway.offline.look.readings import Described
+from gateway.offline.look.roles import Found
+from gateway.records import I64, Signal
+
+MOSTLY: Final = 0.5
+COUNTER_BITS: Final = range(2, 33)
+FIX_3D: Final = 3
+_COUNTER_WORDS: Final = ("counter", "count", "alive", "sequence", "seq")
+
+
+def write_draft(seen: Look, output: Path) -> tuple[Path, ...]:
+    """Write the map and, beside it, the databases it needs that come with the package; what was written, the map first.
+
+    Raises ConfigurationError where that would write over a file, SpringscaleError where nothing was found to write.
+    """
+    shipped = seen.shipped
+    if shipped is None and not any(found.role is Signal.VERTICAL_ACCELERATION for found in seen.found):
+        whole = [f"springscale:{fit.name}" for fit in seen.fits if fit.is_whole]
+        choice = f"{' and '.join(whole)} fit alike: take the one of your device" if whole else "; ".join(seen.lacking)
+        raise SpringscaleError(f"{output} is not written: {choice}")
+    text = _own_text(seen, output) if shipped is None else shipped_map(shipped.name).read_text(encoding="utf-8")
+    databases = [path for path in shipped_databases() if f'"{path.name}"' in text]
+    new = [output, *(output.parent / path.name for path in databases)]
+    taken = [path for path in new if path.exists()]
+    if taken:
+        raise ConfigurationError(f"{taken[0]}: is there already, and is not written over; name another --output")
+    for path in databases:
+        shutil.copyfile(path, output.parent / path.name)
+    output.write_text(text, encoding="utf-8")
+    load_signal_map(output)
+    return tuple(new)
+
+
+def _own_text(seen: Look, output: Path) -> str:
+    """The map of what was found."""
+    roles = {found.role: found for found in seen.found}
+    sources = dict.fromkeys(found.reading.described.message.source for found in seen.found)
+    up = roles[Signal.VERTICAL_ACCELERATION].reading.described
+    lines = [f"# A first signal map, drafted from {seen.log.name} by springscale look: look at what says CHECK."]
+    lines += [
+        f"# CHECK: is {name} the database of this device? Only identifiers and lengths say so."
+        for name in seen.unsure_databases
+    ]
+    lines += [f"# Still lacking: {what}" for what in seen.lacking]
+    lines.append(f"dbc = [{', '.join(_toml(_as_named(path, output)) for path in sources)}]")
+    if len({one.channel for one in seen.heard}) > 1:
+        lines.append(f"channel = {_toml(up.heard.channel or '')}")
+    if any(found.reading.described.by_group for found in seen.found):
+        lines.append("j1939 = true")
+    for found in seen.found:
+        lines += ["", *_entry(found)]
+    return "\n".join(lines) + "\n"
+
+
+def _as_named(path: Path, output: Path) -> str:
+    """A database as the map names it: those of the package are copied beside it."""
+    beside = path in shipped_databases() or path.resolve().parent == output.resolve().parent
+    return path.name if beside else path.resolve().as_posix()
+
+
+def _entry(found: Found) -> Iterator[str]:
+    signal = found.reading.signal
+    yield f"[signals.{found.role}] # {'' if found.is_sure else 'CHECK: '}{found.why}"
+    yield f"message = {_toml(found.reading.described.message.name)}"
+    yield f"signal = {_toml(signal.name)}"
+    if found.role in (Signal.SPEED, Signal.WHEEL_SPEED):
+        yield "latency_s = 0.0 # CHECK: how late the receiver tells it; 0.2 is usual where it sends five times a second"
+    else:
+        yield f"sign = {found.sign}"
+    condition = _valid_when(found.reading.described, signal)
+    if condition is not None:
+        yield f"valid_when = {{ {_toml_key(condition[0])} = {condition[1]} }}"
+    counter = _counter(found.reading.described)
+    if counter is not None and found.role in (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE):
+        yield f"counter = {_toml(counter)}"
+
+
+def _valid_when(described: Described, signal: DatabaseSignal) -> tuple[str, int] | None:
+    """The one flag of the message that says "valid" and mostly holds, or a GNSS fix that mostly is a full one."""
+    raw = {other.name: _raw(described, other) for other in described.message.signals.values() if other is not signal}
+    fields = {name: described.message.signals[name].field for name in raw}
+    valid = [
+        name for name, bits in raw.items()
+        if fields[name].length == 1 and "valid" in name.lower() and "invalid" not in name.lower()
+        and float(np.mean(bits == 1)) > MOSTLY
+    ]  # fmt: skip
+    if len(valid) == 1:
+        return valid[0], 1
+    for name, bits in raw.items():
+        if name.lower().startswith("fix") and bits.max() == FIX_3D and float(np.mean(bits == FIX_3D)) > MOSTLY:
+            return name, FIX_3D
+    return None
+
+
+def _counter(described: Described) -> str | None:
+    """The signal of the message that goes on by one from most frames to the next."""
+    for signal in described.message.signals.values():
+        is_named = any(word in signal.name.lower() for word in _COUNTER_WORDS)
+        if not is_named or signal.field.length not in COUNTER_BITS or signal.field.coding is Coding.FLOAT:
+            continue
+        steps = np.diff(_raw(described, signal)) % (1 << signal.field.length)
+        if len(steps) and float(np.mean(steps == 1)) > MOSTLY:
+            return signal.name
+    return None
+
+
+def _raw(described: Described, signal: DatabaseSignal) -> I64:
+    """Raw numbers (n,) of one signal in the frames of the right length."""
+    frames = described.heard.frames
+    return signal.field.bits(frames.payload[frames.length == described.message.length]).astype(np.int64)
+
+
+def _toml(text: str) -> str:
+    quoted = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{quoted}"'
+
+
+def _toml_key(name: str) -> str:
+    return name if name.replace("_", "").isalnum() and name.isascii() else _toml(name)

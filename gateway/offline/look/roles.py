@@ -1,0 +1,174 @@
+"""Which signal is which of ours: the axis that carries gravity, the one that braking shows, the one they leave.
+
+Gravity shows the axis that is up, and the horizontal acceleration that goes with the change of speed the one that lies
+along the vehicle. Left is up x forward (ISO 8855), and the rate about left is the pitch rate, by the right-hand rule
+that gyroscopes follow. A name that says "pitch" is believed before that.
+"""
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.core.batch import GRAVITY_TOLERANCE_MPS2
+from gateway.offline.look.readings import Reading
+from gateway.records import F64, Signal
+from gateway.units import STANDARD_GRAVITY_MPS2
+
+LEAST_CORRELATION: Final = 0.4
+LEAST_MOVING_S: Final = 60
+MOVING_MPS: Final = 3.0
+FASTEST_MPS: Final = 100.0  # what reads more is no road vehicle's speed
+_NO_SPEED: Final = re.compile(r"accura|error|std|dev|limit|vert|max|min|set|_[xyz]$", re.IGNORECASE)
+_SPEED: Final = re.compile(r"speed|vel|sog|spd", re.IGNORECASE)
+_WORDS: Final = {"vertical": "z", "longitudinal": "x", "forward": "x", "lateral": "y", "transverse": "y"}
+_AXES: Final = "xyz"
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A reading that carries one of our signals, its sign, and how that is known."""
+
+    role: Signal
+    reading: Reading
+    sign: int
+    why: str
+    is_sure: bool = True
+
+
+def roles_of(readings: Sequence[Reading]) -> tuple[Found, ...]:
+    """What could be told apart, in the order of Signal."""
+    speed = _speed(readings)
+    up = upright(readings)
+    found = [each for each in (up, speed) if each]
+    if up is not None:
+        forward = _forward(readings, up, speed)
+        found += [each for each in (forward, _pitch(readings, up, forward)) if each]
+    return tuple(sorted(found, key=lambda each: list(Signal).index(each.role)))
+
+
+def upright(readings: Iterable[Reading]) -> Found | None:
+    """The acceleration that reads gravity, the fastest of them."""
+    candidates = [r for r in readings if r.quantity == "acceleration" and _reads_gravity(r)]
+    if not candidates:
+        return None
+    best = max(candidates, key=lambda r: (round(r.rate_hz), -abs(abs(r.usual) - STANDARD_GRAVITY_MPS2)))
+    sign = 1 if best.usual > 0.0 else -1
+    return Found(Signal.VERTICAL_ACCELERATION, best, sign, f"reads {best.usual:+.2f} m/s2: this axis is vertical")
+
+
+def _reads_gravity(reading: Reading) -> bool:
+    return abs(abs(reading.usual) - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
+
+
+def tilt_deg(readings: Iterable[Reading], up: Found) -> float:
+    """How far the axis that is up leans, by what its message's other axes read; 0 where they are not told."""
+    beside = {r.usual for r in readings if _is_beside(r, up.reading) and math.isfinite(r.usual)}
+    return math.degrees(math.atan2(math.hypot(*beside), abs(up.reading.usual)))
+
+
+def _is_beside(reading: Reading, other: Reading) -> bool:
+    return reading is not other and reading.described is other.described and reading.quantity == other.quantity
+
+
+def axis_of(name: str) -> str:
+    """x, y or z as the last letter of a name says, or a word in it; empty where nothing says it."""
+    bare = name.rstrip("_0123456789")
+    if len(bare) > 1 and bare[-1] in "XYZ" and not bare[-2:].isupper():
+        return bare[-1].lower()
+    if re.search(r"(?:_|^)[xyzXYZ]$", bare) or re.search(r"(?i)(?:acc|gyro|rate|gyr|rot)[xyz]$", bare):
+        return bare[-1].lower()
+    return next((axis for word, axis in _WORDS.items() if word in name.lower()), "")
+
+
+def _forward(readings: Sequence[Reading], up: Found, speed: Found | None) -> Found | None:
+    """The horizontal acceleration that goes with the change of speed."""
+    beside = [r for r in readings if _is_beside(r, up.reading)]
+    if speed is None or not beside:
+        return None
+    found = [(correlation, r) for r in beside if math.isfinite(correlation := _with_braking(r, speed.reading))]
+    if not found:
+        return None
+    correlation, best = max(found, key=lambda pair: abs(pair[0]))
+    if abs(correlation) < LEAST_CORRELATION:
+        return None
+    where = "forward" if correlation > 0.0 else "rearward"
+    why = f"points {where}: goes with the change of speed (correlation {correlation:+.2f})"
+    return Found(Signal.LONGITUDINAL_ACCELERATION, best, 1 if correlation > 0.0 else -1, why)
+
+
+def _with_braking(acceleration: Reading, speed: Reading) -> float:
+    """Correlation with the slope of the speed, second by second while the vehicle moves; NaN where it hardly does."""
+    if len(speed.t_s) < LEAST_MOVING_S or len(acceleration.t_s) < LEAST_MOVING_S:
+        return math.nan
+    begin_s, end_s = max(speed.t_s[0], acceleration.t_s[0]), min(speed.t_s[-1], acceleration.t_s[-1])
+    n = int(end_s - begin_s)
+    if n < LEAST_MOVING_S:
+        return math.nan
+    speed_mps = np.interp(begin_s + 0.5 + np.arange(n), speed.t_s, speed.x)
+    slope = np.gradient(np.convolve(speed_mps, np.full(3, 1.0 / 3.0), mode="same"))
+    mean = _second_by_second(acceleration.t_s - begin_s, acceleration.x, n)
+    counts = (speed_mps > MOVING_MPS) & np.isfinite(mean)
+    counts[[0, -1]] = False
+    if np.count_nonzero(counts) < LEAST_MOVING_S or np.ptp(slope[counts]) == 0.0 or np.ptp(mean[counts]) == 0.0:
+        return math.nan
+    return float(np.corrcoef(mean[counts], slope[counts])[0, 1])
+
+
+def _second_by_second(t_s: F64, x: F64, n: int) -> F64:
+    """(n,) mean of the samples of each second; NaN where there are none."""
+    second = np.floor(t_s).astype(int)
+    inside = (second >= 0) & (second < n)
+    n_samples = np.bincount(second[inside], minlength=n)
+    total = np.bincount(second[inside], x[inside], minlength=n)
+    return np.where(n_samples > 0, total / np.maximum(n_samples, 1), np.nan)
+
+
+def _pitch(readings: Sequence[Reading], up: Found, forward: Found | None) -> Found | None:
+    """The rate about the axis that points left."""
+    rates = [r for r in readings if r.quantity == "angular_rate" and r.described.heard.channel == _channel(up)]
+    rates.sort(key=lambda r: (r.described is not up.reading.described, -round(r.rate_hz)))
+    axis, sign, is_sure = _left(up, forward)
+    named = next((r for r in rates if "pitch" in r.signal.name.lower() and "accel" not in r.signal.name.lower()), None)
+    if named is not None:
+        why = "its name says so; its sign is not: it must go up as braking begins, else sign = -1"
+        return Found(Signal.PITCH_RATE, named, 1, why, is_sure=False)
+    about = next((r for r in rates if axis and axis_of(r.signal.name) == axis), None)
+    if about is None:
+        return None
+    why = "the rate about left = up x forward"
+    unsure = "" if is_sure else "; that x points forward is a guess: no braking shows it"
+    return Found(Signal.PITCH_RATE, about, sign, why + unsure, is_sure)
+
+
+def _channel(found: Found) -> str | None:
+    return found.reading.described.heard.channel
+
+
+def _left(up: Found, forward: Found | None) -> tuple[str, int, bool]:
+    """The axis along left, its sign, and whether it was measured; with z up and nothing else known, x is forward."""
+    up_axis = axis_of(up.reading.signal.name)
+    ahead, ahead_sign = ("x", 1) if forward is None else (axis_of(forward.reading.signal.name), forward.sign)
+    if not up_axis or not ahead or up_axis == ahead:
+        return "", 1, False
+    turns = np.cross(up.sign * np.eye(3)[_AXES.index(up_axis)], ahead_sign * np.eye(3)[_AXES.index(ahead)])
+    left = int(np.argmax(np.abs(turns)))
+    return _AXES[left], int(np.sign(turns[left])), forward is not None
+
+
+def _speed(readings: Iterable[Reading]) -> Found | None:
+    """Speed over ground where there is one, else of the wheels."""
+    named = [r for r in readings if r.quantity == "speed" and _is_speed(r)]
+    if not named:
+        return None
+    best = min(named, key=lambda r: ("wheel" in r.name.lower(), "navig" not in r.name.lower(), -r.rate_hz))
+    role = Signal.WHEEL_SPEED if "wheel" in best.name.lower() else Signal.SPEED
+    return Found(role, best, 1, f"up to {np.max(best.x) * 3.6:.0f} km/h")
+
+
+def _is_speed(reading: Reading) -> bool:
+    is_named = _SPEED.search(reading.name) and not _NO_SPEED.search(reading.signal.name)
+    return bool(is_named and len(reading.x) and np.min(reading.x) > -1.0 and np.max(reading.x) < FASTEST_MPS)

@@ -1,0 +1,217 @@
+"""From an unknown log to a first signal map: what is heard, what fits, what points up, and what is lacking."""
+
+import json
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from support.bus_drive import bus_drive
+from support.encoded import encode_signals
+
+from gateway.bus.frames import merge_frames
+from gateway.bus.logs import write_candump
+from gateway.bus.messages import message_of
+from gateway.bus.signals import load_signal_map
+from gateway.cli import springscale
+from gateway.offline.look.roles import axis_of
+from gateway.records import Frames, Signal
+
+T0_NS = 1_790_000_000_000_000_000
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: A
+BO_ 512 BOX: 8 A
+ SG_ AccX : 0|12@1- (0.01,0) [0|0] "m/s^2" A
+ SG_ AccY : 12|12@1- (0.01,0) [0|0] "m/s^2" A
+ SG_ AccZ : 24|12@1- (0.01,0) [0|0] "m/s^2" A
+ SG_ Count : 36|4@1+ (1,0) [0|15] "" A
+BO_ 513 TURN: 6 A
+ SG_ GyroX : 0|16@1- (0.01,0) [0|0] "deg/s" A
+ SG_ GyroY : 16|16@1- (0.01,0) [0|0] "deg/s" A
+ SG_ GyroZ : 32|16@1- (0.01,0) [0|0] "deg/s" A
+BO_ 514 GPS: 3 A
+ SG_ Speed : 0|16@1+ (0.01,0) [0|0] "km/h" A
+ SG_ SpeedValid : 16|1@1+ (1,0) [0|1] "" A
+"""
+N = 12_000
+
+
+def run(*arguments: object) -> str:
+    found = CliRunner().invoke(springscale, ["look", *map(str, arguments)], catch_exceptions=False)
+    assert found.exit_code == 0, found.output
+    return found.stdout
+
+
+def seen(*arguments: object) -> dict[str, object]:
+    found: dict[str, object] = json.loads(run(*arguments, "--json"))
+    return found
+
+
+def packed(can_id: int, length: int, t_ns: np.ndarray, *fields: tuple[int, int, np.ndarray]) -> Frames:
+    """Frames whose little-endian fields (start bit, bits, raw numbers) are these."""
+    whole = np.zeros(len(t_ns), np.uint64)
+    for start, n_bits, raw in fields:
+        whole |= (np.rint(raw).astype(np.int64).astype(np.uint64) & np.uint64((1 << n_bits) - 1)) << np.uint64(start)
+    payload = whole.view(np.uint8).reshape(-1, 8)
+    return Frames(t_ns, np.full(len(t_ns), can_id, np.uint32), np.full(len(t_ns), length, np.uint8), payload.copy())
+
+
+def box_on_its_side(mps2: float = 9.8) -> Frames:
+    """A box whose y axis points down and whose z axis points rearward, in a car that brakes now and then."""
+    rng = np.random.default_rng(1)
+    t_s = np.arange(N) / 100.0
+    speed_mps = 14.0 + 5.0 * np.sin(2.0 * np.pi * t_s / 30.0)
+    ahead_mps2 = np.gradient(speed_mps, t_s)
+    noise = rng.standard_normal((3, N)) * 0.3
+    t_ns, gps_ns = T0_NS + np.arange(N) * 10_000_000, T0_NS + np.arange(N // 20) * 200_000_000
+    accelerations = [100.0 * x for x in (noise[0], noise[1] - mps2, noise[2] - ahead_mps2)]
+    return merge_frames(
+        [
+            packed(512, 8, t_ns, *[(12 * i, 12, x) for i, x in enumerate(accelerations)], (36, 4, np.arange(N) % 16)),
+            packed(513, 6, t_ns + 1, *[(16 * i, 16, 20.0 * rng.standard_normal(N)) for i in range(3)]),
+            packed(514, 3, gps_ns, (0, 16, 360.0 * speed_mps[::20]), (16, 1, np.ones(N // 20))),
+            packed(0x7E8, 8, T0_NS + np.arange(60) * 1_000_000_000),
+        ]
+    )
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("box")
+    (folder / "box.dbc").write_text(DBC)
+    write_candump(box_on_its_side(), "can3", folder / "drive.log.gz")
+    return folder / "drive.log.gz"
+
+
+def test_a_box_on_its_side_is_mapped_by_gravity_and_braking(box: Path, tmp_path: Path) -> None:
+    output = box.parent / "signals.toml"
+    told = run(box, "--output", output)
+    assert "BOX.AccY: -9.80 m/s2  reads -9.80 m/s2: this axis is vertical" in told
+    assert "BOX.AccZ: +0." in told or "BOX.AccZ: -0." in told
+    assert "points rearward: goes with the change of speed" in told
+    assert "This can work." in told
+    mapped = {m.signal: m for message in load_signal_map(output).messages for m in message.signals}
+    # up = -y, forward = -z, left = up x forward = y x z = x
+    assert (mapped[Signal.VERTICAL_ACCELERATION].dbc_signal, mapped[Signal.VERTICAL_ACCELERATION].to_si) == ("AccY", -1)
+    assert mapped[Signal.PITCH_RATE].dbc_signal == "GyroX"
+    assert mapped[Signal.PITCH_RATE].to_si == pytest.approx(np.pi / 180.0)
+    assert mapped[Signal.LONGITUDINAL_ACCELERATION].dbc_signal == "AccZ"
+    assert mapped[Signal.LONGITUDINAL_ACCELERATION].to_si == -1
+    assert mapped[Signal.VERTICAL_ACCELERATION].counter is not None
+    assert len(mapped[Signal.SPEED].valid_when) == 1
+    assert "signals" not in {path.name for path in tmp_path.iterdir()}
+
+
+def test_who_speaks_how_often_and_how_long(box: Path) -> None:
+    heard = {one["id"]: one for one in seen(box)["identifiers"]}
+    assert {name: (one["lengths"], one["message"]) for name, one in heard.items()} == {
+        "200": ([8], "BOX"), "201": ([6], "TURN"), "202": ([3], "GPS"), "7E8": ([8], None)
+    }  # fmt: skip
+    assert [heard[name]["rate_hz"] for name in ("200", "202", "7E8")] == pytest.approx([100.0, 5.0, 1.0], abs=0.05)
+    assert {one["channel"] for one in heard.values()} == {"can3"}
+
+
+def test_a_map_is_not_written_over(box: Path) -> None:
+    mine = box.parent / "mine.toml"
+    mine.write_text("mine")
+    found = CliRunner().invoke(springscale, ["look", str(box), "--output", str(mine)])
+    assert isinstance(found.exception, Exception)
+    assert "is there already" in str(found.exception)
+    assert mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize("suffix", [".log", ".asc", ".blf", ".csv", ".trc"])
+def test_a_shipped_map_that_fits_is_named_and_copied_whatever_the_kind_of_log(suffix: str, tmp_path: Path) -> None:
+    log, frames = tmp_path / f"drive{suffix}", bus_drive(30.0, seed=3)
+    if suffix == ".log":
+        write_candump(frames, "can0", log)
+    else:
+        with can.Logger(log) as writer:
+            for row in range(len(frames)):
+                message = message_of(frames, row)
+                message.channel, message.timestamp = 1, float(message.timestamp)
+                writer.on_message_received(message)
+    told = seen(log, "--output", tmp_path / "signals.toml")
+    fits = [one for one in told["maps"] if one["fits"]]
+    assert [one["name"] for one in fits] == ["springscale:reference"]
+    assert fits[0]["vertical_mps2"] == pytest.approx(9.81, abs=0.05)
+    assert told["can_work"]
+    assert load_signal_map(tmp_path / "signals.toml").signals == load_signal_map("springscale:reference").signals
+    assert [Path(path).name for path in told["written"]] == ["signals.toml", "springscale_reference.dbc"]
+
+
+def test_a_j1939_device_is_found_whatever_its_address(tmp_path: Path) -> None:
+    drive = bus_drive(30.0, seed=3, signals="springscale:j1939")
+    moved = Frames(drive.t_ns, (drive.can_id & ~np.uint32(0xFF)) | np.uint32(0x55), drive.length, drive.payload)
+    write_candump(moved, "can0", tmp_path / "drive.log")
+    told = seen(tmp_path / "drive.log")
+    assert "springscale:j1939" in [one["name"] for one in told["maps"] if one["fits"]]
+    assert all(one["database"] == "j1939.dbc" for one in told["identifiers"])
+
+
+def test_two_channels_are_two(tmp_path: Path) -> None:
+    first, second = bus_drive(20.0, seed=3), bus_drive(20.0, seed=4)
+    write_candump(first, "can0", tmp_path / "a.log")
+    write_candump(second, "can1", tmp_path / "b.log")
+    lines = [*(tmp_path / "a.log").read_text().splitlines(), *(tmp_path / "b.log").read_text().splitlines()]
+    (tmp_path / "both.log").write_text("\n".join(sorted(lines)) + "\n")
+    heard = seen(tmp_path / "both.log")["identifiers"]
+    assert [(one["channel"], one["id"]) for one in heard] == [
+        (channel, name) for channel in ("can0", "can1") for name in ("120", "121", "130")
+    ]
+
+
+def of_reference(samples: dict[Signal, float], t_ns: np.ndarray) -> Frames:
+    signals = load_signal_map("springscale:reference")
+    constant = {signal: np.full(len(t_ns), x) for signal, x in samples.items()}
+    return encode_signals(signals, dict.fromkeys(constant, t_ns), constant)
+
+
+@pytest.mark.parametrize(
+    ("mps2", "rate_hz", "words"),
+    [
+        (0.0, 100.0, "no acceleration reads 9.8 m/s2"),
+        (9.8, 20.0, "comes 20 times a second; 40 are needed"),
+    ],
+)
+def test_what_stands_in_the_way_is_said(mps2: float, rate_hz: float, words: str, tmp_path: Path) -> None:
+    (tmp_path / "box.dbc").write_text(DBC)
+    whole = box_on_its_side(mps2)
+    is_kept = np.ones(len(whole), bool) if rate_hz == 100.0 else whole.t_ns % 50_000_000 < 2
+    thinned = Frames(whole.t_ns[is_kept], whole.can_id[is_kept], whole.length[is_kept], whole.payload[is_kept])
+    write_candump(thinned, "can0", tmp_path / "drive.log")
+    told = run(tmp_path / "drive.log")
+    assert "This cannot work yet:" in told
+    assert words in told
+
+
+def test_an_unknown_sensor_asks_for_its_database(tmp_path: Path) -> None:
+    write_candump(packed(0x321, 8, T0_NS + np.arange(500) * 10_000_000), "can0", tmp_path / "drive.log")
+    told = seen(tmp_path / "drive.log")
+    assert not told["can_work"]
+    assert told["lacking"] == [
+        "no database describes an acceleration in it: give the DBC of the sensor with --dbc"
+    ]  # fmt: skip
+
+
+def test_a_database_of_another_device_is_no_certainty(tmp_path: Path) -> None:
+    """The shipped reference layout with its valid flags down: who knows whose frames these are?"""
+    drive = bus_drive(30.0, seed=3)
+    payload = drive.payload.copy()
+    payload[drive.can_id < 0x130, 7] = 0
+    write_candump(Frames(drive.t_ns, drive.can_id, drive.length, payload), "can0", tmp_path / "drive.log")
+    assert "if springscale_reference.dbc describes your device" in run(tmp_path / "drive.log")
+
+
+@pytest.mark.parametrize(
+    ("name", "axis"),
+    [
+        ("AccelX", "x"), ("AngularRateZ", "z"), ("acc_y", "y"), ("ACC_Z", "z"), ("GYROY", "y"),
+        ("VerticalAcceleration", "z"), ("LateralAcceleration", "y"), ("RateY2", "y"), ("Energy", ""), ("Speed", ""),
+    ],
+)  # fmt: skip
+def test_axes_are_told_by_their_names(name: str, axis: str) -> None:
+    assert axis_of(name) == axis
