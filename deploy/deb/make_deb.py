@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from fnmatch import fnmatch
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -31,6 +32,8 @@ PYTHON: Final = f"python{sys.version_info.major}.{sys.version_info.minor}"
 
 VEHICLE_LOCK: Final = PROJECT / "requirements.txt"
 DESK_LOCK: Final = PROJECT / "requirements-workbench.txt"  # all of the vehicle's, and more
+UNIMPORTED: Final = frozenset(("narwhals", "plotly"))  # of the vehicle's: only reports import them, ...
+STAYING: Final = ("plotly/package_data/plotly.min.js", "plotly-*.dist-info/*")  # ... the dashboard shows this one file
 PINNED: Final = re.compile(r"^([a-z0-9][a-z0-9._-]*)==", re.MULTILINE)
 SOURCES: Final = ("gateway", "dbc", "pyproject.toml", "README.md", "LICENSE")
 
@@ -137,10 +140,15 @@ def install(tree: Path, architecture: str) -> None:
 
 def part(tree: Path, desk: Path) -> None:
     """Move what only the workbench needs from one tree to the other."""
-    of_desk = pinned(DESK_LOCK) - pinned(VEHICLE_LOCK)
+    names = of_desk()
     for found in distributions(path=[str(tree)]):
-        if normal_name(found) in of_desk:
+        if normal_name(found) in names:
             move(found, tree, desk)
+
+
+def of_desk() -> frozenset[str]:
+    """Names of the distributions that a vehicle does without."""
+    return pinned(DESK_LOCK) - pinned(VEHICLE_LOCK) | UNIMPORTED
 
 
 def pinned(lock: Path) -> frozenset[str]:
@@ -149,9 +157,11 @@ def pinned(lock: Path) -> frozenset[str]:
 
 
 def move(found: Distribution, tree: Path, desk: Path) -> None:
-    """The files of one distribution, wherever it recorded them."""
+    """The files of one distribution, wherever it recorded them, but for those that stay."""
     for file in found.files or ():
         source = tree / file
+        if any(fnmatch(str(file), pattern) for pattern in STAYING):
+            continue
         if source.is_file() and tree in source.resolve().parents:
             (desk / file).parent.mkdir(parents=True, exist_ok=True)
             source.rename(desk / file)

@@ -18,7 +18,6 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 PROJECT: Final = Path(__file__).resolve().parents[2]
-VENDORED: Final = Path("gateway/web/vendored/vendored.json")
 LOCKS: Final = {"vehicle": "requirements.txt", "workbench": "requirements-workbench.txt"}
 CYCLONEDX: Final = "1.6"
 
@@ -80,31 +79,12 @@ def timeless(archive: bytes, epoch_s: int) -> bytes:
 
 
 def bill_of_materials(tree: Path, lock: str) -> str:
-    """CycloneDX: every locked package with its hashes, and the scripts of others that lie in the wheel."""
+    """CycloneDX: every locked package with its hashes."""
     command = [sys.executable, "-W", "ignore", "-m", "cyclonedx_py", "requirements", lock, "--pyproject", "pyproject.toml"]
     options = ["--mc-type", "application", "--output-reproducible", "--of", "JSON", "--sv", CYCLONEDX]
     made = subprocess.run([*command, *options], cwd=tree, capture_output=True, text=True, check=True).stdout
     bill: dict[str, Any] = json.loads(made)
-    bill["components"] += [component_of(each) for each in json.loads((tree / VENDORED).read_text())]
     return json.dumps(bill, indent=2, sort_keys=True) + "\n"
-
-
-def component_of(vendored: dict[str, Any]) -> dict[str, Any]:
-    """One entry of vendored.json as CycloneDX has it."""
-    purl = f"pkg:npm/{vendored['npm']}@{vendored['version']}"
-    files = [
-        {"type": "file", "name": name, "hashes": [{"alg": "SHA-256", "content": content}]}
-        for name, content in vendored["sha256"].items()
-    ]
-    return {
-        "type": "library",
-        "bom-ref": purl,
-        "purl": purl,
-        "name": vendored["npm"],
-        "version": vendored["version"],
-        "licenses": [{"license": {"id": vendored["licence"]}}],
-        "components": files,
-    }
 
 
 if __name__ == "__main__":

@@ -1,10 +1,9 @@
-"""The charts' library, plotly.js, as it lies in vendored/: kept by browsers, packed on the wire."""
+"""The charts' library, plotly.js, as the installed plotly package ships it: kept by browsers, packed on the wire."""
 
 import gzip
-import json
 import re
 from functools import cache
-from importlib.resources import files
+from importlib.metadata import distribution
 from pathlib import Path
 from typing import Final
 
@@ -12,10 +11,9 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
-VENDORED: Final = Path(str(files("gateway.web"))) / "vendored"
-LIBRARY: Final = VENDORED / "plotly/plotly-basic.min.js"
-_VERSIONS: Final = {each["folder"]: each["version"] for each in json.loads((VENDORED / "vendored.json").read_text())}
-LIBRARY_URL: Final = f"/assets/plotly-{_VERSIONS['plotly']}.min.js"
+_PLOTLY: Final = distribution("plotly")  # found by its metadata: importlib.resources would import it
+LIBRARY: Final = Path(str(_PLOTLY.locate_file("plotly/package_data/plotly.min.js")))
+LIBRARY_URL: Final = f"/assets/plotly-{_PLOTLY.version}.min.js"
 _KEPT: Final = {"cache-control": "public, max-age=31536000, immutable", "vary": "accept-encoding"}
 _MEDIA_TYPE: Final = "text/javascript; charset=utf-8"
 _STYLE_ID: Final = re.compile(rb'getElementById\("([0-9a-f]{64})"\)')
@@ -40,5 +38,5 @@ async def library_response(request: Request) -> Response:
 
 @cache
 def _packed() -> bytes:
-    """Packed once, when first asked for: about 0.4 MB instead of 1.2."""
+    """Packed once, when first asked for: about 1.5 MB instead of 4.8."""
     return gzip.compress(LIBRARY.read_bytes(), compresslevel=6, mtime=0)

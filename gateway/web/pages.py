@@ -1,4 +1,4 @@
-"""Pages for people: the dashboard and the API's own documentation, every file from this package."""
+"""Pages for people: the dashboard and the API's own documentation, every file from an installed package."""
 
 from importlib.resources import files
 from pathlib import Path
@@ -9,10 +9,11 @@ from fastapi import FastAPI
 from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
 
-from gateway.web.charting import LIBRARY_URL, VENDORED, library_response, style_ids
+from gateway.web.charting import LIBRARY_URL, library_response, style_ids
 from gateway.web.door.headers import content_security_policy
 
 ASSETS: Final = Path(str(files("gateway.web"))) / "assets"
+SWAGGER_FILES: Final = Path(str(files("fastapi_offline"))) / "static"
 
 
 def install(app: FastAPI, known_loads_path: str = "") -> None:
@@ -33,4 +34,4 @@ def install(app: FastAPI, known_loads_path: str = "") -> None:
 
     app.add_route(LIBRARY_URL, library_response, include_in_schema=False)
     app.mount("/assets", StaticFiles(directory=ASSETS), name="assets")
-    app.mount("/swagger", StaticFiles(directory=VENDORED / "swagger-ui"), name="swagger")
+    app.mount("/swagger", StaticFiles(directory=SWAGGER_FILES), name="swagger")

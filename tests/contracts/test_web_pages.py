@@ -49,7 +49,7 @@ def test_every_file_the_page_names_is_there(client: Client) -> None:
     assert [path for path in named if client.get(path).status_code != 200] == []
 
 
-def test_the_library_is_that_of_the_package_packed_or_not(client: Client) -> None:
+def test_the_library_is_that_of_the_installed_package_packed_or_not(client: Client) -> None:
     plain = client.get(LIBRARY_URL, headers={"accept-encoding": "identity"})
     packed = client.get(LIBRARY_URL, headers={"accept-encoding": "gzip"})
     assert plain.content == packed.content == LIBRARY.read_bytes()
