@@ -1,32 +1,35 @@
 # Every target does its own set-up: a machine with Python 3.11 (venv, pip) and make is enough.
-# PYTHON=python3.12 make test builds with another interpreter.
+# PYTHON=python3.12 make test builds with another interpreter, make demo PORT=8001 serves on another port.
 PYTHON ?= python3
+PORT := 8000
 BIN := .venv/bin
+PIP := $(BIN)/pip --disable-pip-version-check
 
 .PHONY: demo test check bench deb dist soak test-vm vm-image vcan lock docs site screenshots clean
 .DEFAULT_GOAL := demo
 
 .venv/bin/python:
+	@echo "Setting up .venv, once; pip tells how far it is."
 	$(PYTHON) -m venv .venv
 
 # What builds the package is locked too: nothing is fetched without a hash.
 .venv/.build: requirements-build.txt | .venv/bin/python
-	$(BIN)/pip install --quiet --require-hashes -r requirements-build.txt
+	$(PIP) install --require-hashes -r requirements-build.txt
 	touch $@
 
 # The package itself, with the workbench, is installed in place: the code is read from here, so only its metadata makes
 # a new set-up.
 .venv/.package: requirements-workbench.txt pyproject.toml .venv/.build
-	$(BIN)/pip install --quiet --require-hashes -r requirements-workbench.txt
-	$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
+	$(PIP) install --require-hashes -r requirements-workbench.txt
+	$(PIP) install --no-deps --no-build-isolation --editable .
 	touch $@
 
 .venv/.development: requirements-dev.txt .venv/.package
-	$(BIN)/pip install --quiet --require-hashes -r requirements-dev.txt
+	$(PIP) install --require-hashes -r requirements-dev.txt
 	touch $@
 
 demo: .venv/.package
-	$(BIN)/springscale demo
+	$(BIN)/springscale demo --port $(PORT)
 
 # A whole file stays on one worker: compiled code and servers are shared inside it. Small matrices: more threads only cost.
 test: .venv/.development

@@ -2,13 +2,29 @@
 
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from gateway.errors import ConfigurationError
 
 Model = TypeVar("Model", bound=BaseModel)
+
+_BEYOND: Final = {  # pydantic's type of fault -> (its words, the bound's name in the fault)
+    "less_than_equal": ("is above", "le"),
+    "less_than": ("is not below", "lt"),
+    "greater_than_equal": ("is below", "ge"),
+    "greater_than": ("is not above", "gt"),
+}
+_TAKEN_FOR: Final = (  # (end of the key, factor to its unit, what the number was probably in); the first that fits
+    ("_m", 0.001, "millimetres"),
+    ("_m", 0.01, "centimetres"),
+    ("_kg", 0.001, "grams"),
+    ("_kg", 1000.0, "tonnes"),
+    ("_pct", 100.0, "a fraction"),
+    ("_mps", 1.0 / 3.6, "km/h"),
+    ("_s", 0.001, "milliseconds"),
+)
 
 
 def read_toml(path: Path, error: type[ConfigurationError] = ConfigurationError) -> dict[str, Any]:
@@ -59,6 +75,27 @@ def _what(fault: dict[str, Any]) -> str:
         return "unknown key; remove it or check its spelling"
     if fault["type"] == "missing":
         return "missing; it must be given"
+    if fault["type"] in _BEYOND:
+        return _beyond(fault)
     message = fault["msg"].removeprefix("Value error, ")
     shown = repr(fault.get("input"))
     return message if fault["type"] == "value_error" or len(shown) > 60 else f"{message} (it says {shown})"
+
+
+def _beyond(fault: dict[str, Any]) -> str:
+    """ "1240 is above 30: millimetres?" """
+    said, name = _BEYOND[fault["type"]]
+    number, bound = fault["input"], fault["ctx"][name]
+    key = next((part for part in reversed(fault["loc"]) if isinstance(part, str)), "")
+    unit = _taken_for(key, number, bound) if isinstance(number, int | float) else None
+    return f"{number} {said} {bound:g}" + (f": {unit}?" if unit else "")
+
+
+def _taken_for(key: str, number: float, bound: float) -> str | None:
+    """The unit in which ``number`` would keep the bound, and not be a speck."""
+    for end, factor, unit in _TAKEN_FOR:
+        meant = factor * number
+        keeps_it = meant > bound if number < bound else meant < bound
+        if key.endswith(end) and keeps_it and abs(meant) >= 1.0:
+            return unit
+    return None

@@ -1,8 +1,9 @@
 """From inspected drives to a calibration file."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.metadata import version
 
 import numpy as np
@@ -25,6 +26,8 @@ from gateway.calibration.ratio_index import BandChoice, RatioIndexFit, Structure
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch
+
+OnFit = Callable[[str, int, int], None]  # (estimator, steps done, steps in all)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,7 @@ def calibrate_inspected(
     bands: BandChoice = "campaign",
     structure: StructureChoice = "auto",
     command: str = "",
+    on_fit: OnFit = lambda name, done, of: None,
 ) -> Outcome:
     """Fits every named estimator on the identification parts of the runs without a fault.
 
@@ -63,7 +67,7 @@ def calibrate_inspected(
     split = inspection.usable
     runs = [one.identification for one in split]
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
-    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, bands, structure)
+    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, bands, structure, on_fit)
     with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
     speeds = [batch.mean_speed_mps for batch in counted]
     file = CalibrationFile(
@@ -89,17 +93,21 @@ def _fit(
     campaign: Campaign,
     bands: BandChoice,
     structure: StructureChoice,
+    on_fit: OnFit,
 ) -> tuple[RatioIndexFit | None, CrossSpectrumFit | None, list[str]]:
     """What each named estimator learned, and a warning for each that these runs cannot carry."""
     ratio_index: RatioIndexFit | None = None
     cross_spectrum: CrossSpectrumFit | None = None
     warnings: list[str] = []
     for name in estimators:
+        progress = partial(on_fit, name)
         try:
             if name == "ratio_index":
-                ratio_index = fit_ratio_index(runs, campaign.vehicle, bands=bands, structure=structure)
+                ratio_index = fit_ratio_index(
+                    runs, campaign.vehicle, bands=bands, structure=structure, progress=progress
+                )
             else:
-                cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle)
+                cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle, progress)
                 warnings.extend(cross_spectrum.calibration.warnings)
         except CalibrationImpossibleError as fault:
             warnings.append(f"{name}: {fault}")

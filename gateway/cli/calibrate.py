@@ -16,7 +16,7 @@ from gateway.calibration.judgement import LearningCurve, curve_of
 from gateway.calibration.plan import LoadPlan, plan_first, plan_next
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
-from gateway.cli.progress import counted
+from gateway.cli.progress import counted, on_share
 from gateway.cli.text.inspection import inspection_json, inspection_sentences
 from gateway.cli.text.plan import plan_sentences
 from gateway.config import ESTIMATOR_NAMES
@@ -84,14 +84,16 @@ def calibrate(
         raise CalibrationImpossibleError(f"{campaign}: {inspection.refusal}; the findings say what to mend")
     if only_checks:
         return
-    outcome = calibrate_inspected(
-        loaded,
-        inspection,
-        estimators=estimators or ESTIMATOR_NAMES,
-        bands=bands,
-        structure=structure,
-        command=shlex.join(["springscale", *sys.argv[1:]]),
-    )
+    with counted("fitting") as on_step:
+        outcome = calibrate_inspected(
+            loaded,
+            inspection,
+            estimators=estimators or ESTIMATOR_NAMES,
+            bands=bands,
+            structure=structure,
+            command=shlex.join(["springscale", *sys.argv[1:]]),
+            on_fit=on_share(on_step, estimators or ESTIMATOR_NAMES),
+        )
     if output is not None:
         _write(output, outcome.file)
     if report is not None:

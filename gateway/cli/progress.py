@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
 from typing import Final, Protocol
@@ -50,3 +50,13 @@ def counted(label: str) -> Iterator[Steps]:
             progress.update(done - progress.pos)
 
         yield on_step
+
+
+def on_share(on_step: Steps, parts: Sequence[str]) -> Callable[[str, int, int], None]:
+    """One bar for ``parts`` that each tell (name, steps done, steps in all): every part is as long as the others."""
+
+    def on_part(name: str, done: int, of: int) -> None:
+        percent = 100 * parts.index(name) + 100 * done // of
+        on_step(percent, 100 * len(parts), f"fitting {name.replace('_', ' ')}")
+
+    return on_part

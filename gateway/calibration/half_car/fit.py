@@ -66,20 +66,23 @@ def fit_cross_spectrum(
     known = known_spectra(runs, vehicle)
     prior = prior_of(vehicle)
     can_leave_out = len(known) >= LEAST_RUNS_TO_LEAVE_ONE_OUT
-    n_steps = 1 + len(known) * can_leave_out
-    found = _best_fit(known, prior)
-    _tell(progress, 1, n_steps)
+    n_steps = len(_STARTS) + len(known) * can_leave_out
+    tried: list[Found] = []
+    for shift in _STARTS:
+        tried.append(fit_half_car(known, prior, prior.start(*shift)))
+        _tell(progress, len(tried), n_steps)
+    found = min(tried, key=lambda one: one.cost)  # the posterior need not have one peak
     calibration = half_car_calibration(known, vehicle, found)
     if not can_leave_out:
         return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
     errors: list[_LeftOut] = []
     without: dict[int, CrossSpectrumCalibration] = {}
-    for left_out, one in enumerate(known):
+    for left_out, one in enumerate(known, 1):
         others = [k for k in known if k is not one]
         refound = fit_half_car(others, prior, found.x)
         without[one.run.number] = half_car_calibration(others, vehicle, refound)
         errors.extend(_left_out_errors(one, without[one.run.number]))
-        _tell(progress, 2 + left_out, n_steps)
+        _tell(progress, len(_STARTS) + left_out, n_steps)
     payload_z, share_z, misfits, payload_kg, share_pct, reach = np.array([astuple(one) for one in errors]).T
     of_payload, of_share = inflation_of(payload_z, reach), inflation_of(share_z, reach)
 
@@ -100,11 +103,6 @@ def fit_cross_spectrum(
 def _tell(progress: Callable[[int, int], None] | None, done: int, n_steps: int) -> None:
     if progress is not None:
         progress(done, n_steps)
-
-
-def _best_fit(known: list[KnownSpectra], prior: Prior) -> Found:
-    """The best of several starts: the posterior need not have one peak."""
-    return min((fit_half_car(known, prior, prior.start(*shift)) for shift in _STARTS), key=lambda found: found.cost)
 
 
 def fit_half_car(known: Sequence[KnownSpectra], prior: Prior, start: F64) -> Found:

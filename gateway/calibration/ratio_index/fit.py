@@ -6,7 +6,7 @@ the run that is then judged. By it the families of structures are compared, and 
 is widened where it demands so.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
@@ -82,10 +82,14 @@ def fit_ratio_index(
     *,
     bands: BandChoice = "campaign",
     structure: StructureChoice = "auto",
+    progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> RatioIndexFit:
-    """Identification runs -> calibration. Raises CalibrationImpossibleError where they cannot carry one."""
+    """Identification runs -> calibration. Raises CalibrationImpossibleError where they cannot carry one.
+
+    ``progress`` is called with (steps done, steps in all).
+    """
     table = spectrum_table(runs)
-    trials = _family_trials(table, vehicle, bands, FAMILIES if structure == "auto" else (structure,))
+    trials = _family_trials(table, vehicle, bands, FAMILIES if structure == "auto" else (structure,), progress)
     chosen = trials[0]
     batches = [batch for run in runs for batch in run.batches if not batch.rejected]
     speeds_mps = [batch.mean_speed_mps for batch in batches]
@@ -117,7 +121,11 @@ def fit_ratio_index(
 
 
 def _family_trials(
-    table: SpectrumTable, vehicle: Vehicle, bands: BandChoice, families: Sequence[Family]
+    table: SpectrumTable,
+    vehicle: Vehicle,
+    bands: BandChoice,
+    families: Sequence[Family],
+    progress: Callable[[int, int], None],
 ) -> tuple[FamilyTrial, ...]:
     """Every family these runs can carry, the best first: most targets told, then least nested error."""
     _check(table)
@@ -128,8 +136,15 @@ def _family_trials(
             f"no regression ({', '.join(families)}) can be made of {table.n_runs} runs with {table.n_loads} payloads "
             f"and {table.n_shares} front shares: drive another known load"
         )
-    folds = _folds(table, bands)
-    trials = [_trial(table, folds, choice, vehicle) for choice in choices]
+    n_steps = table.n_runs + len(choices)
+    folds: list[Fold] = []
+    for done, fold in enumerate(_folds(table, bands), 1):
+        folds += fold
+        progress(done, n_steps)
+    trials: list[FamilyTrial] = []
+    for choice in choices:
+        trials.append(_trial(table, folds, choice, vehicle))
+        progress(table.n_runs + len(trials), n_steps)
     return tuple(sorted(trials, key=lambda trial: _rank(trial, vehicle)))
 
 
@@ -145,16 +160,16 @@ def _check(table: SpectrumTable) -> None:
         )
 
 
-def _folds(table: SpectrumTable, bands: BandChoice) -> list[Fold]:
-    """One for each run without which bands can still be chosen."""
-    folds: list[Fold] = []
+def _folds(table: SpectrumTable, bands: BandChoice) -> Iterator[list[Fold]]:
+    """For each run the fold without it, or none where no bands can be chosen then."""
     for number in np.unique(table.run):
+        folds: list[Fold] = []
         is_out = table.run == number
         rest = table.rows(~is_out)
         if rest.n_loads > 1:
             with suppress(CalibrationImpossibleError):
                 folds.append((is_out, rest, candidates(rest, bands)))
-    return folds
+        yield folds
 
 
 def _trial(table: SpectrumTable, folds: Sequence[Fold], choice: Choice, vehicle: Vehicle) -> FamilyTrial:
