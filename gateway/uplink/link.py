@@ -33,7 +33,15 @@ class Answer:
     reason: str
 
 
-_HOPELESS: Final = {"Packet too large", "Payload format invalid"}  # MQTT 5, table 2-6: 0x95, 0x99
+_TOO_LARGE: Final = 0x95  # MQTT 5, table 2-6
+_HOPELESS: Final = frozenset({_TOO_LARGE, 0x99})  # and payload format invalid
+_NOTHING: Final = 0  # no packet has this number
+
+# mosquitto answers a message over its limit with 0x95, which MQTT 5 has not among those of PUBACK, and so neither paho
+ReasonCode.names = {
+    **ReasonCode.names,
+    _TOO_LARGE: {"Packet too large": [PacketTypes.CONNACK, PacketTypes.PUBACK, PacketTypes.DISCONNECT]},
+}
 
 
 class MqttLink:
@@ -48,19 +56,28 @@ class MqttLink:
         self._answers: list[Answer] = []
         self._connack: ReasonCode | None = None
         self._loss: str | None = None
+        self._most_bytes: int | None = None  # the broker's Maximum Packet Size
+        self._under_way = _NOTHING
         self._client = self._make_client()
         self._connect()
         self._announce(birth)
 
     def send(self, letter: Letter) -> int:
-        """Hand a letter to the broker -> the number its answer will carry."""
+        """Hand a letter to the broker -> the number its answer will carry. What it said is too large is not sent."""
+        if self._most_bytes is not None and len(letter.text.encode()) > self._most_bytes:
+            self._answers.append(Answer(_NOTHING, False, True, f"larger than the broker's {self._most_bytes} bytes"))
+            return _NOTHING
         said = {"ContentType": "application/json", "PayloadFormatIndicator": 1, "UserProperty": [("id", letter.id)]}
-        return self._publish("estimates", letter.text, properties=_properties(PacketTypes.PUBLISH, said))
+        self._under_way = self._publish("estimates", letter.text, properties=_properties(PacketTypes.PUBLISH, said))
+        return self._under_way
 
     def turn(self, timeout_s: float) -> list[Answer]:
-        """Read and write what the socket allows -> answers that came; returns at the first that moves."""
-        code = self._client.loop(timeout_s)
-        if code != mqtt.MQTT_ERR_SUCCESS or self._loss is not None:
+        """Read and write what the socket allows -> answers that came; returns at the first that moves.
+
+        A broker may give its last answer by ending the connection: then that comes first, and LinkError with the next.
+        """
+        code = self._client.loop(0.0 if self._answers else timeout_s)
+        if not self._answers and (code != mqtt.MQTT_ERR_SUCCESS or self._loss is not None):
             raise LinkError(self._loss or mqtt.error_string(code))
         answers, self._answers = self._answers, []
         return answers
@@ -136,15 +153,22 @@ class MqttLink:
             raise LinkError(self._loss or mqtt.error_string(sent.rc))
         return sent.mid
 
-    def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, code: ReasonCode, _told: Any) -> None:
+    def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, code: ReasonCode, told: Any) -> None:
         self._connack = code
+        self._most_bytes = getattr(told, "MaximumPacketSize", None)
 
     def _on_disconnect(self, _client: Any, _userdata: Any, _flags: Any, code: ReasonCode, _told: Any) -> None:
         self._loss = f"the connection to {self._settings.broker} was lost: {code}"
+        if code.value in _HOPELESS and self._under_way != _NOTHING:
+            self._answer(self._under_way, code)
 
     def _on_publish(self, _client: Any, _userdata: Any, mid: int, code: ReasonCode, _told: Any) -> None:
-        reason = str(code)
-        self._answers.append(Answer(mid, not code.is_failure, reason in _HOPELESS, reason))
+        self._answer(mid, code)
+
+    def _answer(self, mid: int, code: ReasonCode) -> None:
+        if mid == self._under_way:
+            self._under_way = _NOTHING
+        self._answers.append(Answer(mid, not code.is_failure, code.value in _HOPELESS, str(code)))
 
 
 def _properties(packet: int, fields: Mapping[str, Any]) -> Properties:

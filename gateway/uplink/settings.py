@@ -3,9 +3,12 @@
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from gateway.config import UplinkSection, VehicleSection
 from gateway.errors import ConfigurationError
+
+MOST_NAME_BYTES: Final = 65_535
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +59,18 @@ class UplinkSettings:
         if self.password_file is None:
             return None
         try:
-            return self.password_file.read_text(encoding="utf-8").strip()
+            password = self.password_file.read_text(encoding="utf-8").strip()
         except (OSError, UnicodeDecodeError) as fault:
             raise ConfigurationError(f"[uplink] password_file {self.password_file} cannot be read: {fault}") from None
+        _check_name("password_file's password", password)
+        return password
 
 
 def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSettings | None:
-    """What [uplink] says of this vehicle; None without a host. Raises ConfigurationError for a topic MQTT forbids."""
+    """What [uplink] says of this vehicle; None without a host.
+
+    Raises ConfigurationError for a name MQTT forbids, and for a vehicle without a name of its own.
+    """
     if section.host is None:
         return None
     topic = section.topic.replace("{vehicle_id}", vehicle.id)
@@ -80,6 +88,24 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
         keep_alive_s=section.keep_alive_s,
         back_off_max_s=section.back_off_max_s,
     )
+    names = {"topic": f"{topic}/estimates", "client_id": settings.client_id, "username": settings.username}
+    for name, text in names.items():
+        _check_name(name, text)
     settings.tls_context()  # a wrong file is told at the start
     settings.password()
+    if vehicle.id == VehicleSection().id:
+        raise ConfigurationError(
+            f"[uplink] host is set, but [vehicle] id is {vehicle.id!r}, that of every vehicle that was given none: "
+            "two of them would cut each other's link; set [vehicle] id to a name of its own"
+        )
     return settings
+
+
+def _check_name(name: str, text: str | None) -> None:
+    """MQTT writes the length of a name in two bytes, and the name in UTF-8 (MQTT 5, 1.5.4)."""
+    try:
+        n_bytes = len((text or "").encode())
+    except UnicodeEncodeError:
+        raise ConfigurationError(f"[uplink] {name} is no text that UTF-8 can hold") from None
+    if n_bytes > MOST_NAME_BYTES:
+        raise ConfigurationError(f"[uplink] {name} has {n_bytes} bytes, MQTT allows {MOST_NAME_BYTES}: make it shorter")
