@@ -113,11 +113,12 @@ class Motion:
         return self.t_ns[known], column[known]
 
     def counter_of(self, signal: Signal) -> I64 | None:
-        """Message counters (m,) of the samples that ``of`` gives; None where the signal has none."""
+        """Message counters (m,) of the samples that ``of`` gives; None where not every one has its own."""
         if signal not in self.signals or signal not in self.counters:
             return None
         known = np.isfinite(self.columns[:, self.signals.index(signal)])
-        return self.counters[signal][known].astype(np.int64)
+        counter = self.counters[signal][known]
+        return counter.astype(np.int64) if np.isfinite(counter).all() else None
 
     def rows(self, chosen: Bool | slice) -> "Motion":
         """The chosen rows, in the order they have."""

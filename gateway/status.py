@@ -158,7 +158,7 @@ class Status(_Told):
         """The state in words, with what is wrong beside it."""
         said = [SENTENCES[self.state]]
         if self.state is State.SENSOR_FAULT and (
-            silent := [s.signal.replace("_", " ") for s in self.signals if s.is_silent]
+            silent := [f"{s.signal.replace('_', ' ')}{self._why_silent(s.signal)}" for s in self.signals if s.is_silent]
         ):
             said.append(f"Silent: {', '.join(silent)}.")
         if self.state is State.READER_FAULT and self.bus.last_fault:
@@ -171,3 +171,12 @@ class Status(_Told):
             said.append(f"Not connected to the fleet's broker ({self.uplink.last_fault}); estimates wait.")
         said += [f"{warning[:1].upper()}{warning[1:]}." for warning in self.warnings]
         return " ".join(said)
+
+    def _why_silent(self, signal: str) -> str:
+        """No frame of its message, or frames and never a valid sample; empty where it was heard before."""
+        counts = {row.reason: row.n for row in self.decode if row.signal == signal}
+        n_refused = sum(n for reason, n in counts.items() if reason != "ok")
+        if not counts or counts.get("ok"):
+            return ""
+        reasons = " and ".join(reason.replace("_", " ") for reason, n in counts.items() if n and reason != "ok")
+        return f" ({n_refused} frames came, all {reasons})" if n_refused else " (no frame of its message)"

@@ -1,6 +1,7 @@
 """A campaign's drives: read, cut into identification and validation, inspected, calibrated from and judged by."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
@@ -17,7 +18,8 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
 from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
-from gateway.records import Motion
+from gateway.offline.look import why_silent
+from gateway.records import Motion, Signal
 from gateway.units import NS_PER_S
 
 Split = Literal["identification", "validation", "all"]
@@ -71,9 +73,17 @@ def _split_run(
         start_s=run.start_s,
         span_ns=(int(motion.t_ns.min()), int(motion.t_ns.max())) if len(motion) else None,
         damage=_damage(report),
+        silent=_silent(log, motion, signal_map),
     )
     facts = row_facts(motion, signal_map.traits)
     return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)
+
+
+def _silent(log: Path, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:
+    """Why mapped inertial signals have no sample to speak of."""
+    wanted = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
+    silent = [signal for signal in wanted if signal in motion.signals and len(motion.of(signal)[1]) < 2]
+    return {signal: why_silent(log, signal_map, signal) for signal in silent}
 
 
 def _damage(report: LogReport) -> str | None:

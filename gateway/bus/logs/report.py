@@ -106,7 +106,7 @@ class LogReport:
         if self.frames:
             raise LogUnreadableError(
                 f"{self.path}: none of its {self.frames} frames has an identifier of the signal map; "
-                "is it the map of this vehicle?"
+                "is it the map of this vehicle? springscale look shows what is in it"
             )
         why = f" ({self.ended_early})" if self.ended_early else ""
         raise LogUnreadableError(f"{self.path}: holds no CAN frame{why}; candump logs are recorded with candump -L")

@@ -8,7 +8,7 @@ from gateway.bus.signals.bit_field import Coding
 from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, load_messages
 from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.encode import Encoder
-from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES, IdFilter, j1939_filter
+from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES, IdFilter, MappedMessage, id_name, j1939_filter
 from gateway.bus.signals.samples import is_j1939_code
 from gateway.bus.signals.signal_map import (
     SHIPPED_PREFIX,
@@ -30,8 +30,10 @@ __all__ = [
     "Decoder",
     "Encoder",
     "IdFilter",
+    "MappedMessage",
     "SignalMap",
     "SignalMapFile",
+    "id_name",
     "is_j1939_code",
     "j1939_filter",
     "load_messages",

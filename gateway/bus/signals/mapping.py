@@ -122,6 +122,12 @@ class SignalMap:
         return CLASSIC_BYTES if longest <= CLASSIC_BYTES else CAN_FD_BYTES
 
 
+def id_name(can_id: int) -> str:
+    """An identifier as candump writes it: three digits, or eight where it has 29 bits."""
+    number = can_id & ~EXTENDED_ID
+    return f"{number:08X}" if can_id & EXTENDED_ID else f"{number:03X}"
+
+
 def exact_filter(frame_id: int) -> IdFilter:
     """This identifier (EXTENDED_ID set for 29 bits) and no other."""
     return IdFilter(frame_id, EXTENDED_ID | (0x1FFF_FFFF if frame_id & EXTENDED_ID else 0x7FF))

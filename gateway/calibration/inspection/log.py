@@ -1,12 +1,13 @@
 """What reading a drive's log says before any of its rows is looked at: can it be read, and is it this drive's alone?"""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Severity
 from gateway.calibration.inspection.kinds import Kind
+from gateway.records import Signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +15,8 @@ class LogFacts:
     """How the log of a run was read.
 
     ``duration_s`` is of the whole log, ``span_ns`` the first and last stamp of the run's piece of it, None where
-    that piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it.
+    that piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it, ``silent`` why
+    a mapped signal has no valid sample.
     """
 
     sha256: str = ""
@@ -23,6 +25,7 @@ class LogFacts:
     span_ns: tuple[int, int] | None = (0, 0)
     unreadable: str | None = None
     damage: str | None = None
+    silent: Mapping[Signal, str] = field(default_factory=dict)
 
 
 def log_findings(facts: LogFacts) -> Iterator[Finding]:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite, nan, pi
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -99,14 +100,18 @@ def unmapped_findings(facts: RowFacts) -> Iterator[Finding]:
         yield finding_of(Kind.SIGNAL_UNMAPPED, severity, f"{text}; axes and loads cannot be checked")
 
 
-def rate_findings(facts: RowFacts, settings: BatchSettings) -> Iterator[Finding]:
+def rate_findings(
+    facts: RowFacts, settings: BatchSettings, why_silent: Mapping[Signal, str] = MappingProxyType({})
+) -> Iterator[Finding]:
     """Sensors that are silent, slow or unevenly stamped."""
     for signal in INERTIAL:
         stream = facts.streams.get(signal)
         if stream is None:
             continue
         if stream.n < 2:
-            yield finding_of(Kind.SENSOR_SILENT, Severity.FAULT, f"{signal} has {stream.n} samples in the whole run")
+            text = f"{signal} has {stream.n} samples in the whole run"
+            why = f": {why_silent[signal]}" if signal in why_silent else ""
+            yield finding_of(Kind.SENSOR_SILENT, Severity.FAULT, text + why)
         elif stream.rate_hz < RATE_MIN_SHARE * settings.rate_hz:
             text = (
                 f"{signal} comes at {stream.rate_hz:.3g} Hz, at least {RATE_MIN_SHARE * settings.rate_hz:g} are needed"

@@ -51,7 +51,7 @@ def inspect_run(drive: SplitRun, vehicle: Vehicle, settings: BatchSettings) -> R
     if _has_fault(of_log):
         return RunVerdict(one.number, one.name, of_log)
     acceleration, findings = gravity_findings(facts)
-    findings.extend((*of_log, *unmapped_findings(facts), *rate_findings(facts, settings)))
+    findings.extend((*of_log, *unmapped_findings(facts), *rate_findings(facts, settings, drive.log.silent)))
     findings.extend(_speed_findings(drive, settings))
     findings.extend(_masked_findings(drive))
     spectra = cross_spectra_of(drive.batches, reading_of(vehicle))

@@ -10,5 +10,6 @@ from gateway.offline.look.heard import Heard
 from gateway.offline.look.look import Look, look
 from gateway.offline.look.readings import Described
 from gateway.offline.look.roles import Found
+from gateway.offline.look.silence import why_silent
 
-__all__ = ["Described", "Fit", "Found", "Heard", "Look", "look", "write_draft"]
+__all__ = ["Described", "Fit", "Found", "Heard", "Look", "look", "why_silent", "write_draft"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from gateway.bus.frames import join, take
 from gateway.bus.logs import LogReport, open_whole_log
-from gateway.bus.signals import CAN_FD_BYTES
+from gateway.bus.signals import CAN_FD_BYTES, id_name
 from gateway.records import EXTENDED_ID, Frames
 from gateway.units import NS_PER_S
 
@@ -41,8 +41,7 @@ class Heard:
     @property
     def name(self) -> str:
         """The identifier as candump writes it: three digits, or eight where it has 29 bits."""
-        number = self.can_id & ~EXTENDED_ID
-        return f"{number:08X}" if self.can_id & EXTENDED_ID else f"{number:03X}"
+        return id_name(self.can_id)
 
 
 @dataclass(slots=True)
