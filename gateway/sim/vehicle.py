@@ -5,7 +5,7 @@ Rates and forces are those felt at the wheel. Positive travel compresses.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +85,6 @@ class Vehicle:
         """Share of the sprung mass on the front axle."""
         return 100.0 * (1.0 - self.cog_position_m / self.wheelbase_m)
 
-    def linear(self) -> "Vehicle":
-        """The textbook car: no progression, friction, asymmetry, digression or tyre patch, wheels round and balanced.
-
-        Stops and tyre lift-off remain; small motion does not reach them.
-        """
-        return replace(self, front=_linear(self.front), rear=_linear(self.rear), contact_patch_m=0.0)
-
 
 @dataclass(frozen=True, slots=True)
 class Load:
@@ -156,13 +149,3 @@ def load_for_share(vehicle: Vehicle, mass_kg: float, share_pct: float) -> Load:
             f"{mass_kg:g} kg would have to stand {position:.2f} m behind the front axle for a share of {share_pct:g} %"
         )
     return Load(mass_kg, position)
-
-
-def _linear(axle: Axle) -> Axle:
-    mean = (axle.damper.compression_nspm + axle.damper.rebound_nspm) / 2.0
-    return replace(
-        axle,
-        spring=replace(axle.spring, progression_npm2=0.0),
-        damper=Damper(mean, mean),
-        wheel=replace(axle.wheel, imbalance_kgm=0.0, runout_m=0.0),
-    )

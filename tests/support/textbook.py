@@ -1,11 +1,30 @@
 """The half-car as textbooks have it: what both the simulator and the estimator are held to."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from gateway.records import C128, F64
-from gateway.sim.vehicle import Load, Vehicle
+from gateway.sim.vehicle import Axle, Damper, Load, Vehicle
+
+
+def linearised(vehicle: Vehicle) -> Vehicle:
+    """The textbook car: no progression, friction, asymmetry, digression or tyre patch, wheels round and balanced.
+
+    Stops and tyre lift-off remain; small motion does not reach them.
+    """
+    return replace(vehicle, front=_linear(vehicle.front), rear=_linear(vehicle.rear), contact_patch_m=0.0)
+
+
+def _linear(axle: Axle) -> Axle:
+    mean = (axle.damper.compression_nspm + axle.damper.rebound_nspm) / 2.0
+    return replace(
+        axle,
+        spring=replace(axle.spring, progression_npm2=0.0),
+        damper=Damper(mean, mean),
+        wheel=replace(axle.wheel, imbalance_kgm=0.0, runout_m=0.0),
+    )
 
 
 def half_car(vehicle: Vehicle, load: Load, speed_mps: float, freq_hz: F64) -> C128:

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.half_car_road import CAR
 from support.textbook import half_car as textbook_half_car
+from support.textbook import linearised
 
 from gateway.core.cross_spectrum.half_car import Axle, HalfCar, frequency_response
 from gateway.sim.vans import PAPER_VAN, SMALL_VAN
@@ -58,7 +59,7 @@ def test_both_axles_lifted_alike_lift_without_pitch_where_the_vehicle_is_symmetr
 @pytest.mark.parametrize("position_m", [0.6, 2.4])
 def test_it_is_the_half_car_of_the_textbooks(van: Vehicle, position_m: float) -> None:
     """Lagrange's equations for four coordinates, written independently, give the same heave and pitch."""
-    linear = _without_tyre_damping(replace(van, cog_height_m=0.8).linear())
+    linear = _without_tyre_damping(linearised(replace(van, cog_height_m=0.8)))
     load = Load(300.0, position_m, height_m=0.8, length_m=1.0, tall_m=0.4)
     freq_hz = np.array([0.7, 1.4, 3.0, 7.0, 11.0])
     speed_mps = 15.0

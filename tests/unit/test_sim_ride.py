@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.statics import static_axle_loads_kg
+from support.textbook import linearised
 
 from gateway.records import F64
 from gateway.sim.chassis import Chassis, chassis_of
@@ -82,7 +83,7 @@ def test_without_dampers_energy_is_conserved(drop_m: float, drift: float) -> Non
 
 def test_halving_the_step_divides_the_error_by_sixteen() -> None:
     """A fourth-order method on a smooth system."""
-    vehicle = PAPER_VAN.linear()
+    vehicle = linearised(PAPER_VAN)
     chassis = chassis_of(vehicle, (Load(300.0, 2.0),))
 
     def end_state(step_s: float) -> F64:
@@ -180,7 +181,7 @@ def test_a_stiff_base_holds_a_load_as_if_it_were_welded() -> None:
     drive, road = constant(14.0, 20.0, rng), PaperRoad().lay(400.0, rng)
 
     def shaken(resonance_hz: float) -> Ride:
-        return ride(PAPER_VAN.linear(), (Load(300.0, 2.4, resonance_hz=resonance_hz),), road, drive)
+        return ride(linearised(PAPER_VAN), (Load(300.0, 2.4, resonance_hz=resonance_hz),), road, drive)
 
     welded = shaken(math.inf).acceleration
     distance = [np.std(shaken(f).acceleration - welded) / np.std(welded) for f in (12.0, 80.0)]
@@ -193,7 +194,7 @@ def test_friction_passes_more_of_a_smooth_road_on_to_the_body() -> None:
     rng = np.random.default_rng(5)
     drive, road = constant(14.0, 60.0, rng, jitter_std_mps=0.0), PaperRoad().lay(1000.0, rng)
     smooth = Road(road.step_m, 0.02 * road.left_m, 0.02 * road.right_m)
-    textbook = PAPER_VAN.linear()
+    textbook = linearised(PAPER_VAN)
 
     def gain(friction_n: float) -> float:
         def rubbing(axle: Axle) -> Axle:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.textbook import linearised
 
 from gateway.records import F64
 from gateway.sim.drive import Drive, constant
@@ -35,7 +36,7 @@ def read(felt: Felt, sensors: Sensors, seed: int = 1, start_ns: int = 0) -> Reco
 
 def test_at_rest_the_reading_is_gravity_upwards() -> None:
     still = ride(
-        PAPER_VAN.linear(),
+        linearised(PAPER_VAN),
         (),
         PaperRoad(sigma_m=0.0).lay(20.0, np.random.default_rng(1)),
         Drive(np.zeros(101), np.zeros(101)),
@@ -74,7 +75,7 @@ def test_rates_are_roll_pitch_yaw(driven: Ride) -> None:
 )
 def test_a_turned_unit_sees_gravity_askew(turned: Mount, expected: tuple[float, float, float]) -> None:
     still = ride(
-        PAPER_VAN.linear(),
+        linearised(PAPER_VAN),
         (),
         PaperRoad(sigma_m=0.0).lay(20.0, np.random.default_rng(1)),
         Drive(np.zeros(3), np.zeros(3)),
