@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from gateway.calibration.file import CalibrationFile
-from gateway.calibration.file.calibration_file import RatioIndexPart, content_id
+from gateway.calibration.file.calibration_file import content_id
+from gateway.calibration.file.parts import RatioIndexPart
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 

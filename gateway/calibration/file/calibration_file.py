@@ -16,8 +16,6 @@ from gateway.calibration.file.parts import (
     Part,
     ProvenancePart,
     RatioIndexPart,
-    RegressionPart,
-    RunPart,
     SeenPart,
     VehiclePart,
 )
@@ -28,22 +26,6 @@ from gateway.toml_file import describe_faults
 
 Content = dict[str, Any]
 FIRST_VERSION: Final = 1
-
-__all__ = [
-    "FORMAT",
-    "VERSION",
-    "CalibrationFile",
-    "CrossSpectrumPart",
-    "ExpectedErrorsPart",
-    "ProvenancePart",
-    "RatioIndexPart",
-    "RegressionPart",
-    "RunPart",
-    "SeenPart",
-    "VehiclePart",
-    "content_id",
-    "load_calibration",
-]
 
 FORMAT: Final = "springscale-calibration"
 VERSION: Final = 2

@@ -5,7 +5,8 @@ from enum import StrEnum
 from pathlib import Path
 
 from gateway.calibration.campaign import Campaign, file_sha256
-from gateway.calibration.file.calibration_file import CalibrationFile, RunPart
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file.parts import RunPart
 
 
 class Verdict(StrEnum):

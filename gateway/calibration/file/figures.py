@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gateway.calibration.file.calibration_file import CalibrationFile, CrossSpectrumPart, RegressionPart
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file.parts import CrossSpectrumPart, RegressionPart
 from gateway.core.cross_spectrum.parameters import is_positive
 
 
