@@ -14,37 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.records import F64
-from gateway.sim.vehicle import Axle, Load, Vehicle
+from gateway.sim.vehicle import Axle, Damper, Load, Spring, Vehicle, Wheel
 from gateway.units import STANDARD_GRAVITY_MPS2
 
+_PARTS: Final = (Spring, Damper, Wheel)
+_PLACED: Final = ("forward_m", "left_m", "anti_roll_npm", "spring_preload_n", "tyre_preload_n")  # preloads: when empty
 CORNER: Final = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            "forward_m",
-            "left_m",
-            "rate_npm",
-            "progression_npm2",
-            "bump_clearance_m",
-            "rebound_clearance_m",
-            "stop_npm2",
-            "spring_preload_n",  # the empty vehicle's static force
-            "compression_nspm",
-            "rebound_nspm",
-            "digression",
-            "knee_mps",
-            "friction_n",
-            "friction_slip_mps",
-            "anti_roll_npm",
-            "unsprung_kg",
-            "tyre_npm",
-            "tyre_nspm",
-            "tyre_preload_n",  # the empty vehicle's static force
-            "radius_m",
-            "imbalance_kgm",
-            "runout_m",
-        )
-    ]
+    [(name, np.float64) for name in (*_PLACED, *(f.name for part in _PARTS for f in fields(part)))]
 )
 ELASTIC: Final = np.dtype([(name, np.float64) for name in ("forward_m", "left_m", "mass_kg", "base_npm", "base_nspm")])
 Records = NDArray[np.void]  # rows of CORNER or ELASTIC; one array passes between compiled functions at little cost

@@ -68,29 +68,21 @@ def ident(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     pairs = [(0.0, None)]
     for mass_kg in np.linspace(0.2, 1.0, 5) * vehicle.rated_payload_kg:
         pairs += [(float(mass_kg), share) for share in np.linspace(-10.0, 10.0, 6) + _middle_share_pct(vehicle)]
-    loads = [_placed(vehicle, mass_kg, share) for mass_kg, share in pairs]
-    drives = [
-        _steady(vehicle, placed, min(600.0, longest_s), PaperRoad(), rng) for placed in loads if placed is not None
-    ]
-    return Plan(tuple(drives), identification_fraction=1.0)
+    return _paper_grid(vehicle, [_placed(vehicle, mass_kg, share) for mass_kg, share in pairs], rng, longest_s)
 
 
 def load_sweep(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's Fig. 3: 0 to the rated payload at the centre of gravity."""
     masses = np.linspace(0.0, 1.0, 10) * vehicle.rated_payload_kg
     loads = [(Load(float(mass_kg), vehicle.cog_position_m),) if mass_kg > 0.0 else () for mass_kg in masses]
-    drives = [_steady(vehicle, carried, min(600.0, longest_s), PaperRoad(), rng) for carried in loads]
-    return Plan(tuple(drives), identification_fraction=1.0)
+    return _paper_grid(vehicle, loads, rng, longest_s)
 
 
 def share_sweep(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's Fig. 4: eight ninths of the rated payload moved from 40 to 60 %."""
     mass_kg = 8.0 / 9.0 * vehicle.rated_payload_kg
     loads = [_placed(vehicle, mass_kg, share) for share in np.linspace(-10.0, 10.0, 9) + _middle_share_pct(vehicle)]
-    drives = [
-        _steady(vehicle, placed, min(600.0, longest_s), PaperRoad(), rng) for placed in loads if placed is not None
-    ]
-    return Plan(tuple(drives), identification_fraction=1.0)
+    return _paper_grid(vehicle, loads, rng, longest_s)
 
 
 def load_step(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
@@ -232,6 +224,15 @@ def _experiment_loads(vehicle: Vehicle) -> list[tuple[Load, ...]]:
     by_mass, by_length = vehicle.rated_payload_kg / PAPER_PAYLOAD_KG, vehicle.wheelbase_m / PAPER_WHEELBASE_M
     loaded = [(Load(m * by_mass, d * by_length),) for m in (120.0, 270.0, 420.0) for d in (0.5, 1.3, 2.8)]
     return [(), *loaded]
+
+
+def _paper_grid(
+    vehicle: Vehicle, loads: Sequence[tuple[Load, ...] | None], rng: np.random.Generator, longest_s: float
+) -> Plan:
+    """Ten minutes with each feasible load on the paper's road, all of it to identify."""
+    feasible = [placed for placed in loads if placed is not None]
+    drives = [_steady(vehicle, placed, min(600.0, longest_s), PaperRoad(), rng) for placed in feasible]
+    return Plan(tuple(drives), identification_fraction=1.0)
 
 
 def _steady(
