@@ -13,31 +13,19 @@ import click
 from gateway.errors import SpringscaleError
 
 _COMMANDS = {
-    "calibrate": ("gateway.cli.calibrate", "calibrate", "Make a calibration file from drives with known loads."),
-    "calibration": (
-        "gateway.cli.calibration",
-        "calibration_commands",
-        "Show, compare and check calibration files; re-zero a running service.",
-    ),
-    "check-config": (
-        "gateway.cli.check_config",
-        "check_config",
-        "Check a configuration, without opening the bus.",
-    ),
-    "demo": ("gateway.cli.demo", "demo", "Run the whole service on a simulated drive: no hardware, no configuration."),
-    "estimate": ("gateway.cli.estimate", "estimate", "Weigh from log files, one line per batch."),
-    "evaluate": ("gateway.cli.evaluate", "evaluate", "Compare estimates with known loads: the error table."),
-    "look": ("gateway.cli.look", "look", "What an unknown log holds, and a first signal map from it."),
-    "replay": ("gateway.cli.replay", "replay", "Send a log to a bus, paced by its time stamps."),
-    "reproduce": (
-        "gateway.cli.reproduce",
-        "reproduce",
-        "Repeat the paper's section 4 in the simulator, as a report.",
-    ),
-    "run": ("gateway.cli.run", "run", "Run the service."),
-    "simulate": ("gateway.cli.simulate", "simulate", "Simulate drives, as log files or onto a bus."),
-    "token": ("gateway.cli.token", "token_commands", "Make, list and revoke access tokens for other machines."),
-}
+    "calibrate": "Make a calibration file from drives with known loads.",
+    "calibration": "Show, compare and check calibration files; re-zero a running service.",
+    "check-config": "Check a configuration, without opening the bus.",
+    "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",
+    "estimate": "Weigh from log files, one line per batch.",
+    "evaluate": "Compare estimates with known loads: the error table.",
+    "look": "What an unknown log holds, and a first signal map from it.",
+    "replay": "Send a log to a bus, paced by its time stamps.",
+    "reproduce": "Repeat the paper's section 4 in the simulator, as a report.",
+    "run": "Run the service.",
+    "simulate": "Simulate drives, as log files or onto a bus.",
+    "token": "Make, list and revoke access tokens for other machines.",
+}  # each in the module of its name
 
 
 # What a vehicle does without: the extra "workbench", in Debian a package of its own.
@@ -56,14 +44,14 @@ class _Lazy(click.Group):
         """The command itself, imported now; None where there is none of that name."""
         if cmd_name not in _COMMANDS:
             return None
-        module, attribute, _ = _COMMANDS[cmd_name]
-        command: click.Command = getattr(import_module(module), attribute)
+        name = cmd_name.replace("-", "_")
+        command: click.Command = getattr(import_module(f"gateway.cli.{name}"), name)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list of --help, without importing anything."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, _COMMANDS[name][2]) for name in sorted(_COMMANDS)])
+            formatter.write_dl(sorted(_COMMANDS.items()))
 
 
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]})

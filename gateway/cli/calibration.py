@@ -26,14 +26,14 @@ from gateway.records import json_line
 
 
 @click.group("calibration")
-def calibration_commands() -> None:
+def calibration() -> None:
     """Look at calibration files, compare and check them; re-zero a running service (tare)."""
 
 
-calibration_commands.add_command(tare_commands)
+calibration.add_command(tare_commands)
 
 
-@calibration_commands.command("show")
+@calibration.command("show")
 @click.argument("file", type=FILE)
 @as_json
 def show(file: Path, as_json: bool) -> None:
@@ -42,7 +42,7 @@ def show(file: Path, as_json: bool) -> None:
     click.echo(json_line({"id": held.id, **held.model_dump(mode="json")}) if as_json else calibration_text(held))
 
 
-@calibration_commands.command("diff")
+@calibration.command("diff")
 @click.argument("one", type=FILE)
 @click.argument("other", type=FILE)
 @as_json
@@ -59,7 +59,7 @@ def diff(one: Path, other: Path, as_json: bool) -> None:
         click.echo("\n".join(map(_difference, changes)))
 
 
-@calibration_commands.command("verify")
+@calibration.command("verify")
 @click.argument("file", type=FILE)
 @click.option("--logs", "campaign", type=FILE, default=None, help="campaign file: check the logs it was made from")
 @as_json
@@ -82,7 +82,7 @@ def verify(file: Path, campaign: Path | None, as_json: bool) -> None:
 KILOGRAMS = click.FloatRange(0.0, 100_000.0, min_open=True)
 
 
-@calibration_commands.command("sprung")
+@calibration.command("sprung")
 @click.option("--front-axle-kg", type=KILOGRAMS, required=True, help="weight on the front axle, vehicle empty")
 @click.option("--rear-axle-kg", type=KILOGRAMS, required=True, help="weight on the rear axle, vehicle empty")
 @click.option("--unsprung-front-kg", type=KILOGRAMS, default=None, help="axle, wheels, brakes [default: estimated]")

@@ -6,7 +6,7 @@ import ssl
 import urllib.error
 import urllib.request
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
@@ -47,16 +47,9 @@ def _service(command: Command) -> Command:
     """The options that say which service is asked; handed to ``command`` as one."""
 
     @functools.wraps(command)
-    def asking(
-        config_path: Path | None,
-        url: str | None,
-        token: str | None,
-        ca: Path | None,
-        certificate: Path | None,
-        key: Path | None,
-        **others: Any,
-    ) -> None:
-        command(_Service(config_path, url, token, ca, certificate, key), **others)
+    def asking(**options: Any) -> None:
+        service = _Service(**{each.name: options.pop(each.name) for each in fields(_Service)})
+        command(service, **options)
 
     decorated: Command = asking
     for option in (

@@ -27,11 +27,11 @@ def token_file(config_path: Path) -> TokenFile:
 
 
 @click.group("token")
-def token_commands() -> None:
+def token() -> None:
     """Make, list and revoke access tokens for other machines."""
 
 
-@token_commands.command("create")
+@token.command("create")
 @click.argument("name")
 @click.option("--scope", type=click.Choice([str(scope) for scope in Scope]), default="read", show_default=True)
 @click.option(
@@ -44,19 +44,19 @@ def create(name: str, scope: str, days: float | None, config_path: Path) -> None
     click.echo(token_file(config_path).create(name, Scope(scope), lifetime_s))
 
 
-@token_commands.command("list")
+@token.command("list")
 @click.option("--json", "as_json", is_flag=True, help="one JSON object a line")
 @_config
 def list_tokens(as_json: bool, config_path: Path) -> None:
     """Show the tokens there are; what they are made of cannot be shown."""
-    for token in token_file(config_path).tokens():
+    for held in token_file(config_path).tokens():
         if as_json:
-            click.echo(json.dumps({"id": token.id, "name": token.name, "scope": token.scope, "ends": token.expiry()}))
+            click.echo(json.dumps({"id": held.id, "name": held.name, "scope": held.scope, "ends": held.expiry()}))
         else:
-            click.echo(f"{token.id}  {token.scope:8}{token.expiry():>18}  {token.name}")
+            click.echo(f"{held.id}  {held.scope:8}{held.expiry():>18}  {held.name}")
 
 
-@token_commands.command("revoke")
+@token.command("revoke")
 @click.argument("name")
 @_config
 def revoke(name: str, config_path: Path) -> None:

@@ -24,7 +24,7 @@ from gateway.calibration.file import (
     load_calibration,
 )
 from gateway.calibration.file.calibration_file import content_id
-from gateway.cli.calibration import calibration_commands
+from gateway.cli.calibration import calibration as calibration_commands
 from gateway.core.ratio_index.regression import term_columns
 from gateway.errors import CalibrationFileError
 

@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 from support.tare import FakePipeline, tare_desk
 from support.web import Gateway, serving
 
-from gateway.cli.calibration import calibration_commands
+from gateway.cli.calibration import calibration as calibration_commands
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.web import Scope, Tls, TokenFile, server_config
 

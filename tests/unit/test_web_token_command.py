@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from gateway.cli.token import token_commands
+from gateway.cli.token import token as token_commands
 from gateway.errors import ConfigurationError
 from gateway.web import TokenFile
 

@@ -2,7 +2,7 @@
 
 from functools import singledispatch
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, YAxis
@@ -55,30 +55,21 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     for order, mark in enumerate(panel.marks):
         _draw_mark(mark, axes, order + 2)
     axes.set_title(panel.title, fontsize=9)
-    _set_x(axes, panel.x)
-    _set_y(axes, panel.y)
+    axes.set(xlabel=panel.x.title, ylabel=panel.y.title)
+    _set_axis(axes.xaxis, panel.x, rotation=30, ha="right")
+    _set_axis(axes.yaxis, panel.y)
 
 
-def _set_x(axes: Axes, axis: Axis) -> None:
-    axes.set_xlabel(axis.title)
+def _set_axis(drawn: XAxis | YAxis, axis: Axis, **of_places: Any) -> None:
+    """Scale, limits and places; ``of_places`` is how the names of places are set."""
+    name = drawn.axis_name
     if axis.is_log:
-        axes.set_xscale("log")
-        _with_plain_ticks(axes.xaxis)
+        drawn.axes.set(**{f"{name}scale": "log"})
+        _with_plain_ticks(drawn)
     if axis.limits:
-        axes.set_xlim(*axis.limits)
+        drawn.axes.set(**{f"{name}lim": axis.limits})
     if axis.places:
-        axes.set_xticks(range(len(axis.places)), axis.places, rotation=30, ha="right", fontsize=7)
-
-
-def _set_y(axes: Axes, axis: Axis) -> None:
-    axes.set_ylabel(axis.title)
-    if axis.is_log:
-        axes.set_yscale("log")
-        _with_plain_ticks(axes.yaxis)
-    if axis.limits:
-        axes.set_ylim(*axis.limits)
-    if axis.places:
-        axes.set_yticks(range(len(axis.places)), axis.places, fontsize=7)
+        drawn.set_ticks(range(len(axis.places)), axis.places, fontsize=7, **of_places)
 
 
 def _with_plain_ticks(axis: XAxis | YAxis) -> None:
