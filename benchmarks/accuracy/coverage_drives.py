@@ -2,22 +2,24 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, scattered
-from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
+from gateway.bus.signals import SHIPPED_PREFIX, Decoder, SignalMap, load_signal_map
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle as StatedVehicle
 from gateway.offline.batches import batches_of_motion
+from gateway.records import Motion
 from gateway.sim.drive import Drive, constant, motorway, rural, urban
 from gateway.sim.obstacles import ObstacleRoad, UnevenRoad
 from gateway.sim.road import RoadRecipe, iso_road
 from gateway.sim.scenario import simulate_drive
-from gateway.sim.sensors import REFERENCE
+from gateway.sim.sensors import REFERENCE, Sensors
 from gateway.sim.vans import VANS
 from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg
 from gateway.workbench.campaigns import ON_PALLETS, PAPER_SPEED_MPS, share_range_pct
@@ -91,15 +93,40 @@ def driven(
     van: Vehicle, loads: tuple[Load, ...], trip: Trip, scope: Scope, seeds: np.random.SeedSequence, number: int
 ) -> KnownRun:
     """One drive through sensors, frames and decoder, as batches with their truth."""
-    plan_rng, day_rng = (np.random.default_rng(seed) for seed in seeds.spawn(2))
+    rows, today, carried = rows_of(van, loads, trip, scope, seeds)
+    return known_run(rows, number, trip.kind, today, carried)
+
+
+def rows_of(
+    van: Vehicle,
+    loads: tuple[Load, ...],
+    trip: Trip,
+    scope: Scope,
+    seeds: np.random.SeedSequence,
+    sensors: Sensors = REFERENCE,
+) -> tuple[Motion, Vehicle, tuple[Load, ...]]:
+    """One drive through sensors, frames and decoder; with the vehicle as it is that day, and what it carries.
+
+    The same seeds give the same road and drive whatever the sensors.
+    """
+    plan_seed, day_seed = np.random.SeedSequence(seeds.entropy, spawn_key=seeds.spawn_key).spawn(2)
+    plan_rng, day_rng = np.random.default_rng(plan_seed), np.random.default_rng(day_seed)
     today = scattered(van, FROM_DAY_TO_DAY, day_rng) if trip.is_changed else van
     carried = tuple(replace(load, **ON_PALLETS) for load in loads) if trip.is_on_pallets else loads
     seed = int(seeds.generate_state(1)[0])
-    simulated = simulate_drive(today, carried, trip.road, trip.drive(scope, plan_rng), REFERENCE, seed)
-    signal_map = load_signal_map(SHIPPED_PREFIX + MAP_NAME)
-    motion = Decoder(signal_map).decode(Wiring(MAP_NAME).frames_of(simulated.recording))
-    batches = batches_of_motion(motion, signal_map, BatchSettings())
-    return KnownRun(number, trip.kind, payload_kg(carried), front_share_pct(today, carried), batches)
+    simulated = simulate_drive(today, carried, trip.road, trip.drive(scope, plan_rng), sensors, seed)
+    return Decoder(_map()).decode(Wiring(MAP_NAME).frames_of(simulated.recording)), today, carried
+
+
+def known_run(rows: Motion, number: int, name: str, van: Vehicle, carried: tuple[Load, ...]) -> KnownRun:
+    """Decoded rows as batches with their truth."""
+    batches = batches_of_motion(rows, _map(), BatchSettings())
+    return KnownRun(number, name, payload_kg(carried), front_share_pct(van, carried), batches)
+
+
+@lru_cache(maxsize=1)
+def _map() -> SignalMap:
+    return load_signal_map(SHIPPED_PREFIX + MAP_NAME)
 
 
 def _load(van: Vehicle, part: float, place: float) -> Load:

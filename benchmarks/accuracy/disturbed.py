@@ -1,0 +1,143 @@
+"""What may go wrong with a calibrated vehicle's sensors and stamps: each disturbance by name.
+
+Some disturb the rows of a drive that was recorded well; the others are driven again with sensors that sit
+elsewhere, or with a load that calibration never saw the like of.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from gateway.records import I64, Motion, Signal, Why
+from gateway.sim.sensors import REFERENCE, Sensors
+from gateway.units import NS_PER_S
+
+Rows = Callable[[Motion, np.random.Generator], Motion]
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbance:
+    """One line of the table. ``rows`` disturbs what was decoded, ``sensors`` drive again.
+
+    ``is_mended`` where errors should stay within a quarter of the undisturbed; ``reasons`` are the right ones to refuse.
+    """
+
+    name: str
+    rows: Rows = lambda motion, rng: motion
+    sensors: Sensors = REFERENCE
+    is_overloaded: bool = False
+    is_mended: bool = False
+    reasons: tuple[Why, ...] = ()
+
+
+def _stamped(stamp: Callable[[I64, np.random.Generator], I64]) -> Rows:
+    """Rows with other stamps, in the order in which they then come."""
+
+    def disturb(motion: Motion, rng: np.random.Generator) -> Motion:
+        t_ns = stamp(motion.t_ns, rng)
+        order = np.argsort(t_ns, kind="stable")
+        return Motion(motion.signals, t_ns[order], motion.columns[order])
+
+    return disturb
+
+
+def jittered(mean_s: float) -> Rows:
+    """Every stamp late by an exponential delay, never before an earlier one."""
+    return _stamped(
+        lambda t_ns, rng: np.maximum.accumulate(
+            t_ns + np.rint(rng.exponential(mean_s, len(t_ns)) * NS_PER_S).astype(int)
+        )
+    )
+
+
+def heaped(every_s: float) -> Rows:
+    """Frames handed over together every so often, stamped then, as USB adapters do."""
+    every_ns = round(every_s * NS_PER_S)
+    return _stamped(lambda t_ns, rng: t_ns[0] - (t_ns[0] - t_ns) // every_ns * every_ns)
+
+
+def stalled(length_s: float, every_s: float) -> Rows:
+    """A reader that stands still for a moment, again and again."""
+    length_ns, every_ns = round(length_s * NS_PER_S), round(every_s * NS_PER_S)
+
+    def stamp(t_ns: I64, rng: np.random.Generator) -> I64:
+        into_ns = (t_ns - t_ns[0]) % every_ns
+        return np.where(into_ns < length_ns, t_ns - into_ns + length_ns, t_ns)
+
+    return _stamped(stamp)
+
+
+def lossy(share: float) -> Rows:
+    """Frames lost by chance."""
+
+    def disturb(motion: Motion, rng: np.random.Generator) -> Motion:
+        kept = rng.random(len(motion)) >= share
+        return Motion(motion.signals, motion.t_ns[kept], motion.columns[kept])
+
+    return disturb
+
+
+def lagging(by_s: float) -> Rows:
+    """The gyro's frames come later than the accelerometer's."""
+
+    def disturb(motion: Motion, rng: np.random.Generator) -> Motion:
+        is_gyro = np.isfinite(motion.columns[:, motion.signals.index(Signal.PITCH_RATE)])
+        return _stamped(lambda t_ns, rng: np.where(is_gyro, t_ns + round(by_s * NS_PER_S), t_ns))(motion, rng)
+
+    return disturb
+
+
+def amplified(by: float) -> Rows:
+    """An accelerometer whose gain has changed, gravity included."""
+
+    def disturb(motion: Motion, rng: np.random.Generator) -> Motion:
+        columns = motion.columns.copy()
+        columns[:, motion.signals.index(Signal.VERTICAL_ACCELERATION)] *= 1.0 + by
+        return replace(motion, columns=columns)
+
+    return disturb
+
+
+def _remounted(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -> Sensors:
+    mount = REFERENCE.mount
+    return replace(
+        REFERENCE,
+        mount=replace(
+            mount,
+            position_m=mount.position_m + back_m,
+            left_m=mount.left_m + left_m,
+            yaw_deg=mount.yaw_deg + yaw_deg,
+        ),
+    )
+
+
+_SENSOR_MOVED: Final = (Why.SENSOR_DISAGREEMENT, Why.MODEL_MISFIT)
+_BEYOND: Final = (Why.OUT_OF_RANGE, Why.MODEL_MISFIT, Why.TOO_UNCERTAIN)
+
+UNDISTURBED: Final = Disturbance("as recorded", is_mended=True)
+DISTURBANCES: Final[Mapping[str, Disturbance]] = MappingProxyType(
+    {
+        one.name: one
+        for one in (
+            UNDISTURBED,
+            Disturbance("jitter of 1 ms", jittered(0.001), is_mended=True, reasons=(Why.TIME_STAMPS,)),
+            Disturbance("jitter of 3 ms", jittered(0.003), is_mended=True, reasons=(Why.TIME_STAMPS,)),
+            Disturbance("heaps every 16 ms", heaped(0.016), is_mended=True, reasons=(Why.TIME_STAMPS,)),
+            Disturbance("heaps every 40 ms", heaped(0.040), is_mended=True, reasons=(Why.TIME_STAMPS,)),
+            Disturbance("stalls of 40 ms every 2 s", stalled(0.04, 2.0), is_mended=True, reasons=(Why.TIME_STAMPS,)),
+            Disturbance("2 % of frames lost", lossy(0.02), is_mended=True, reasons=(Why.GAP, Why.TIME_STAMPS)),
+            Disturbance("10 % of frames lost", lossy(0.1), is_mended=True, reasons=(Why.GAP, Why.TIME_STAMPS)),
+            Disturbance("gyro late by 5 ms", lagging(0.005), is_mended=True),
+            Disturbance("gyro late by 20 ms", lagging(0.020), is_mended=True),
+            Disturbance("accelerometer's gain + 2 %", amplified(0.02), reasons=_SENSOR_MOVED),
+            Disturbance("accelerometer's gain + 5 %", amplified(0.05), reasons=_SENSOR_MOVED),
+            Disturbance("sensor moved 0.2 m left", sensors=_remounted(left_m=0.2), reasons=_SENSOR_MOVED),
+            Disturbance("sensor moved 0.2 m back", sensors=_remounted(back_m=0.2), reasons=_SENSOR_MOVED),
+            Disturbance("sensor turned by 10 degrees", sensors=_remounted(yaw_deg=10.0), reasons=_SENSOR_MOVED),
+            Disturbance("load beyond the calibrated", is_overloaded=True, reasons=_BEYOND),
+        )
+    }
+)
