@@ -130,6 +130,11 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "signal map",
         ),
         Why.SENSOR_RATE_LOW: Explanation(Cause.SENSORS, "the sensor sends too seldom for `rate_hz`", "raise its rate"),
+        Why.SENSOR_CHANGED: Explanation(
+            Cause.SENSORS,
+            "the sensor is not where, or not what, it was when it was calibrated: moved, turned, or with another gain",
+            "mount it as it was, or calibrate again",
+        ),
         Why.SENSOR_DISAGREEMENT: Explanation(
             Cause.SENSORS,
             "acceleration and pitch rate do not move together as one body does",

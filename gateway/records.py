@@ -68,6 +68,7 @@ class Why(StrEnum):
     TOO_UNCERTAIN = "too_uncertain"
     MODEL_MISFIT = "model_misfit"
     SENSOR_DISAGREEMENT = "sensor_disagreement"
+    SENSOR_CHANGED = "sensor_changed"
     WRONG_SIGN = "wrong_sign"
 
 

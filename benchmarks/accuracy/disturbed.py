@@ -22,7 +22,7 @@ Rows = Callable[[Motion, np.random.Generator], Motion]
 class Disturbance:
     """One line of the table. ``rows`` disturbs what was decoded, ``sensors`` drive again.
 
-    ``is_mended`` where errors should stay within a quarter of the undisturbed; ``reasons`` are the right ones to refuse.
+    ``is_mended``: errors should stay within a quarter of the undisturbed; ``reasons`` are the right ones to refuse.
     """
 
     name: str
@@ -114,7 +114,7 @@ def _remounted(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -
     )
 
 
-_SENSOR_MOVED: Final = (Why.SENSOR_DISAGREEMENT, Why.MODEL_MISFIT)
+_SENSOR_MOVED: Final = (Why.SENSOR_CHANGED, Why.MODEL_MISFIT)
 _BEYOND: Final = (Why.OUT_OF_RANGE, Why.MODEL_MISFIT, Why.TOO_UNCERTAIN)
 
 UNDISTURBED: Final = Disturbance("as recorded", is_mended=True)

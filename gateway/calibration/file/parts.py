@@ -141,6 +141,7 @@ class CrossSpectrumPart(Part):
     payload_inflation_per_reach: float = Field(0.0, ge=0.0)
     front_share_inflation_per_reach: float = Field(0.0, ge=0.0)
     usual_log_amplitude: float | None = None
+    gravity_mps2: float | None = Field(None, gt=0.0)
 
     @classmethod
     def of(cls, calibration: CrossSpectrumCalibration) -> "CrossSpectrumPart":

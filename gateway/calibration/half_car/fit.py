@@ -10,6 +10,7 @@ true of loads that calibration has not seen.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
+from statistics import fmean
 from typing import Final
 
 import numpy as np
@@ -83,6 +84,8 @@ def fit_cross_spectrum(
         without[one.run.number] = half_car_calibration(others, vehicle, refound)
         errors.extend(_left_out_errors(one, without[one.run.number]))
         _tell(progress, len(_STARTS) + left_out, n_steps)
+    if not errors:
+        return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
     payload_z, share_z, misfits, payload_kg, share_pct, reach = np.array([astuple(one) for one in errors]).T
     of_payload, of_share = inflation_of(payload_z, reach), inflation_of(share_z, reach)
 
@@ -93,7 +96,7 @@ def fit_cross_spectrum(
             payload_inflation_per_reach=of_payload.per_reach,
             front_share_inflation=of_share.within,
             front_share_inflation_per_reach=of_share.per_reach,
-            misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.max(misfits))),
+            misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.nanmax([0.0, *misfits]))),
         )
 
     tested_without = {number: tested(one) for number, one in without.items()}
@@ -149,13 +152,14 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         warnings=(SPRINGS_FROM_PRIORS,) if len({*payloads}) == 1 else (),
         known_loads=tuple(run.load for run in runs),
         usual_log_amplitude=reading.usual_log_amplitude,
+        gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _LeftOut:
-    """A batch of a run that the others weighed: errors in their own standard deviations, the misfit, errors in
-    kg and percentage points, and how far the load lies beyond the others'.
+    """A batch of a run that the others weighed: errors in their own standard deviations, errors in kg and percentage
+    points, and how far the load that was found lies beyond the others'. The misfit is NaN where the run itself does.
     """
 
     payload_z: float
@@ -170,16 +174,26 @@ def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -
     """Every batch of a run that ``calibration`` has not seen."""
     errors = []
     truth = one.run.load
-    reach = beyond(truth, calibration.known_loads, calibration.empty_mass_kg)
+    is_among = beyond(truth, calibration.known_loads, calibration.empty_mass_kg) == 0.0
     for batch in one.run.batches:
         spectra = cross_spectra_of([batch], calibration.reading)
         if spectra is None or batch.rejected:
             continue
         located = locate(spectra, calibration)
+        if located.is_off:  # the service would refuse it
+            continue
+        reach = beyond(located.point.load, calibration.known_loads, calibration.empty_mass_kg)
         payload_std_kg, share_std = np.sqrt(np.diag(located.load_covariance))
         payload_kg = located.point.payload_kg - truth.payload_kg
         share = located.point.front_share - truth.front_share
         errors.append(
-            _LeftOut(payload_kg / payload_std_kg, share / share_std, located.misfit, payload_kg, 100.0 * share, reach)
+            _LeftOut(
+                payload_z=payload_kg / payload_std_kg,
+                front_share_z=share / share_std,
+                misfit=located.misfit if is_among else np.nan,
+                payload_kg=payload_kg,
+                front_share_pct=100.0 * share,
+                reach=reach,
+            )
         )
     return errors

@@ -16,7 +16,8 @@ class CrossSpectrumCalibration:
     these are positive quantities). The inflations widen standard deviations, by so much more per_reach
     as a load lies beyond ``known_loads`` (reach.beyond); misfit_limit is the
     largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
-    root mean squares within the band. usual_log_amplitude: see core.cross_spectra.Reading.
+    root mean squares within the band. usual_log_amplitude: see measured.Reading. gravity_mps2 is what the
+    accelerometer read on average; None where the file does not say.
     """
 
     empty_mass_kg: float
@@ -40,6 +41,7 @@ class CrossSpectrumCalibration:
     payload_inflation_per_reach: float = 0.0
     front_share_inflation_per_reach: float = 0.0
     usual_log_amplitude: float | None = None
+    gravity_mps2: float | None = None
 
     @property
     def ground(self) -> Ground:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+from scipy.stats import chi2
 
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.records import F64
@@ -58,6 +59,19 @@ def _believed_covariance() -> F64:
 
 DRIFT_PRECISION: Final = np.linalg.inv(_believed_covariance())
 """(k, k) of the DRIFTING parameters: the inverse of what the search believes of them."""
+
+
+MOST_TENSION: Final = float(chi2.ppf(1.0 - 1e-4, len(DRIFTING)))
+"""What drifts as the search believes it to exceeds this once in ten thousand batches."""
+
+
+def tension_of(off: F64) -> float:
+    """How far the drifting parameters lie ``off`` (k,) their calibration: their squared distance, chi-squared of k.
+
+    A load unlike any that calibration saw, or a vehicle that is no longer the same, is fitted at the price of
+    parameters that no drift explains. The search holds them near the calibration, so that they lie nearer by right.
+    """
+    return float(off @ DRIFT_PRECISION @ off)
 
 
 def drift_covariance(found: F64, moves: F64) -> F64:

@@ -17,12 +17,27 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY, drift_covariance
+from gateway.core.cross_spectrum.drift import (
+    DRIFT_PRECISION,
+    DRIFTING,
+    MOST_TENSION,
+    STEADY,
+    drift_covariance,
+    tension_of,
+)
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found, most_probable
+from gateway.core.cross_spectrum.sensor_change import (
+    FITTED,
+    MOST_GRAVITY_CHANGE_MPS2,
+    SensorScores,
+    gain_moves,
+    gain_std,
+    scores_of,
+)
 from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
 from gateway.estimate import Estimate, Quantity
 from gateway.records import F64, Batch, Why
@@ -45,25 +60,36 @@ ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibrat
 class Located:
     """The best point of a batch with its covariance of (payload in kg, front share 0..1), not yet inflated.
 
-    drift_covariance is what a change of the vehicle since its calibration adds; no inflation is due on it.
+    drift_covariance is what a change of the vehicle since its calibration adds, gain_moves (2,) by how much the load
+    moves with the accelerometer's gain; no inflation is due on either. tension is how far what drifts lies off its
+    calibration: drift.tension_of.
     """
 
     point: Point
     load_covariance: F64
     drift_covariance: F64
+    gain_moves: F64
     misfit: float
+    tension: float
+    scores: SensorScores
     is_reversed: bool
+
+    @property
+    def is_off(self) -> bool:
+        """True where vehicle or sensor are not as calibrated, whatever the spectra fit."""
+        return self.scores.is_changed or self.tension > MOST_TENSION
 
 
 def by_cross_spectrum(batch: Batch, calibration: CrossSpectrumCalibration, blank: Estimate) -> Estimate:
     """``blank`` with payload, front share and diagnostics of the batch, or with the reason why not."""
     spectra = cross_spectra_of([batch], calibration.reading)
-    why = _unfit(batch, spectra, calibration) or _off_its_speeds(batch, calibration)
+    why = _unfit(batch, spectra, calibration) or _off_its_speeds(batch, calibration) or _unlike(batch, calibration)
     if spectra is None or why is not None:
         return replace(blank, rejected=(why or Why.TOO_SHORT,))
     located = locate(spectra, calibration)
     inflation = _unseen_inflation(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
-    return _judged(blank, spectra, located, inflation, calibration)
+    by_gain = located.gain_moves * gain_std(batch.gravity_mps2, calibration.gravity_mps2)
+    return _judged(blank, spectra, located, inflation, by_gain, calibration)
 
 
 def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Located:
@@ -71,13 +97,18 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
     whittle = Whittle(spectra, calibration.ground)
     found = _fit_load(whittle, calibration)
     point = _point(found.x, calibration)
-    moves = _moves(whittle, point, found)
+    whole = whittle.curvature(point, list(range(len(PARAMETERS))), is_load_free=True)
+    # the fitted x moves by -C I_xt for each of the other parameters t
+    moves = -found.covariance @ whole.information[np.ix_(FITTED, STEADY)]
     misfit = whittle.misfit(point)
     return Located(
         point=point,
         load_covariance=_load_covariance(found, moves, calibration),
         drift_covariance=drift_covariance(found.covariance, moves)[-2:, -2:],
+        gain_moves=gain_moves(whittle, point, found.covariance)[-2:],
         misfit=misfit,
+        tension=tension_of(found.x[:-2] - calibration.parameters[DRIFTING]),
+        scores=scores_of(whole, point, found.covariance, calibration),
         is_reversed=_is_reversed(whittle, point, misfit, calibration),
     )
 
@@ -130,17 +161,6 @@ def _starting_loads(calibration: CrossSpectrumCalibration) -> list[tuple[float, 
     return loads
 
 
-def _moves(whittle: Whittle, point: Point, found: Found) -> F64:
-    """By how much drifting parameters and load (k,) move with each of the STEADY ones: (k, s).
-
-    With x the fitted and t the other parameters, x moves by -C I_xt for each t.
-    """
-    fitted = [*DRIFTING, len(PARAMETERS), len(PARAMETERS) + 1]
-    information = whittle.curvature(point, list(range(len(PARAMETERS))), is_load_free=True).information
-    moves: F64 = -found.covariance @ information[np.ix_(fitted, STEADY)]
-    return moves
-
-
 def _load_covariance(found: Found, moves: F64, calibration: CrossSpectrumCalibration) -> F64:
     """Covariance (2, 2) of payload and share: the batch's own, and what calibration left open."""
     covariance = found.covariance + moves @ calibration.covariance[np.ix_(STEADY, STEADY)] @ moves.T
@@ -171,18 +191,31 @@ def _off_its_speeds(batch: Batch, calibration: CrossSpectrumCalibration) -> Why 
     return None if slowest / margin <= batch.mean_speed_mps <= fastest * margin else Why.SPEED_UNCALIBRATED
 
 
+def _unlike(batch: Batch, calibration: CrossSpectrumCalibration) -> Why | None:
+    """Gravity tells a gain that changed, or an axis that was tilted."""
+    usual_mps2 = calibration.gravity_mps2
+    if usual_mps2 is None or abs(batch.gravity_mps2 - usual_mps2) <= MOST_GRAVITY_CHANGE_MPS2:
+        return None
+    return Why.SENSOR_CHANGED
+
+
 def _judged(
-    blank: Estimate, spectra: CrossSpectra, located: Located, unseen: float, calibration: CrossSpectrumCalibration
+    blank: Estimate,
+    spectra: CrossSpectra,
+    located: Located,
+    unseen: float,
+    by_gain: F64,
+    calibration: CrossSpectrumCalibration,
 ) -> Estimate:
-    """``unseen`` widens what is away from the calibration's speeds and roads."""
+    """``unseen`` widens what is away from the calibration's speeds and roads; ``by_gain`` (2,) is of the sensor."""
     load = located.point.load
     payload_var, share_var = np.diag(located.load_covariance)
-    payload_drift_var, share_drift_var = np.diag(located.drift_covariance)
+    payload_shared_var, share_shared_var = np.diag(located.drift_covariance) + by_gain**2
     reach = beyond(load, calibration.known_loads, calibration.empty_mass_kg)
     of_payload = calibration.payload_inflation * (1.0 + calibration.payload_inflation_per_reach * reach)
     of_share = calibration.front_share_inflation * (1.0 + calibration.front_share_inflation_per_reach * reach)
-    payload_std_kg = math.sqrt((unseen * of_payload) ** 2 * payload_var + payload_drift_var)
-    share_std_pct = 100.0 * math.sqrt((unseen * of_share) ** 2 * share_var + share_drift_var)
+    payload_std_kg = math.sqrt((unseen * of_payload) ** 2 * payload_var + payload_shared_var)
+    share_std_pct = 100.0 * math.sqrt((unseen * of_share) ** 2 * share_var + share_shared_var)
     diagnostics = {
         "reach": reach,
         "misfit": located.misfit,
@@ -191,8 +224,11 @@ def _judged(
         "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
         "damper_rear_ratio": _ratio(located, calibration, "damper_rear_nspm"),
         "delay_scale": float(located.point.theta[INDEX["delay_scale"]]),
-        PAYLOAD_DRIFT_STD_KG: math.sqrt(payload_drift_var),
-        FRONT_SHARE_DRIFT_STD_PCT: 100.0 * math.sqrt(share_drift_var),
+        PAYLOAD_DRIFT_STD_KG: math.sqrt(payload_shared_var),
+        FRONT_SHARE_DRIFT_STD_PCT: 100.0 * math.sqrt(share_shared_var),
+        "tension": located.tension,
+        "sensor_position_score": located.scores.position,
+        "sensor_noise_score": located.scores.noise,
         "payload_mode_hz": math.exp(located.point.theta[INDEX["payload_mode_hz"]]),
         "delay_s": spectra.delay_mean_s,
         "delay_std_s": spectra.delay_std_s,
@@ -212,6 +248,10 @@ def _disbelieved(located: Located, payload_std_kg: float, calibration: CrossSpec
     if located.is_reversed:
         return Why.WRONG_SIGN
     if not located.misfit <= calibration.misfit_limit:
+        return Why.MODEL_MISFIT
+    if located.scores.is_changed:
+        return Why.SENSOR_CHANGED
+    if located.tension > MOST_TENSION:
         return Why.MODEL_MISFIT
     if not payload_std_kg <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:
         return Why.TOO_UNCERTAIN

@@ -89,6 +89,10 @@ class CrossSpectra:
         """How much that time varied."""
         return float(np.sqrt(np.average((self.delay_s - self.delay_mean_s) ** 2, weights=self.n_segments)))
 
+    def with_acceleration_times(self, gain: float) -> "CrossSpectra":
+        """As if the accelerometer had so many times its gain; the division of segments stays."""
+        return replace(self, acceleration=gain**2 * self.acceleration, cross=gain * self.cross)
+
     def with_pitch_reversed(self) -> "CrossSpectra":
         """As if the pitch rate had the other sign."""
         return replace(self, cross=-self.cross)
