@@ -81,6 +81,7 @@ class Estimate:
     tare: Correction | None = None
     vehicle_id: str | None = None
     vin: str | None = None
+    correlation: float = math.nan  # of the errors of payload and front share, -1 to 1
 
     @property
     def counted(self) -> bool:

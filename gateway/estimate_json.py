@@ -238,6 +238,7 @@ FIELDS: Final = (
         [50.2, 50.6],
         columns=("front_share_low95_pct", "front_share_high95_pct"),
     ),
+    EstimateField("payload_front_share_correlation", "correlation", NUMBER, "of both errors, -1 to 1", 0.62, _LATER),
     _field("ratio_index_acceleration", "ratio_index_acceleration", NUMBER, "R_a of the paper", 0.97),
     _field("ratio_index_pitch_rate", "ratio_index_pitch_rate", NUMBER, "R_g of the paper", 1.21),
     _field("mean_speed_mps", "mean_speed_mps", NUMBER, "over what every gate let through", 13.9),

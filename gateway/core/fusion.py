@@ -4,7 +4,7 @@
     replace(estimate, epoch=summary(epoch))
 
 Part of a batch's error is its own, part is shared by all batches of one vehicle and load (the model's
-error, and what the vehicle has changed since its calibration), and only the first averages out. What is
+error, what calibration left open, and what the vehicle has changed since), and only the first averages out. What is
 shared hides no change of load. A batch that does not fit opens a new epoch by itself.
 """
 
@@ -14,21 +14,22 @@ from typing import Final
 
 from gateway.estimate import Epoch, Estimate, Quantity
 
-SHARED_VARIANCE: Final = 0.5  # of a batch's variance without drift: what the batches of an epoch have in common
-PAYLOAD_DRIFT_STD_KG: Final = "payload_drift_std_kg"
-FRONT_SHARE_DRIFT_STD_PCT: Final = "front_share_drift_std_pct"
-"""Names in ``Estimate.diagnostics`` of what the vehicle's drift adds, which batches share wholly; none if absent."""
+LEAST_OWN_VARIANCE: Final = 0.25
+"""Of a batch's variance: batches of one load scatter at least so much (the rest was measured as 0.73 to 0.82)."""
+PAYLOAD_OWN_STD_KG: Final = "payload_own_std_kg"
+FRONT_SHARE_OWN_STD_PCT: Final = "front_share_own_std_pct"
+"""Names in ``Estimate.diagnostics`` of what is a batch's own, by its length and its road; half of it if absent."""
 CHANGE_THRESHOLD: Final = 13.8  # chi-squared of two degrees of freedom, one false alarm in a thousand
 STOP_THAT_ENDS_EPOCH_S: Final = 60.0
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One batch's number with its variance, drift apart."""
+    """One batch's number with the variance that is its own, and the one it shares."""
 
     number: float
-    var: float
-    drift_var: float
+    own_var: float
+    shared_var: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +37,14 @@ class Fused:
     """A running precision-weighted mean of n estimates, in the unit of the quantity."""
 
     mean: float
-    precision: float  # sum of inverse variances, drift apart
-    drift_var: float  # mean, weighted alike
+    precision: float  # sum of inverse variances of the batches' own
+    shared_var: float  # mean, weighted alike
     n: int
 
     @property
     def var(self) -> float:
-        """Shared parts whole, own part divided by n."""
-        return self.drift_var + self.n / self.precision * (SHARED_VARIANCE + (1.0 - SHARED_VARIANCE) / self.n)
+        """What is shared stays whole, what is each batch's own averages out."""
+        return self.shared_var + 1.0 / self.precision
 
     @property
     def quantity(self) -> Quantity:
@@ -52,16 +53,15 @@ class Fused:
 
     def distance2(self, found: Found) -> float:
         """Squared distance of another estimate in standard deviations of the difference; shared errors cancel."""
-        own = 1.0 - SHARED_VARIANCE
-        return (found.number - self.mean) ** 2 / (own * (found.var + 1.0 / self.precision))
+        return (found.number - self.mean) ** 2 / (found.own_var + 1.0 / self.precision)
 
     def joined(self, found: Found) -> "Fused":
         """With one more estimate."""
-        precision = self.precision + 1.0 / found.var
-        weight = 1.0 / (found.var * precision)
+        precision = self.precision + 1.0 / found.own_var
+        weight = 1.0 / (found.own_var * precision)
         mean = self.mean + weight * (found.number - self.mean)
-        drift_var = self.drift_var + weight * (found.drift_var - self.drift_var)
-        return Fused(mean, precision, drift_var, self.n + 1)
+        shared_var = self.shared_var + weight * (found.shared_var - self.shared_var)
+        return Fused(mean, precision, shared_var, self.n + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +83,8 @@ def fused(epoch: LoadEpoch | None, estimate: Estimate, could_have_changed: bool 
     kept = None if could_have_changed else epoch
     if not _teaches(estimate):
         return kept
-    payload = _found(estimate, estimate.payload, PAYLOAD_DRIFT_STD_KG)
-    share = _found(estimate, estimate.front_share, FRONT_SHARE_DRIFT_STD_PCT)
+    payload = _found(estimate, estimate.payload, PAYLOAD_OWN_STD_KG)
+    share = _found(estimate, estimate.front_share, FRONT_SHARE_OWN_STD_PCT)
     begun = LoadEpoch(estimate.t_start_ns, _begun(payload), _begun(share))
     if kept is None:
         return begun
@@ -95,13 +95,15 @@ def fused(epoch: LoadEpoch | None, estimate: Estimate, could_have_changed: bool 
     )
 
 
-def _found(estimate: Estimate, quantity: Quantity, drift_name: str) -> Found:
-    drift_var = estimate.diagnostics.get(drift_name, 0.0) ** 2
-    return Found(quantity.number, quantity.std**2 - drift_var, drift_var)
+def _found(estimate: Estimate, quantity: Quantity, own_name: str) -> Found:
+    var = quantity.std**2
+    own_var = estimate.diagnostics.get(own_name, math.sqrt(0.5 * var)) ** 2
+    own_var = min(max(own_var, LEAST_OWN_VARIANCE * var), var)
+    return Found(quantity.number, own_var, var - own_var)
 
 
 def _begun(found: Found) -> Fused:
-    return Fused(found.number, 1.0 / found.var, found.drift_var, 1)
+    return Fused(found.number, 1.0 / found.own_var, found.shared_var, 1)
 
 
 def summary(epoch: LoadEpoch | None) -> Epoch | None:

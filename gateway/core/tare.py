@@ -139,9 +139,15 @@ def tared(estimate: Estimate, tare: Tare | None) -> Estimate:
         e,
         payload=_less(e.payload, payload),
         front_share=_less(e.front_share, front_share),
+        correlation=e.correlation * _kept(e.payload, payload) * _kept(e.front_share, front_share),
         epoch=epoch and Epoch(_less(epoch.payload, payload), _less(epoch.front_share, front_share), epoch.n_batches),
         tare=Correction(tare.id, payload, front_share, raw_payload=e.payload, raw_front_share=e.front_share),
     )
+
+
+def _kept(raw: Quantity, zero: Quantity) -> float:
+    """By how much the zero's own error, which knows nothing of the other quantity, lessens a correlation."""
+    return raw.std / math.hypot(raw.std, zero.std)
 
 
 def _less(raw: Quantity, zero: Quantity) -> Quantity:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.core.vehicle import Vehicle
-from gateway.estimate import Z95
+from gateway.estimate import Z95, Quantity
 
 RELEASE_SHARE: Final = 0.03  # of the limit: how far a load must fall below it before a warning ends
 
@@ -32,30 +32,34 @@ class Weights:
     rear_axle: Weight
 
 
-def weights_of(
-    vehicle: Vehicle, payload_kg: float, payload_std_kg: float, front_share_pct: float, front_share_std_pct: float
-) -> Weights:
+def weights_of(vehicle: Vehicle, payload: Quantity, front_share: Quantity, correlation: float = 0.0) -> Weights:
     """Gross weight and axle loads of ``vehicle`` with a payload aboard.
 
     On an axle rests its share D of the sprung mass M + L and its unsprung mass u:
 
         F_front = D/100 (M + L) + u_front,    F_rear = (1 - D/100) (M + L) + u_rear,    G = F_front + F_rear
 
-    Standard deviations are of first order with independent errors of L and D; the empty figures count
-    as exact. An unsprung mass that was not stated follows from the kerb weight of its axle; without
-    either, that axle's load (and the gross weight) are unknown.
+    Standard deviations are of first order in L and D, whose errors have this ``correlation``; where it is NaN they
+    count as independent, and the empty figures count as exact. An unsprung mass that was not stated follows from the
+    kerb weight of its axle; without either, that axle's load (and the gross weight) are unknown.
     """
-    sprung_kg = vehicle.empty_mass_kg + payload_kg
-    share = front_share_pct / 100.0
-    from_share_kg = sprung_kg * front_share_std_pct / 100.0
+    sprung_kg = vehicle.empty_mass_kg + payload.number
+    share = front_share.number / 100.0
+    by_share_kg = sprung_kg * front_share.std / 100.0
     front_kg, rear_kg = unsprung_kg(vehicle)
     return Weights(
-        gross=_weight(sprung_kg + front_kg + rear_kg, payload_std_kg),
-        front_axle=_weight(share * sprung_kg + front_kg, math.hypot(share * payload_std_kg, from_share_kg)),
+        gross=_weight(sprung_kg + front_kg + rear_kg, payload.std),
+        front_axle=_weight(share * sprung_kg + front_kg, _together(share * payload.std, by_share_kg, correlation)),
         rear_axle=_weight(
-            (1.0 - share) * sprung_kg + rear_kg, math.hypot((1.0 - share) * payload_std_kg, from_share_kg)
+            (1.0 - share) * sprung_kg + rear_kg, _together((1.0 - share) * payload.std, -by_share_kg, correlation)
         ),
     )
+
+
+def _together(one: float, other: float, correlation: float) -> float:
+    """Standard deviation of a sum of two errors (signed standard deviations) with this correlation."""
+    common = 0.0 if math.isnan(correlation) else 2.0 * correlation * one * other
+    return math.sqrt(max(0.0, one**2 + other**2 + common)) if not math.isnan(one + other) else math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,26 +70,25 @@ class Place:
     std_m: float
 
 
-def place_of(
-    vehicle: Vehicle, payload_kg: float, payload_std_kg: float, front_share_pct: float, front_share_std_pct: float
-) -> Place | None:
+def place_of(vehicle: Vehicle, payload: Quantity, front_share: Quantity, correlation: float = 0.0) -> Place | None:
     """Where the payload lies; None where there may be none, and so no place to tell.
 
     With s the share, s0 the empty share, M the empty mass and l the wheelbase, moments about the front axle give
 
         d = l (1 - F / L),    F = s (M + L) - s0 M,    the part of L that rests on the front axle,
 
-    the inverse of equation (3) of Bottelli et al. The deviation is of first order in L and s.
+    the inverse of equation (3) of Bottelli et al. The deviation is of first order in L and s, whose errors have this
+    ``correlation``.
     """
-    if not payload_kg > Z95 * payload_std_kg:
+    if not payload.number > Z95 * payload.std:
         return None
-    share, empty_share = front_share_pct / 100.0, vehicle.empty_front_share
-    total_kg = vehicle.empty_mass_kg + payload_kg
-    front_share_of_load = (share * total_kg - empty_share * vehicle.empty_mass_kg) / payload_kg
-    by_payload = (share - front_share_of_load) / payload_kg * payload_std_kg
-    by_share = total_kg / payload_kg * front_share_std_pct / 100.0
+    share, empty_share = front_share.number / 100.0, vehicle.empty_front_share
+    total_kg = vehicle.empty_mass_kg + payload.number
+    front_share_of_load = (share * total_kg - empty_share * vehicle.empty_mass_kg) / payload.number
+    by_payload = (share - front_share_of_load) / payload.number * payload.std
+    by_share = total_kg / payload.number * front_share.std / 100.0
     position = 1.0 - front_share_of_load  # in wheelbases
-    return Place(vehicle.wheelbase_m * position, vehicle.wheelbase_m * math.hypot(by_payload, by_share))
+    return Place(vehicle.wheelbase_m * position, vehicle.wheelbase_m * _together(by_payload, by_share, correlation))
 
 
 def unsprung_kg(vehicle: Vehicle) -> tuple[float, float]:

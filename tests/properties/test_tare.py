@@ -104,7 +104,9 @@ def test_intervals_move_with_the_number_and_never_narrow(found: Estimate, zero: 
 @given(batches)
 def test_a_zero_known_to_be_nothing_moves_nothing(found: Estimate) -> None:
     shown = tared(found, tare_of(Zero(0.0, 0.0, 0.0, 0.0)))
-    assert replace(shown, tare=None, payload=found.payload, front_share=found.front_share) == found
+    same = {"payload": found.payload, "front_share": found.front_share, "correlation": found.correlation}
+    assert replace(shown, tare=None, **same) == found
+    assert shown.correlation == pytest.approx(found.correlation, nan_ok=True)
     for after, before in ((shown.payload, found.payload), (shown.front_share, found.front_share)):
         assert (after.number, after.std) == (before.number, before.std)
         assert after.interval95 == pytest.approx(before.interval95)

@@ -17,7 +17,6 @@ from gateway.core.cross_spectrum.estimator import (
 )
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
-from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
@@ -103,7 +102,7 @@ def test_more_driving_makes_it_surer(calibration: CrossSpectrumCalibration) -> N
 
 def own_variances(found: Estimate) -> F64:
     """Of payload (kg) and front share (%), without what a change of the vehicle adds: that is the same anywhere."""
-    drift = np.array([found.diagnostics[PAYLOAD_DRIFT_STD_KG], found.diagnostics[FRONT_SHARE_DRIFT_STD_PCT]])
+    drift = np.array([found.diagnostics["payload_drift_std_kg"], found.diagnostics["front_share_drift_std_pct"]])
     return np.array([found.payload.std, found.front_share.std]) ** 2 - drift**2
 
 

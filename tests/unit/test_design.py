@@ -30,6 +30,7 @@ from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.vehicle import Load, front_share_pct
 from gateway.core.weights import weights_of
+from gateway.estimate import Quantity
 
 PRIOR = prior_of(VAN)
 UNKNOWN = np.diag(PRIOR.std**2)
@@ -159,7 +160,7 @@ def test_no_load_beyond_the_vehicle_is_asked_for() -> None:
     assert loads[0] == empty(LIMITED)
     assert len(loads) < len(drivable_loads(VAN))
     for load in (*loads, *weighed_loads(LIMITED)):
-        weights = weights_of(LIMITED, load.payload_kg, 0.0, load.front_share_pct, 0.0)
+        weights = weights_of(LIMITED, Quantity(load.payload_kg, 0.0), Quantity(load.front_share_pct, 0.0))
         assert weights.rear_axle.kg <= 950.0
         assert weights.gross.kg <= 1750.0
         assert load.payload_kg <= LIMITED.payload_range_kg[1]

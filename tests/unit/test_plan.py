@@ -19,6 +19,7 @@ from gateway.cli import springscale
 from gateway.cli.text.plan import plan_sentences
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError
+from gateway.estimate import Quantity
 from gateway.reports.calibration.runs import best_next
 
 DRAFT = """
@@ -54,7 +55,7 @@ def test_a_first_campaign_begins_empty_and_spreads_the_load() -> None:
 def test_axle_limits_bound_what_is_advised() -> None:
     limited = replace(VAN, unsprung_front_kg=80.0, unsprung_rear_kg=85.0, rear_axle_limit_kg=900.0)
     for advice in plan_first(limited).advice:
-        weights = weights_of(limited, advice.load.payload_kg, 0.0, advice.load.front_share_pct, 0.0)
+        weights = weights_of(limited, Quantity(advice.load.payload_kg, 0.0), Quantity(advice.load.front_share_pct, 0.0))
         assert weights.rear_axle.kg <= 900.0
 
 

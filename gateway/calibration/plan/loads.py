@@ -9,6 +9,7 @@ import numpy as np
 from gateway.core.calibrated import RANGE_MARGIN
 from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.core.weights import weights_of
+from gateway.estimate import Quantity
 
 DRIVEN_PARTS: Final = (0.25, 0.5, 0.75, 1.0)  # of the largest payload
 DRIVEN_PLACES: Final = (0.15, 0.35, 0.55, 0.75, 1.0)  # of the wheelbase, behind the front axle
@@ -86,7 +87,7 @@ def _within_limits(vehicle: Vehicle, loads: Iterable[tuple[float, float]]) -> tu
 
 def _is_allowed(vehicle: Vehicle, load: PlacedLoad) -> bool:
     """Limits are of the whole vehicle; one whose weight is not known is not checked."""
-    weights = weights_of(vehicle, load.payload_kg, 0.0, load.front_share_pct, 0.0)
+    weights = weights_of(vehicle, Quantity(load.payload_kg, 0.0), Quantity(load.front_share_pct, 0.0))
     checked = (
         (weights.gross, vehicle.gross_limit_kg),
         (weights.front_axle, vehicle.front_axle_limit_kg),

@@ -61,16 +61,18 @@ DRIFT_PRECISION: Final = np.linalg.inv(_believed_covariance())
 """(k, k) of the DRIFTING parameters: the inverse of what the search believes of them."""
 
 
-MOST_TENSION: Final = float(chi2.ppf(1.0 - 1e-4, len(DRIFTING)))
-"""What drifts as the search believes it to exceeds this once in ten thousand batches."""
+_OF_THE_VEHICLE: Final = np.array([name != "gyro_lag_s" for name in DRIFT_STD], dtype=float)  # a lag is the computer's
+MOST_TENSION: Final = float(chi2.ppf(1.0 - 1e-4, int(_OF_THE_VEHICLE.sum())))
+"""A vehicle that drifts as the search believes it to exceeds this once in ten thousand batches."""
 
 
 def tension_of(off: F64) -> float:
-    """How far the drifting parameters lie ``off`` (k,) their calibration: their squared distance, chi-squared of k.
+    """How far the drifting parameters lie ``off`` (k,) their calibration: those of the vehicle, squared, chi-squared.
 
     A load unlike any that calibration saw, or a vehicle that is no longer the same, is fitted at the price of
     parameters that no drift explains. The search holds them near the calibration, so that they lie nearer by right.
     """
+    off = off * _OF_THE_VEHICLE
     return float(off @ DRIFT_PRECISION @ off)
 
 

@@ -38,7 +38,7 @@ from gateway.core.cross_spectrum.sensor_change import (
     gain_std,
     scores_of,
 )
-from gateway.core.fusion import FRONT_SHARE_DRIFT_STD_PCT, PAYLOAD_DRIFT_STD_KG
+from gateway.core.fusion import FRONT_SHARE_OWN_STD_PCT, PAYLOAD_OWN_STD_KG
 from gateway.estimate import Estimate, Quantity
 from gateway.records import F64, Batch, Why
 
@@ -60,13 +60,15 @@ ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibrat
 class Located:
     """The best point of a batch with its covariance of (payload in kg, front share 0..1), not yet inflated.
 
-    drift_covariance is what a change of the vehicle since its calibration adds, gain_moves (2,) by how much the load
-    moves with the accelerometer's gain; no inflation is due on either. tension is how far what drifts lies off its
+    own_covariance is the part of it that no other batch shares: what its length and road leave. drift_covariance is
+    what a change of the vehicle since its calibration adds, gain_moves (2,) by how much the load moves with the
+    accelerometer's gain; no inflation is due on either. tension is how far what drifts lies off its
     calibration: drift.tension_of.
     """
 
     point: Point
     load_covariance: F64
+    own_covariance: F64
     drift_covariance: F64
     gain_moves: F64
     misfit: float
@@ -104,6 +106,7 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
     return Located(
         point=point,
         load_covariance=_load_covariance(found, moves, calibration),
+        own_covariance=found.covariance[-2:, -2:],
         drift_covariance=drift_covariance(found.covariance, moves)[-2:, -2:],
         gain_moves=gain_moves(whittle, point, found.covariance)[-2:],
         misfit=misfit,
@@ -209,13 +212,15 @@ def _judged(
 ) -> Estimate:
     """``unseen`` widens what is away from the calibration's speeds and roads; ``by_gain`` (2,) is of the sensor."""
     load = located.point.load
-    payload_var, share_var = np.diag(located.load_covariance)
-    payload_shared_var, share_shared_var = np.diag(located.drift_covariance) + by_gain**2
     reach = beyond(load, calibration.known_loads, calibration.empty_mass_kg)
     of_payload = calibration.payload_inflation * (1.0 + calibration.payload_inflation_per_reach * reach)
     of_share = calibration.front_share_inflation * (1.0 + calibration.front_share_inflation_per_reach * reach)
-    payload_std_kg = math.sqrt((unseen * of_payload) ** 2 * payload_var + payload_shared_var)
-    share_std_pct = 100.0 * math.sqrt((unseen * of_share) ** 2 * share_var + share_shared_var)
+    wider = unseen * np.array([of_payload, of_share])
+    covariance = wider[:, None] * located.load_covariance * wider
+    not_inflated = located.drift_covariance + np.outer(by_gain, by_gain)
+    covariance += not_inflated
+    payload_std_kg, share_std = (float(std) for std in np.sqrt(np.diag(covariance)))
+    own_payload_std_kg, own_share_std = (float(std) for std in np.sqrt(np.diag(located.own_covariance)))
     diagnostics = {
         "reach": reach,
         "misfit": located.misfit,
@@ -224,8 +229,10 @@ def _judged(
         "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
         "damper_rear_ratio": _ratio(located, calibration, "damper_rear_nspm"),
         "delay_scale": float(located.point.theta[INDEX["delay_scale"]]),
-        PAYLOAD_DRIFT_STD_KG: math.sqrt(payload_shared_var),
-        FRONT_SHARE_DRIFT_STD_PCT: 100.0 * math.sqrt(share_shared_var),
+        "payload_drift_std_kg": math.sqrt(not_inflated[0, 0]),
+        "front_share_drift_std_pct": 100.0 * math.sqrt(not_inflated[1, 1]),
+        PAYLOAD_OWN_STD_KG: own_payload_std_kg,
+        FRONT_SHARE_OWN_STD_PCT: 100.0 * own_share_std,
         "tension": located.tension,
         "sensor_position_score": located.scores.position,
         "sensor_noise_score": located.scores.noise,
@@ -239,7 +246,8 @@ def _judged(
     return replace(
         blank,
         payload=Quantity.normal(load.payload_kg, payload_std_kg),
-        front_share=Quantity.normal(load.front_share_pct, share_std_pct),
+        front_share=Quantity.normal(load.front_share_pct, 100.0 * share_std),
+        correlation=float(covariance[0, 1]) / (payload_std_kg * share_std),
         diagnostics=diagnostics,
     )
 

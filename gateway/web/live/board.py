@@ -1,6 +1,7 @@
 """What the service knows right now, ready to be sent: filled by the pipeline, read by the web."""
 
 import json
+import math
 import threading
 import time
 from collections import deque
@@ -48,6 +49,10 @@ class Shown:
     @property
     def payload(self) -> Quantity:
         return UNKNOWN if self.estimate is None else self.estimate.payload
+
+    @property
+    def correlation(self) -> float:
+        return math.nan if self.estimate is None else self.estimate.correlation
 
     @property
     def front_share(self) -> Quantity:

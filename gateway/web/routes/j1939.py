@@ -66,7 +66,9 @@ def j1939_router(board: Board, scales: Scales) -> APIRouter:
             t_end=None if shown.estimate is None else iso_utc(shown.estimate.t_end_ns),
             age_s=shown.age_s,
             is_stale=shown.is_stale,
-            parameters=parameters_of(scales.weigh(shown.payload, shown.front_share), shown.payload.number),
+            parameters=parameters_of(
+                scales.weigh(shown.payload, shown.front_share, shown.correlation), shown.payload.number
+            ),
         )
 
     return router

@@ -49,16 +49,18 @@ class Scales:
     def __init__(self, calibrated: CalibratedVehicle | None) -> None:
         self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
 
-    def weigh(self, payload: Quantity, front_share: Quantity) -> Weights | None:
+    def weigh(self, payload: Quantity, front_share: Quantity, correlation: float = math.nan) -> Weights | None:
         """Weights with such a payload; None without an answer or without figures of the vehicle."""
         if self.vehicle is None or math.isnan(payload.number) or math.isnan(front_share.number):
             return None
-        return weights_of(self.vehicle, payload.number, payload.std, front_share.number, front_share.std)
+        return weights_of(self.vehicle, payload, front_share, correlation)
 
-    def place(self, payload: Quantity, front_share: Quantity) -> Place | None:
+    def place(self, payload: Quantity, front_share: Quantity, correlation: float = math.nan) -> Place | None:
         """Where such a payload lies; None where that cannot be told."""
         numbers = (payload.number, payload.std, front_share.number, front_share.std)
-        return None if self.vehicle is None or any(map(math.isnan, numbers)) else place_of(self.vehicle, *numbers)
+        if self.vehicle is None or any(map(math.isnan, numbers)):
+            return None
+        return place_of(self.vehicle, payload, front_share, correlation)
 
     def limits_kg(self) -> dict[str, float | None]:
         """The limits that were stated for this vehicle."""
@@ -85,9 +87,10 @@ def weights_router(board: Board, scales: Scales) -> APIRouter:
 def weigh_latest(board: Board, scales: Scales) -> LatestWeights:
     """Weights of the estimate shown now; the warnings look back over the last estimates."""
     shown = board.shown()
-    weighed = (scales.weigh(past.payload, past.front_share) for past in board.recent_estimates())
+    weighed = (scales.weigh(past.payload, past.front_share, past.correlation) for past in board.recent_estimates())
     history = [weights for weights in weighed if weights is not None]
-    now, place = scales.weigh(shown.payload, shown.front_share), scales.place(shown.payload, shown.front_share)
+    told = (shown.payload, shown.front_share, shown.correlation)
+    now, place = scales.weigh(*told), scales.place(*told)
     limits = scales.limits_kg()
     return LatestWeights(
         id=None if shown.estimate is None else shown.estimate.id,
