@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
 
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
 from gateway.core.cross_spectrum.parameters import PARAMETERS
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import TERMS, RegressionModel
@@ -142,6 +142,8 @@ class CrossSpectrumPart(Part):
     front_share_inflation_per_reach: float = Field(0.0, ge=0.0)
     usual_log_amplitude: float | None = None
     gravity_mps2: float | None = Field(None, gt=0.0)
+    most_position_score: float = Field(SCORE, gt=0.0)
+    most_noise_score: float = Field(SCORE, gt=0.0)
 
     @classmethod
     def of(cls, calibration: CrossSpectrumCalibration) -> "CrossSpectrumPart":

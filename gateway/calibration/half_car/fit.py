@@ -20,7 +20,8 @@ from gateway.calibration.half_car.inflation import inflation_of
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
 from gateway.calibration.half_car.prior import Prior, prior_of
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
+from gateway.core.cross_spectrum.drift import MOST_TENSION
 from gateway.core.cross_spectrum.estimator import locate
 from gateway.core.cross_spectrum.likelihood import Curvature
 from gateway.core.cross_spectrum.measured import cross_spectra_of
@@ -32,6 +33,7 @@ from gateway.records import F64
 
 LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
 MISFIT_MARGIN: Final = 3.0
+SCORE_MARGIN: Final = 1.5  # other roads and loads than those of calibration
 SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
 UNTESTED: Final = "intervals_untested"
 
@@ -86,7 +88,8 @@ def fit_cross_spectrum(
         _tell(progress, len(_STARTS) + left_out, n_steps)
     if not errors:
         return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
-    payload_z, share_z, misfits, payload_kg, share_pct, reach = np.array([astuple(one) for one in errors]).T
+    columns = np.array([astuple(one) for one in errors]).T
+    payload_z, share_z, misfits, payload_kg, share_pct, reach, position_scores, noise_scores = columns
     of_payload, of_share = inflation_of(payload_z, reach), inflation_of(share_z, reach)
 
     def tested(untested: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
@@ -96,6 +99,8 @@ def fit_cross_spectrum(
             payload_inflation_per_reach=of_payload.per_reach,
             front_share_inflation=of_share.within,
             front_share_inflation_per_reach=of_share.per_reach,
+            most_position_score=max(SCORE, SCORE_MARGIN * float(np.max(position_scores))),
+            most_noise_score=max(SCORE, SCORE_MARGIN * float(np.max(noise_scores))),
             misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.nanmax([0.0, *misfits]))),
         )
 
@@ -168,6 +173,8 @@ class _LeftOut:
     payload_kg: float
     front_share_pct: float
     reach: float
+    position_score: float
+    noise_score: float
 
 
 def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -> list[_LeftOut]:
@@ -180,7 +187,7 @@ def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -
         if spectra is None or batch.rejected:
             continue
         located = locate(spectra, calibration)
-        if located.is_off:  # the service would refuse it
+        if located.tension > MOST_TENSION:  # the service would refuse it
             continue
         reach = beyond(located.point.load, calibration.known_loads, calibration.empty_mass_kg)
         payload_std_kg, share_std = np.sqrt(np.diag(located.load_covariance))
@@ -194,6 +201,8 @@ def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -
                 payload_kg=payload_kg,
                 front_share_pct=100.0 * share,
                 reach=reach,
+                position_score=abs(located.scores.position),
+                noise_score=located.scores.noise,
             )
         )
     return errors

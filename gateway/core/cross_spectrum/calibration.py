@@ -1,11 +1,14 @@
 """What the cross-spectral estimator knows of a vehicle: the half-car that its known-load drives taught."""
 
 from dataclasses import dataclass
+from typing import Final
 
 from gateway.core.cross_spectrum.measured import Reading
 from gateway.core.cross_spectrum.parameters import Ground
 from gateway.core.vehicle import Load
 from gateway.records import F64
+
+SCORE: Final = 6.0  # six standard deviations are no chance; a calibration that shows more of its own allows more
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +20,8 @@ class CrossSpectrumCalibration:
     as a load lies beyond ``known_loads`` (reach.beyond); misfit_limit is the
     largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
     root mean squares within the band. usual_log_amplitude: see measured.Reading. gravity_mps2 is what the
-    accelerometer read on average; None where the file does not say.
+    accelerometer read on average; None where the file does not say. The two scores are the largest that are believed
+    of a sensor that nobody touched (sensor_change).
     """
 
     empty_mass_kg: float
@@ -42,6 +46,8 @@ class CrossSpectrumCalibration:
     front_share_inflation_per_reach: float = 0.0
     usual_log_amplitude: float | None = None
     gravity_mps2: float | None = None
+    most_position_score: float = SCORE
+    most_noise_score: float = SCORE
 
     @property
     def ground(self) -> Ground:

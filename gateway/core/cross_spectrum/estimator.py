@@ -76,11 +76,6 @@ class Located:
     scores: SensorScores
     is_reversed: bool
 
-    @property
-    def is_off(self) -> bool:
-        """True where vehicle or sensor are not as calibrated, whatever the spectra fit."""
-        return self.scores.is_changed or self.tension > MOST_TENSION
-
 
 def by_cross_spectrum(batch: Batch, calibration: CrossSpectrumCalibration, blank: Estimate) -> Estimate:
     """``blank`` with payload, front share and diagnostics of the batch, or with the reason why not."""
@@ -257,7 +252,7 @@ def _disbelieved(located: Located, payload_std_kg: float, calibration: CrossSpec
         return Why.WRONG_SIGN
     if not located.misfit <= calibration.misfit_limit:
         return Why.MODEL_MISFIT
-    if located.scores.is_changed:
+    if located.scores.is_changed(calibration):
         return Why.SENSOR_CHANGED
     if located.tension > MOST_TENSION:
         return Why.MODEL_MISFIT
