@@ -1,0 +1,120 @@
+"""A sensor that is not where, or what, it was: told where it can be told, in the interval where it cannot."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.half_car_road import CAR, VAN, batch_over_road, weighed
+
+from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.known_run import KnownRun
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.drift import DRIFTING, MOST_TENSION, tension_of
+from gateway.core.cross_spectrum.parameters import INDEX
+from gateway.estimate import Estimate
+from gateway.records import Batch, Why
+
+KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
+LOAD = (200.0, 50.0)
+
+
+@pytest.fixture(scope="module")
+def calibration() -> CrossSpectrumCalibration:
+    runs = [
+        KnownRun(i, str(i), *load, tuple(batch_over_road(*load, seed=10 * i + k) for k in range(2)))
+        for i, load in enumerate(KNOWN)
+    ]
+    return calibrate_cross_spectrum(runs, VAN)
+
+
+def amplified(batch: Batch, gain: float) -> Batch:
+    """Another gain of the accelerometer shows in what it reads of gravity too."""
+    return replace(
+        batch,
+        vertical_acceleration_mps2=gain * batch.vertical_acceleration_mps2,
+        gravity_mps2=gain * batch.gravity_mps2,
+    )
+
+
+def answered(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
+    estimate = weighed(batch, calibration)
+    assert estimate.counted, estimate.rejected
+    return estimate
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_sensor_that_nobody_touched_is_believed(calibration: CrossSpectrumCalibration, seed: int) -> None:
+    told = answered(batch_over_road(*LOAD, seed=60 + seed), calibration).diagnostics
+    assert abs(told["sensor_position_score"]) < 4.0
+    assert told["sensor_noise_score"] < 4.0
+
+
+@pytest.mark.parametrize("moved_m", [-0.2, 0.2])
+def test_a_sensor_moved_along_the_vehicle_is_told(calibration: CrossSpectrumCalibration, moved_m: float) -> None:
+    elsewhere = replace(CAR, sensor_position_m=CAR.sensor_position_m + moved_m)
+    estimate = weighed(batch_over_road(*LOAD, seed=61, car=elsewhere), calibration)
+    assert estimate.rejected == (Why.SENSOR_CHANGED,)
+    assert np.sign(estimate.diagnostics["sensor_position_score"]) == np.sign(moved_m)
+
+
+def test_what_does_not_come_through_the_springs_is_told_as_noise(calibration: CrossSpectrumCalibration) -> None:
+    """As roll does, where the sensor was moved sideways or turned."""
+    batch = batch_over_road(*LOAD, seed=62)
+    roll = np.random.default_rng(62).standard_normal(len(batch.speed_mps))
+    mixed = replace(batch, vertical_acceleration_mps2=batch.vertical_acceleration_mps2 + 0.15 * roll)
+    estimate = weighed(mixed, calibration)
+    assert estimate.rejected == (Why.SENSOR_CHANGED,)
+    assert estimate.diagnostics["sensor_noise_score"] > calibration.most_noise_score
+
+
+def test_gravity_that_reads_otherwise_is_told(calibration: CrossSpectrumCalibration) -> None:
+    assert calibration.gravity_mps2 == pytest.approx(9.81)
+    assert weighed(amplified(batch_over_road(*LOAD, seed=63), 1.05), calibration).rejected == (Why.SENSOR_CHANGED,)
+
+
+def test_a_little_more_gain_is_within_the_interval(calibration: CrossSpectrumCalibration) -> None:
+    batch = batch_over_road(*LOAD, seed=64)
+    as_it_was, stronger = answered(batch, calibration), answered(amplified(batch, 1.01), calibration)
+    assert stronger.payload.std > as_it_was.payload.std
+    assert stronger.payload.interval95[0] <= LOAD[0] <= stronger.payload.interval95[1]
+    assert stronger.front_share.interval95[0] <= LOAD[1] <= stronger.front_share.interval95[1]
+
+
+def test_a_file_that_does_not_say_gravity_is_no_fault(calibration: CrossSpectrumCalibration) -> None:
+    older = replace(calibration, gravity_mps2=None)
+    batch = batch_over_road(*LOAD, seed=65)
+    assert answered(batch, older).payload.number == answered(batch, calibration).payload.number
+
+
+@pytest.mark.parametrize("lag_s", [-0.02, -0.005, 0.005, 0.02])
+def test_a_lag_between_the_sensors_costs_nothing(calibration: CrossSpectrumCalibration, lag_s: float) -> None:
+    lagging = answered(batch_over_road(*LOAD, seed=66, car=replace(CAR, gyro_lag_s=lag_s)), calibration)
+    assert lagging.payload.number == pytest.approx(
+        answered(batch_over_road(*LOAD, seed=66), calibration).payload.number, abs=6.0
+    )
+    assert lagging.front_share.number == pytest.approx(LOAD[1], abs=0.4)
+
+
+def test_tension_counts_the_vehicle_and_not_the_lag() -> None:
+    off = np.zeros(len(DRIFTING))
+    off[DRIFTING.index(INDEX["gyro_lag_s"])] = 0.02
+    assert tension_of(off) == 0.0
+    off[DRIFTING.index(INDEX["damper_rear_nspm"])] = 0.55
+    assert tension_of(off) > MOST_TENSION
+
+
+def test_a_vehicle_that_no_drift_explains_is_refused(calibration: CrossSpectrumCalibration) -> None:
+    worn = replace(CAR, rear=replace(CAR.rear, damper_nspm=1.74 * CAR.rear.damper_nspm))
+    estimate = weighed(batch_over_road(*LOAD, seed=67, car=worn), calibration)
+    assert not estimate.counted
+    assert estimate.diagnostics["tension"] > MOST_TENSION
+
+
+def test_payload_and_share_say_how_their_errors_go_together(calibration: CrossSpectrumCalibration) -> None:
+    """Errors of many batches are correlated as each of them says, in sign at least."""
+    estimates = [answered(batch_over_road(*LOAD, seed=200 + k, duration_s=100.0), calibration) for k in range(12)]
+    told = float(np.mean([one.correlation for one in estimates]))
+    seen = float(np.corrcoef([[e.payload.number, e.front_share.number] for e in estimates], rowvar=False)[0, 1])
+    assert all(-1.0 < one.correlation < 1.0 for one in estimates)
+    if abs(told) > 0.5:
+        assert np.sign(seen) == np.sign(told)
