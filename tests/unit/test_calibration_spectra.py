@@ -59,7 +59,7 @@ def test_a_curve_for_every_load_and_the_bands_where_they_are() -> None:
     runs = [known(1, 0.0, 52.0), known(2, 200.0, 50.0), known(3, 200.0, 47.0)]
     section = spectra_section(runs, ratio_index_calibration())
     assert section is not None
-    of_load, of_share = section.charts[0].panels
+    of_load, of_share = (chart.panels[0] for chart in section.charts)
     assert [mark.label for mark in of_load.marks if isinstance(mark, Line)] == ["0 kg", "200 kg"]
     assert [mark.label for mark in of_share.marks if isinstance(mark, Line)] == ["47.0 %", "50.0 %", "52.0 %"]
     assert sum(isinstance(mark, Ribbon) for mark in of_share.marks) == 3

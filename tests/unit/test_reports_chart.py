@@ -67,6 +67,15 @@ def test_a_label_stands_in_the_legend_once_and_switches_every_panel() -> None:
     assert [text.get_text() for text in legend.get_texts()] == ["same"]
 
 
+def test_on_a_phone_panels_stand_below_one_another() -> None:
+    told = json.loads(plotly_json(chart(panel(MARKS[0]), panel(MARKS[1]))))
+    wide, narrow = told["layout"], told["narrow"]
+    assert wide["xaxis2"]["domain"][0] > wide["xaxis"]["domain"][1]
+    assert narrow["xaxis"]["domain"] == narrow["xaxis2"]["domain"] == [0.0, 1.0]
+    assert narrow["yaxis"]["domain"][0] > narrow["yaxis2"]["domain"][1]
+    assert narrow["height"] > wide["height"]
+
+
 def test_axes_say_what_they_are() -> None:
     one = chart(Panel(Axis("f", limits=(1.0, 9.0)), Axis("", places=("low", "high")), (Line(X, X),)))
     layout = json.loads(plotly_json(one))["layout"]

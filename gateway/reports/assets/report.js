@@ -17,19 +17,22 @@
     };
   };
 
+  const isPhone = matchMedia("(max-width: 48rem)");
   const draw = (figure) => {
     const place = figure.querySelector(".live");
     const chart = JSON.parse(figure.querySelector("script").textContent);
+    const layout = isPhone.matches ? chart.narrow : chart.layout;
     const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
     place.hidden = false;
     figure.querySelector("img").style.display = "none";
     place.firstElementChild || place.append(document.createElement("div"));
-    Plotly.react(place.firstElementChild, chart.data, themed(chart.layout), options);
+    Plotly.react(place.firstElementChild, chart.data, themed(layout), options);
   };
 
   const visible = () => [...document.querySelectorAll("figure")].filter((one) => !one.closest("details:not([open])"));
   const drawAll = () => visible().forEach(draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+  isPhone.addEventListener("change", drawAll);
   document.querySelectorAll("details").forEach((one) => one.addEventListener("toggle", () => {
     if (one.open) one.querySelectorAll("figure").forEach(draw);
   }));

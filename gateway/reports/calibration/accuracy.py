@@ -25,7 +25,7 @@ from gateway.reports.calibration.text import decimal, estimator_name, percent
 from gateway.reports.charts import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
 
 _MARKERS: Final[Mapping[Part, Marker]] = {Part.LEFT_OUT: "circle", Part.VALIDATION: "diamond"}
-_COLOURS: Final[Mapping[Part, int]] = {Part.LEFT_OUT: 0, Part.VALIDATION: 1, Part.IDENTIFICATION: GREY, Part.ALL: 0}
+_COLOURS: Final[Mapping[Part, int]] = {Part.LEFT_OUT: 0, Part.VALIDATION: 1, Part.IDENTIFICATION: 3, Part.ALL: 0}
 
 
 def accuracy_section(judgement: Judgement) -> Section:

@@ -99,7 +99,7 @@ def _fit_chart(fit: Fit) -> Chart:
     band = (m.freq_hz >= s.freq_hz[0]) & (m.freq_hz <= s.freq_hz[-1])
 
     def panel(title: str, measured: F64, modelled: F64, *, is_log: bool = False) -> Panel:
-        marks = (Line(m.freq_hz[band], measured[band], "measured", 0), Line(s.freq_hz, modelled, "half-car", 1, "dash"))
+        marks = (Line(m.freq_hz[band], measured[band], "measured", 0), Line(s.freq_hz, modelled, "half-car", 2, "dash"))
         return Panel(Axis("frequency [Hz]"), Axis(title, is_log=is_log), marks)
 
     return Chart(

@@ -102,7 +102,8 @@ def _figure(chart: Chart, live: dict[str, str]) -> str:
     """The still picture, and beside it what plotly needs to take its place on screen."""
     spec = live[chart.name].replace("<", "\\u003c")  # so that no text can end the element
     return (
-        f'<figure id="figure-{chart.name}"><img src="figures/{chart.name}.svg" alt="{escape(chart.alt)}">'
+        f'<figure id="figure-{chart.name}">'
+        f'<div class="wide"><img src="figures/{chart.name}.svg" alt="{escape(chart.alt)}"></div>'
         f'<div class="wide live" role="img" aria-label="{escape(chart.alt)}" hidden></div>'
         f'<script type="application/json">{spec}</script>'
         f'<figcaption>{prose(chart.caption)} <a href="figures/{chart.name}.svg">SVG</a> '

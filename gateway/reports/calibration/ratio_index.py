@@ -68,7 +68,7 @@ def _panels(name: str, fitted: IndexRows, later: IndexRows, model: RegressionMod
 
 def _points(name: str, fitted: IndexRows, later: IndexRows, *, of_payload: bool) -> list[Points]:
     sets: list[tuple[IndexRows, str, int, Marker]] = [
-        (fitted, "identification", 0, "circle"),
+        (fitted, "identification", 3, "circle"),
         (later, "validation", 1, "diamond"),
     ]
     return [

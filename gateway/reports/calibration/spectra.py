@@ -58,27 +58,35 @@ def density_of(batches: Iterable[Batch], sensor: str) -> Density | None:
 
 
 def spectra_section(runs: Sequence[KnownRun], ratio_index: RatioIndexCalibration | None) -> Section | None:
-    """Acceleration by payload and pitch rate by front share; None where there is no spectrum at all."""
+    """Acceleration by payload and pitch rate by front share, a chart each, for a colour is one load or one share.
+
+    None where there is no spectrum at all.
+    """
     bands_a = ratio_index.acceleration_bands if ratio_index else None
     bands_g = ratio_index.pitch_rate_bands if ratio_index else None
+    payloads = [(f"{kg:g} kg", kg) for kg in sorted({run.payload_kg for run in runs})]
+    shares = [(f"{pct:.1f} %", pct) for pct in sorted({_share(run) for run in runs})]
     drawn = (
-        _panel(runs, ACCELERATION, [(f"{kg:g} kg", kg) for kg in sorted({run.payload_kg for run in runs})], bands_a),
-        _panel(runs, PITCH_RATE, [(f"{pct:.1f} %", pct) for pct in sorted({_share(run) for run in runs})], bands_g),
+        _chart(ACCELERATION, "for each payload", _panel(runs, ACCELERATION, payloads, bands_a), bands_a),
+        _chart(PITCH_RATE, "for front shares", _panel(runs, PITCH_RATE, shares, bands_g), bands_g),
     )
-    panels = tuple(panel for panel in drawn if panel is not None)
-    if not panels:
+    charts = tuple(chart for chart in drawn if chart is not None)
+    return Section("spectra", "Spectra", (), charts) if charts else None
+
+
+def _chart(sensor: str, by: str, panel: Panel | None, bands: tuple[Band, Band] | None) -> Chart | None:
+    if panel is None:
         return None
-    chart = Chart(
-        "spectra",
-        "Amplitude densities of the identification part: acceleration by payload, pitch rate by front share. The "
-        "ribbon is the 95 % scatter of the mean over that much driving on the same road; roads differ besides."
-        + (" Shaded upright: the bands whose ratio is the index." if ratio_index else ""),
-        "Spectra of vertical acceleration for each payload and of pitch rate for front shares: more load lowers and "
-        "moves the resonances of body and wheels.",
-        panels,
+    name = sensor.replace("_", " ")
+    return Chart(
+        f"spectra_{sensor}",
+        f"Amplitude density of the {name} in the identification part, {by}. The ribbon is the 95 % scatter of the mean "
+        "over that much driving on the same road; roads differ besides."
+        + (" Shaded upright: the bands whose ratio is the index." if bands else ""),
+        f"Spectra of the {name} {by}: more load lowers and moves the resonances of body and wheels.",
+        (panel,),
         row_height_px=380,
     )
-    return Section("spectra", "Spectra", (), (chart,))
 
 
 def _share(run: KnownRun) -> float:

@@ -1,16 +1,19 @@
 """Charts for plotly: the JSON that plotly.js draws in the page, and the script itself."""
 
 import math
+from dataclasses import replace
 from functools import singledispatch
 from typing import Any, Final
 
 import plotly.graph_objects as go
+from plotly.io.json import to_json_plotly
 from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
 
 from gateway.reports.charts.chart import COLOURS, Axis, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
 
 _LEGEND_PX: Final = 90
+_NAME_PX: Final = 20
 _GAP_PX: Final = 95
 _OPACITY: Final = 0.18
 _TICKS: Final = [digit * 10.0**decade for decade in range(-5, 4) for digit in (1, 2, 5)]
@@ -24,13 +27,17 @@ def plotly_script() -> str:
 
 
 def plotly_json(chart: Chart) -> str:
-    """{"data": [...], "layout": {...}}: validated by plotly, without a theme (the page sets its colours)."""
-    text: str = live(chart).to_json()
+    """{"data": [...], "layout": {...}, "narrow": {...}}: validated by plotly, without a theme (the page sets colours).
+
+    ``narrow`` is the layout on a phone, where panels stand below one another.
+    """
+    narrow = live(replace(chart, most_columns=1), has_room=False).layout
+    text: str = to_json_plotly(live(chart).to_plotly_json() | {"narrow": narrow})
     return text
 
 
-def live(chart: Chart) -> go.Figure:
-    """The chart as a plotly figure."""
+def live(chart: Chart, *, has_room: bool = True) -> go.Figure:
+    """The chart as a plotly figure; its legend in lines below, or one name a line where there is no room."""
     height_px = chart.n_rows * chart.row_height_px
     figure = make_subplots(
         rows=chart.n_rows,
@@ -45,9 +52,9 @@ def live(chart: Chart) -> go.Figure:
     figure.update_annotations(font_size=13)
     figure.update_layout(
         template="none",
-        height=height_px + _LEGEND_PX,
+        height=height_px + (_LEGEND_PX if has_room else _LEGEND_PX + _NAME_PX * len(seen)),
         margin={"l": 60, "r": 15, "t": 35, "b": 60},
-        legend={"orientation": "h", "yanchor": "top", "y": -_GAP_PX / height_px * 0.8, "x": 0.0},
+        legend={"orientation": "h" if has_room else "v", "yanchor": "top", "y": -_GAP_PX / height_px * 0.8, "x": 0.0},
         hovermode="closest",
     )
     return figure
