@@ -10,7 +10,7 @@ from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.toml_file import describe_faults, read_toml
 
-Seconds = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years, in nanoseconds within 64 bits
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
 EstimatorName = Literal["cross_spectrum", "ratio_index"]  # those of core.estimator, which loads too much for this
@@ -43,7 +43,9 @@ class BusSection(Section):
     options: dict[str, str | int | float | bool] = Field(
         default_factory=dict, description="further arguments of that python-can interface, e.g. bitrate"
     )
-    inbox_frames: int = Field(65_536, ge=1024, description="frames held between reader and pipeline; more are dropped")
+    inbox_frames: int = Field(
+        65_536, ge=1024, le=16_777_216, description="frames held between reader and pipeline; more are dropped"
+    )
     silence_s: Seconds = Field(2.0, description="the bus counts as silent (asleep) after this long without a frame")
 
 
@@ -60,7 +62,7 @@ class BatchSection(Section):
         0.95, description="the last batch of a drive counts when it holds at least this share of the window"
     )
     standstill_s: Seconds = Field(60.0, description="a standstill this long ends the drive")
-    standstill_speed_mps: float = Field(0.5, gt=0.0, description="slower than this is standing")
+    standstill_speed_mps: float = Field(0.5, gt=0.0, le=100.0, description="slower than this is standing")
     silence_s: Seconds = Field(10.0, description="this long without a mapped frame ends the drive")
     clock_step_s: Seconds = Field(1.0, description="a step back of the time stamps larger than this ends the drive")
     gap_s: Seconds = Field(0.05, description="samples further apart than this leave a gap")
@@ -68,7 +70,10 @@ class BatchSection(Section):
     stuck_s: Seconds = Field(5.0, description="a sensor that repeats one number for this long is stuck")
     speed_frozen_s: Seconds = Field(60.0, description="a GNSS speed that repeats one number for this long is frozen")
     provisional_every_s: float = Field(
-        60.0, ge=0.0, description="the service looks at a growing window this often (0: never); offline tools do not"
+        60.0,
+        ge=0.0,
+        le=1e9,
+        description="the service looks at a growing window this often (0: never); offline tools do not",
     )
 
     @model_validator(mode="after")
@@ -77,6 +82,8 @@ class BatchSection(Section):
             raise ValueError("speed_min_mps must be below speed_max_mps")
         if self.silence_s >= self.window_s:
             raise ValueError("silence_s must be below window_s")
+        if 0.0 < self.provisional_every_s < 1.0:
+            raise ValueError("provisional_every_s must be 0 or at least 1")
         return self
 
     def for_core(self, *, window_s: float | None = None, is_live: bool = False) -> BatchSettings:
@@ -112,8 +119,8 @@ class StoreSection(Section):
     """Where estimates are kept."""
 
     directory: Path = Field(Path("/var/lib/springscale"), description="folder of the database")
-    max_age_days: float = Field(400.0, gt=0.0, description="older records are removed")
-    max_size_mb: float = Field(512.0, ge=4.0, description="the oldest records are removed beyond this size")
+    max_age_days: float = Field(400.0, gt=0.0, le=36_500.0, description="older records are removed")
+    max_size_mb: float = Field(512.0, ge=4.0, le=1e9, description="the oldest records are removed beyond this size")
 
 
 class UplinkSection(Section):

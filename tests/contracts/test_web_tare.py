@@ -143,7 +143,7 @@ _ANY = st.recursive(
 _CLAIM = st.fixed_dictionaries({}, optional={"is_empty": st.just(True) | _ANY, "note": _TEXT | _ANY, "x": _ANY})
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(body=_CLAIM | _ANY)
 def test_no_body_is_met_with_an_error_of_ours_or_spoils_the_next_start(
     tmp_path_factory: pytest.TempPathFactory, body: Any
@@ -200,6 +200,13 @@ def test_the_dashboards_own_page_may(local: Client) -> None:
 def test_a_form_is_no_claim(local: Client, kind: str | None) -> None:
     headers = {} if kind is None else {"Content-Type": kind}
     assert local.request("POST", URL, content=b'{"is_empty": true}', headers=headers).status_code == 422
+
+
+@pytest.mark.parametrize("method", ["OPTIONS", "PUT", "PATCH"])
+def test_what_is_not_possible_is_answered_with_all_that_is(local: Client, method: str) -> None:
+    answer = local.request(method, URL)
+    assert answer.status_code == 405
+    assert set(answer.headers["allow"].split(", ")) == {"GET", "HEAD", "POST", "DELETE"}
 
 
 def test_where_nothing_is_weighed_there_is_nothing_to_re_zero(tmp_path: Path) -> None:

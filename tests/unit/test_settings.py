@@ -1,13 +1,19 @@
 """springscale.toml and the environment; and the border where foreign units become SI."""
 
 import math
+from contextlib import closing
 from pathlib import Path
+from typing import get_args
 
 import pytest
+from support.drives import drive
+from support.patience import PATIENCE_S
 
-from gateway.config import ESTIMATOR_NAMES, Settings, load_settings
+from gateway.config import ESTIMATOR_NAMES, Section, Settings, load_settings
 from gateway.core.estimator import ESTIMATORS
+from gateway.core.scheduler import Scheduler
 from gateway.errors import ConfigurationError, SignalMapError
+from gateway.service.parts import store_of
 from gateway.units import si_factor
 
 LEAST = 'signals = "signals.toml"\n'
@@ -127,3 +133,38 @@ def test_an_unknown_unit_is_an_error_that_says_which_are_known(unit: str | None,
     with pytest.raises(SignalMapError, match=said) as caught:
         si_factor("speed", unit)
     assert "km/h" in str(caught.value)
+
+
+NUMBERS = ("inf", "-inf", "nan", "1e308", "-1e308", "1e18", "1e10", "-1", "0", "5e-324", "9" * 40)
+
+
+def numeric_keys() -> list[tuple[str, str]]:
+    """Section and key of every number there is to set."""
+    sections = {name: field.annotation for name, field in Settings.model_fields.items()}
+    return [
+        (name, key)
+        for name, section in sections.items()
+        if isinstance(section, type) and issubclass(section, Section)
+        for key, field in section.model_fields.items()
+        if {field.annotation, *get_args(field.annotation)} & {int, float}
+    ]
+
+
+@pytest.mark.parametrize(("section", "key"), numeric_keys())
+def test_a_number_out_of_all_bounds_is_refused_in_words_or_can_be_used(tmp_path: Path, section: str, key: str) -> None:
+    refusals = []
+    for n, number in enumerate(NUMBERS):
+        try:
+            settings = loaded(tmp_path, f'{LEAST}vehicle.id = "van-17"\n[{section}]\n{key} = {number}\n')
+        except ConfigurationError as fault:
+            refusals.append(str(fault))
+            continue
+        scheduler = Scheduler(settings.batch.for_core(is_live=True), {})
+        list(scheduler.feed(drive(1.0)))
+        list(scheduler.flush())
+        kept = settings.store.model_copy(update={"directory": tmp_path / str(n)})
+        with closing(store_of(kept, None)) as store:
+            store.write_event("started", {})
+            assert store.flush(PATIENCE_S)
+    assert refusals
+    assert all(f"{section}.{key}: " in refusal or f": {section}: " in refusal for refusal in refusals)

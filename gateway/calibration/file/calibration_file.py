@@ -106,13 +106,17 @@ def load_calibration(path: Path | str) -> CalibrationFile:
         )
     try:
         current = migrated(content, VERSION)
-        return CalibrationFile.model_validate({key: part for key, part in current.items() if key != "id"})
+        held = CalibrationFile.model_validate({key: part for key, part in current.items() if key != "id"})
+        held.for_core()  # a term or a model of another springscale is told here, with the file's name
+    except CalibrationFileError as fault:
+        raise CalibrationFileError(f"{path}: {fault}") from None
     except ValidationError as fault:
         raise CalibrationFileError(describe_faults(path, fault)) from None
-    except (KeyError, TypeError, AttributeError):  # a migration met a shape that its version never had
+    except (KeyError, TypeError, AttributeError, RecursionError):  # a migration met a shape that its version never had
         raise CalibrationFileError(
             f"{path}: not the shape of a calibration file of version {content['version']}: calibrate again"
         ) from None
+    return held
 
 
 def _refuse_unknown_version(path: Path, version: Any) -> None:
@@ -142,7 +146,7 @@ def _read(path: Path) -> dict[str, Any]:
         raise CalibrationFileError(f"{path}: no such calibration file") from None
     except (OSError, UnicodeDecodeError) as fault:
         raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
-    except json.JSONDecodeError as fault:
+    except (ValueError, RecursionError) as fault:  # a number of 5000 digits and brackets 5000 deep are no JSON for us
         raise CalibrationFileError(f"{path}: not valid JSON: {fault}") from None
     if not isinstance(content, dict):
         raise CalibrationFileError(f"{path}: not a springscale calibration file")

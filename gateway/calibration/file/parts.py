@@ -4,7 +4,7 @@ from dataclasses import astuple, fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
 from gateway.core.cross_spectrum.parameters import PARAMETERS
@@ -16,10 +16,22 @@ from gateway.records import F64
 
 
 def _array(numbers: Any) -> F64:
-    array = np.asarray(numbers, dtype=float)
+    try:
+        array = np.asarray(numbers, dtype=float)
+    except (OverflowError, TypeError, ValueError):
+        raise ValueError("is no array of numbers") from None
+    if array.ndim == 0:
+        raise ValueError("is one number where an array belongs")
     if not np.all(np.isfinite(array)):
         raise ValueError("holds a number that is not finite")
     return array
+
+
+def _check_shapes(**expected: tuple[F64, tuple[int, ...]]) -> None:
+    """Arrays by name, each with the shape it must have. Raises ValueError."""
+    for name, (array, shape) in expected.items():
+        if array.shape != shape:
+            raise ValueError(f"{name} has the shape {array.shape}, its terms or names ask for {shape}")
 
 
 Array = Annotated[
@@ -52,6 +64,17 @@ class RegressionPart(Part):
     residual_std: float = Field(gt=0.0)
     dof: float = Field(gt=0.0)
 
+    @model_validator(mode="after")
+    def _is_consistent(self) -> "RegressionPart":
+        n = len(self.terms)
+        _check_shapes(
+            lows=(self.lows, (n,)),
+            highs=(self.highs, (n,)),
+            coefficients=(self.coefficients, (n + 1,)),
+            gram_inverse=(self.gram_inverse, (n + 1, n + 1)),
+        )
+        return self
+
     def for_core(self) -> RegressionModel:
         """The same in the core's terms. Raises CalibrationFileError for a term this version does not know."""
         unknown = sorted(set(self.terms) - set(TERMS))
@@ -64,7 +87,7 @@ class RatioIndexPart(Part):
     """The ratio index of this vehicle; bands are [centre Hz, width Hz], numerator first."""
 
     spectrum: Literal["amplitude", "power"]
-    n_segment: int = Field(ge=64)
+    n_segment: int = Field(ge=64, le=65_536)
     acceleration_bands: tuple[tuple[float, float], tuple[float, float]] | None
     pitch_rate_bands: tuple[tuple[float, float], tuple[float, float]] | None
     payload: RegressionPart | None
@@ -123,7 +146,7 @@ class CrossSpectrumPart(Part):
     empty_front_share_pct: float
     wheelbase_m: float = Field(gt=0.0)
     band_hz: tuple[float, float]
-    n_segment: int = Field(ge=64)
+    n_segment: int = Field(ge=64, le=65_536)
     names: tuple[str, ...]
     parameters: Array
     covariance: Array
@@ -144,6 +167,12 @@ class CrossSpectrumPart(Part):
     gravity_mps2: float | None = Field(None, gt=0.0)
     most_position_score: float = Field(SCORE, gt=0.0)
     most_noise_score: float = Field(SCORE, gt=0.0)
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> "CrossSpectrumPart":
+        n = len(self.names)
+        _check_shapes(parameters=(self.parameters, (n,)), covariance=(self.covariance, (n, n)))
+        return self
 
     @classmethod
     def of(cls, calibration: CrossSpectrumCalibration) -> "CrossSpectrumPart":

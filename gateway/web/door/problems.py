@@ -66,14 +66,22 @@ async def _http(request: Request, error: Exception) -> Response:
         detail = "there is nothing at this address: /openapi.json lists what there is"
     elif error.status_code == 405:
         detail = f"{request.method} is not possible here"
-    return problem_response(error.status_code, detail, request.url.path, headers=_with_head(error.headers))
+    headers = _with_all_methods(request, error.headers)
+    return problem_response(error.status_code, detail, request.url.path, headers=headers)
 
 
-def _with_head(headers: Mapping[str, str] | None) -> Mapping[str, str] | None:
-    """Where GET is allowed, HEAD is (headers.AnswersHead), which the routes do not know."""
-    if headers is None or "GET" not in (allowed := headers.get("Allow", "").split(", ")) or "HEAD" in allowed:
+def _with_all_methods(request: Request, headers: Mapping[str, str] | None) -> Mapping[str, str] | None:
+    """Every method of this address, where each is a route of its own and a route knows only itself.
+
+    Where GET is allowed, HEAD is (headers.AnswersHead), which the routes do not know.
+    """
+    if headers is None or "Allow" not in headers:
         return headers
-    return {**headers, "Allow": ", ".join([*allowed, "HEAD"])}
+    described = request.app.openapi()["paths"].get(request.url.path, {})
+    allowed = dict.fromkeys([*headers["Allow"].split(", "), *(method.upper() for method in described)])
+    if "GET" in allowed:
+        allowed["HEAD"] = None
+    return {**headers, "Allow": ", ".join(allowed)}
 
 
 async def _invalid(request: Request, error: Exception) -> Response:
