@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -17,6 +17,9 @@ OnRun = Callable[[int, int], None]  # (runs done, runs in all)
 Percent = Annotated[float, Field(ge=1.0, le=99.0)]
 Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0)]
 Metres = Annotated[float, Field(ge=-10.0, le=30.0)]
+
+LEAST_PAYLOAD_SHARE: Final = 0.004
+"""Of the empty mass. No vehicle carries four times its own, so that a load in tonnes reads less than this in kg."""
 
 
 class _Table(BaseModel):
@@ -151,7 +154,8 @@ def load_campaign(path: Path, *, may_lack_runs: bool = False) -> Campaign:
     tables = read_toml(path, CampaignError)
     model = DraftTable if may_lack_runs and not tables.get("runs") else CampaignTable
     campaign = Campaign(path, checked(tables, path, model, CampaignError))
-    faults = [
+    faults = [f"{path}: vehicle.{fault}" for fault in _range_faults(campaign.vehicle)]
+    faults += [
         f"{path}: runs[{i}].{fault}" for i, run in enumerate(campaign.runs, 1) for fault in _faults(campaign, run)
     ]
     if faults:
@@ -159,7 +163,22 @@ def load_campaign(path: Path, *, may_lack_runs: bool = False) -> Campaign:
     return campaign
 
 
+def _is_in_tonnes(payload_kg: float, vehicle: Vehicle) -> bool:
+    return 0.0 < payload_kg < LEAST_PAYLOAD_SHARE * vehicle.empty_mass_kg
+
+
+def _range_faults(vehicle: Vehicle) -> Iterator[str]:
+    most_kg = vehicle.payload_range_kg[1]
+    if _is_in_tonnes(most_kg, vehicle):
+        yield f"payload_range_kg: {most_kg:g} kg is no load of a vehicle of {vehicle.empty_mass_kg:g} kg; tonnes?"
+
+
 def _faults(campaign: Campaign, run: RunTable) -> Iterator[str]:
+    if _is_in_tonnes(run.payload_kg, campaign.vehicle):
+        yield (
+            f"payload_kg: {run.payload_kg:g} kg is no load of a vehicle of {campaign.vehicle.empty_mass_kg:g} kg: "
+            f"write {1000.0 * run.payload_kg:g} if these are tonnes, 0 if it was empty"
+        )
     if not campaign.log_of(run).is_file():
         yield f"log: {run.log}: no such file"
     share_pct = campaign.front_share_pct(run)

@@ -132,6 +132,16 @@ def test_the_runs_count(severities: tuple[Severity | None, ...], grade: Grade) -
     assert grade_of(verdict(rows, runs=runs), "runs") is grade
 
 
+def test_a_run_that_the_others_weigh_otherwise_makes_a_calibration_unfit_unless_it_took_no_part() -> None:
+    doubt = Finding(Kind.LOAD_DISAGREES, Severity.WARNING, "weighed at 5 kg", "check the load")
+    fault = Finding(Kind.GAPS, Severity.FAULT, "gaps", "drive again")
+    rows = [judged(run) for run in range(1, 5)]
+    found = verdict(rows, runs=(RunVerdict(1, "a.log"), RunVerdict(2, "b.log", (doubt,)), RunVerdict(3, "c.log")))
+    assert (found.grade, grade_of(found, "labels")) == (Grade.UNFIT, Grade.UNFIT)
+    out = verdict(rows, runs=(RunVerdict(1, "a.log"), RunVerdict(2, "b.log", (fault, doubt)), RunVerdict(3, "c.log")))
+    assert "labels" not in [reason.rule for reason in out.reasons]
+
+
 @pytest.mark.parametrize(("std_kg", "grade"), [(50.0, Grade.FIT), (100.0, Grade.RESERVED), (120.0, Grade.UNFIT)])
 def test_what_it_states_of_all_loads_counts_too(std_kg: float, grade: Grade) -> None:
     """sqrt(2 / pi) of 50, 100 and 120 kg are 8.9, 17.7 and 21.3 % of 450 kg."""

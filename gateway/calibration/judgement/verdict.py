@@ -11,6 +11,7 @@ from typing import Final
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import RunVerdict, Severity
+from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement, Part
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Target, TargetErrors
@@ -83,7 +84,8 @@ def _verdict(assessment: Assessment, judgement: Judgement, expected: Expected | 
     if expected and judgement.estimator == "cross_spectrum":
         reasons.append(_stated(expected, assessment.vehicle))
     if assessment.outcome:
-        reasons += [*_runs(assessment.outcome.inspection.verdicts), *_campaign(assessment.outcome)]
+        verdicts = assessment.outcome.inspection.verdicts
+        reasons += [*_runs(verdicts), *_labels(verdicts), *_campaign(assessment.outcome)]
     return Verdict(judgement.estimator, (*reasons, *_warnings(assessment, judgement.estimator)))
 
 
@@ -205,6 +207,18 @@ def _runs(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
         yield Reason("runs", Grade.RESERVED, f"Of {in_all} want a look: {_listed(doubtful)}.")
     elif verdicts:
         yield Reason("runs", Grade.FIT, f"Without a fault: {in_all}, all there are.")
+
+
+def _labels(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
+    """A wrong load that took part bends every answer, and the errors it is judged by."""
+    doubted = [
+        one.number
+        for one in verdicts
+        if one.is_usable and any(finding.kind is Kind.LOAD_DISAGREES for finding in one.findings)
+    ]
+    if doubted:
+        text = f"The other runs weigh {_listed(doubted)} otherwise than the campaign file says: correct the load, or "
+        yield Reason("labels", Grade.UNFIT, f"{text}calibrate without (--runs).")
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -238,7 +238,7 @@ def _moved_responses(
     """Central differences (k, b, m) of the responses for the vehicle's ``free`` entries, then the load's two."""
     k = len(free) + 2 * is_load_free
     thetas = np.repeat(theta[None], 2 * k, axis=0)
-    payload_kg, share = np.full(2 * k, load[0]), np.full(2 * k, load[1])
+    payload_kg, share = np.full(2 * k, load[0], float), np.full(2 * k, load[1], float)
     step = np.full(k, STEP)
     for row, entry in enumerate(free):
         thetas[2 * row : 2 * row + 2, entry] += (STEP, -STEP)

@@ -16,6 +16,7 @@ GRADE_TEXT: Final = {
     Grade.RESERVED: "Fit for use with reservations",
     Grade.UNFIT: "Not fit for use",
 }
+_RULE_TEXT: Final = {Grade.FIT: "Fit", Grade.RESERVED: "With reservations", Grade.UNFIT: "Not fit"}
 _GRADE_MARK: Final = {Grade.FIT: "✓", Grade.RESERVED: "!", Grade.UNFIT: "✗"}
 
 
@@ -70,7 +71,7 @@ def _verdict(page: Page) -> str:
 
 def _reasons(verdict: Verdict) -> str:
     rows = "".join(
-        f'<li class="{reason.grade}">{_mark(reason.grade)} <span class="unseen">{GRADE_TEXT[reason.grade]}: </span>'
+        f'<li class="{reason.grade}">{_mark(reason.grade)} <span class="unseen">{_RULE_TEXT[reason.grade]}: </span>'
         f"{prose(reason.text)}</li>"
         for reason in verdict.reasons
     )
