@@ -87,7 +87,8 @@ def test_no_flipped_bit_stops_the_others_or_is_served_as_true(tmp_path: Path, da
             assert history[-1] == json_line(new)
             health = store.health()
             if health.set_aside is None:
-                assert set(TEXTS) - set(history) == set() if not health.n_bad_records else len(history) == N_RECORDS
+                assert len(set(TEXTS) - set(history)) <= 1  # where its number flipped it is found no more, nor counted
+                assert len(set(TEXTS) - set(history)) >= health.n_bad_records
                 n_passed_over += health.n_bad_records
     assert n_passed_over > N_FLIPS / 2
 
