@@ -11,7 +11,17 @@ from starlette.types import ASGIApp
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.status import Status
 from gateway.web import pages
-from gateway.web.door import AnswersHead, Failures, Guard, SecurityHeaders, TokenFile, describe_guard, problems
+from gateway.web.door import (
+    AnswersHead,
+    Failures,
+    Guard,
+    InPieces,
+    SecurityHeaders,
+    TokenFile,
+    Turns,
+    describe_guard,
+    problems,
+)
 from gateway.web.live import Board, LatestFirst
 from gateway.web.reader import Reader
 from gateway.web.routes import (
@@ -68,7 +78,9 @@ def create_app(
 
     failures = Failures(chosen.n_wrong_tokens_per_min)
     app = _Application(
-        wrap=lambda inner: SecurityHeaders(AnswersHead(Guard(LatestFirst(inner, board), tokens, failures)), responses),
+        wrap=lambda inner: SecurityHeaders(
+            InPieces(AnswersHead(Guard(LatestFirst(Turns(inner), board), tokens, failures))), responses
+        ),
         title="Springscale",
         version=API_VERSION,
         description=_DESCRIPTION,

@@ -1,18 +1,21 @@
 """Who is answered and who is not, and what the refusal tells."""
 
 import logging
+import socket
 import ssl
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import httpx
 import pytest
 import trustme
-from support.patience import PATIENCE_S
+from support.patience import PATIENCE_S, wait_until
 from support.web import Client, Gateway, serving
 
 from gateway.errors import ConfigurationError
 from gateway.web import Scope, Tls, TokenFile, WebSettings, refuse_open_address, server_config
+from gateway.web.door import connection, tls
 from gateway.web.door.guard import Failures, is_loopback
 
 GUARDED = ["/api/v1/estimates/latest", "/api/v1/estimates", "/api/v1/status", "/api/v1/stream", "/metrics"]
@@ -149,6 +152,15 @@ def test_without_tokens_only_this_machine_is_answered(tmp_path: Path) -> None:
         assert Client(gateway.app, address="::1").get("/api/v1/status").status_code == 200
 
 
+@pytest.mark.parametrize("name", ["Forwarded", "Via", "X-Forwarded-For", "X-Forwarded-Proto", "X-Real-IP"])
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_without_tokens_nobody_is_answered_through_a_proxy(tmp_path: Path, name: str, method: str) -> None:
+    """To the service, all clients of a proxy on the same machine are that machine."""
+    with Gateway(tmp_path) as gateway:
+        answer = Client(gateway.app).request(method, "/api/v1/calibration/tare", headers={name: "203.0.113.7"})
+        assert answer.status_code == 403
+
+
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.7", "::", "gateway.local", ""])
 def test_an_open_address_needs_tokens(host: str) -> None:
     assert not is_loopback(host)
@@ -188,3 +200,30 @@ def test_tls_files_that_cannot_be_used_are_said(tmp_path: Path) -> None:
         pytest.raises(ConfigurationError, match=r"server\.pem.*cannot be used"),
     ):
         server_config(gateway.app, "127.0.0.1", 0, Tls(tmp_path / "server.pem", tmp_path / "absent.pem"))
+
+
+def test_a_handshake_takes_a_place_and_is_soon_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits once counted after it: 1100 silent connections kept everybody out."""
+    monkeypatch.setattr(connection, "CONNECTIONS_PER_ADDRESS", 10)
+    authority = trustme.CA()
+    pem = tmp_path / "server.pem"
+    authority.issue_cert("localhost", "127.0.0.1").private_key_and_cert_chain_pem.write_to_path(pem)
+    trusting = ssl.create_default_context()
+    authority.configure_trust(trusting)
+    with Gateway(tmp_path / "store") as gateway:
+        config = server_config(gateway.app, "127.0.0.1", 0, Tls(pem, pem))
+        with serving(gateway.app, config) as server, ExitStack() as silent:
+            places = server.uvicorn.server_state.connections
+            address = server.socket.getsockname()
+            for _ in range(40):
+                silent.enter_context(socket.create_connection(address, source_address=("127.0.0.2", 0)))
+            assert wait_until(lambda: len(places) == 10)
+            url = server.url.replace("http://", "https://")
+            assert httpx.get(f"{url}/health/live", verify=trusting, timeout=PATIENCE_S).status_code == 200
+            monkeypatch.setattr(tls, "REQUEST_S", 0.1)
+            silent.close()
+            assert wait_until(lambda: not any(place.is_idle and place.client[0] == "127.0.0.2" for place in places))
+            late = silent.enter_context(socket.create_connection(address, source_address=("127.0.0.2", 0)))
+            late.settimeout(PATIENCE_S)
+            with suppress(ConnectionError):
+                assert late.recv(1) == b""  # the handshake it never began is over

@@ -12,7 +12,7 @@ import pytest
 from support.patience import PATIENCE_S, until
 from support.web import Gateway, Server, serving
 
-from gateway.web.door import connection
+from gateway.web.door import connection, turns
 
 STRANGER = "127.0.0.2"  # another address of this machine
 
@@ -187,3 +187,53 @@ def test_what_is_no_request_ends_with_400_and_leaves_no_word_in_the_log(
 
     run(tmp_path, scenario)
     assert [record for record in caplog.records if record.levelno > logging.INFO] == []
+
+
+def test_who_reads_nothing_is_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "UNREAD_S", 0.3)
+
+    async def scenario(server: Server) -> None:
+        reader, writer = stranger = await connect(server)
+        writer.transport.pause_reading()
+        while server.uvicorn.server_state.connections:  # so many unread answers that no kernel holds them
+            writer.write(b"GET /swagger/swagger-ui-bundle.js HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            await asyncio.sleep(0.01)
+        await assert_others_are_answered(server)
+        del reader
+        stranger[1].transport.abort()
+
+    run(tmp_path, scenario)
+
+
+def test_who_reads_nothing_gives_way_to_a_newcomer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "CONNECTIONS", 20)
+
+    async def scenario(server: Server) -> None:
+        crowd = [await connect(server) for _ in range(20)]
+        await assert_others_are_answered(server)
+        for _, writer in crowd:
+            writer.transport.abort()
+
+    run(tmp_path, scenario)
+
+
+def test_one_address_waits_for_its_own_answers_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(turns, "WAIT_S", 0.2)
+    monkeypatch.setattr(turns, "STREAMS_PER_CLIENT", 2)
+
+    async def scenario(server: Server) -> None:
+        crowd = [await connect(server) for _ in range(3)]
+        said = []
+        for reader, writer in crowd:
+            writer.write(b"GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            said.append(await reader.read(12))
+        assert said == [b"HTTP/1.1 200", b"HTTP/1.1 200", b"HTTP/1.1 503"]
+        async with (
+            httpx.AsyncClient(timeout=PATIENCE_S) as client,
+            client.stream("GET", f"{server.url}/api/v1/stream") as response,
+        ):
+            assert response.status_code == 200
+        for _, writer in crowd:
+            writer.transport.abort()
+
+    run(tmp_path, scenario)

@@ -1,4 +1,4 @@
-"""``python -m support.replayed_service CONFIG LOG``: the service, and a drive on its in-process bus, in one process."""
+"""``python -m support.replayed_service CONFIG LOG [later]``: the service and a drive on its bus, in one process."""
 
 import asyncio
 import sys
@@ -15,8 +15,8 @@ from gateway.setup import setup_of
 from support.unhurried import unhurry
 
 
-def main(config: Path, log: Path) -> None:
-    """Plays the log at full speed; a line on standard input ends the service."""
+def main(config: Path, log: Path, *, is_later: bool) -> None:
+    """Plays the log at full speed, or after a line on standard input; another line ends the service."""
     settings = load_settings(config)
     set_up_log(settings.log.level, under_journald=True)
 
@@ -26,6 +26,8 @@ def main(config: Path, log: Path) -> None:
 
     def play(gateway: Gateway, loop: asyncio.AbstractEventLoop) -> None:
         try:
+            if is_later:
+                sys.stdin.readline()
             replay(log, settings.bus.interface, settings.bus.channel, speed="max")
             sys.stdin.readline()  # whoever started us has seen enough
         finally:
@@ -36,4 +38,4 @@ def main(config: Path, log: Path) -> None:
 
 if __name__ == "__main__":
     unhurry(pytest.MonkeyPatch())
-    main(*map(Path, sys.argv[1:]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]), is_later="later" in sys.argv[3:])

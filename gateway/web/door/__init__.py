@@ -9,16 +9,19 @@ from gateway.web.door.headers import AnswersHead, SecurityHeaders, content_secur
 from gateway.web.door.problems import problem_response
 from gateway.web.door.serving import Tls, refuse_open_address, renew_certificate, server_config
 from gateway.web.door.tokens import Scope, Token, TokenFile
+from gateway.web.door.turns import InPieces, Turns
 
 __all__ = [
     "AnswersHead",
     "Failures",
     "Guard",
+    "InPieces",
     "Scope",
     "SecurityHeaders",
     "Tls",
     "Token",
     "TokenFile",
+    "Turns",
     "content_security_policy",
     "describe_guard",
     "problem_response",

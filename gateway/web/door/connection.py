@@ -2,8 +2,9 @@
 
 import asyncio
 import logging
+from collections.abc import Set
 from http import HTTPStatus
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
@@ -14,6 +15,8 @@ REQUEST_S: Final = 10.0  # from a connection's or a request's first byte to its 
 HEAD_BYTES: Final = 32_768  # request line and headers
 BODY_BYTES: Final = 32_768  # no route needs a tenth of it
 LINGER_S: Final = 1.0  # for a refused client to read why; closed at once, its unread bytes would reset the answer away
+UNREAD_S: Final = 20.0  # in which a client must read some more of what waits for it
+UNREAD_BYTES: Final = 32_768  # that wait for one client before the answer itself has to
 CONNECTIONS: Final = 512  # below the usual 1024 file descriptors of a process
 CONNECTIONS_PER_ADDRESS: Final = 128
 
@@ -26,26 +29,56 @@ class GuardedConnection(HttpToolsProtocol):
 
     A request that is not complete in time ends its connection (slow loris). A head or body that is too long and
     what is no HTTP are answered with a problem and end it too; a connection too many is closed before it costs
-    anything. Answers under way, streams among them, may take as long as they like.
+    anything. Answers under way, streams among them, may take as long as they like, as long as they are read. Where
+    all places are taken, the oldest that has shown no token and asks or reads nothing gives way.
+
+    Under TLS it is made before the handshake, and told of its connection after it (tls.TlsDoor).
     """
 
     def __init__(self, *parts: Any, **named_parts: Any) -> None:
         super().__init__(*parts, **named_parts)
         self.logger = _log
+        self.since_s = self.loop.time()
+        self._deadline: asyncio.TimerHandle | None = None
+        self._unread: asyncio.TimerHandle | None = None
+        self._early = b""  # came with the end of the handshake
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as in uvicorn
         super().connection_made(transport)
+        transport.set_write_buffer_limits(UNREAD_BYTES)
         self._n_head_bytes = self._n_body_bytes = 0
         self._is_in_head = self._is_refused = False
-        self._deadline: asyncio.TimerHandle | None = self.loop.call_later(REQUEST_S, transport.abort)
-        if len(self.connections) > CONNECTIONS or self._n_from_same_address() > CONNECTIONS_PER_ADDRESS:
+        self._deadline = self.loop.call_later(REQUEST_S, transport.abort)
+        if not has_place(self, self.connections):
             transport.abort()
+        elif self._early:
+            self.data_received(self._early)
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._disarm()
-        super().connection_lost(exc)
+        self._await_reading(None)
+        if self.transport is not None:
+            super().connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        self._await_reading(self.transport.get_write_buffer_size())
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        self._await_reading(None)
+
+    @property
+    def is_idle(self) -> bool:
+        """True where nothing is asked, or nothing read, and no token was shown."""
+        if self.scope is not None and "token_name" in self.scope.get("state", {}):
+            return False
+        return self.cycle is None or self.cycle.response_complete or self.flow.write_paused
 
     def data_received(self, data: bytes) -> None:
+        if self.transport is None:
+            self._early += data
+            return
         if self._is_refused:
             return
         super().data_received(data)
@@ -109,15 +142,47 @@ class GuardedConnection(HttpToolsProtocol):
         self._disarm()
         self._deadline = self.loop.call_later(LINGER_S, self.transport.close)
 
-    def _n_from_same_address(self) -> int:
-        mine = self.client and self.client[0]
-        others = (other.client for other in self.connections if isinstance(other, GuardedConnection))
-        return sum(client is not None and client[0] == mine for client in others)
+    def _await_reading(self, n_unread: int | None) -> None:
+        """Look again in a while: who has read nothing of ``n_unread`` bytes by then is cut off."""
+        if self._unread is not None:
+            self._unread.cancel()
+        self._unread = None if n_unread is None else self.loop.call_later(UNREAD_S, self._cut_off_unless_read, n_unread)
+
+    def _cut_off_unless_read(self, n_unread: int) -> None:
+        left = self.transport.get_write_buffer_size()
+        if left >= n_unread:
+            self.transport.abort()
+        else:
+            self._await_reading(left)
 
     def _disarm(self) -> None:
         if self._deadline is not None:
             self._deadline.cancel()
             self._deadline = None
+
+
+class Placed(Protocol):
+    """What takes one of the places: a connection, or one whose handshake is under way."""
+
+    client: tuple[str, int] | None
+    since_s: float
+    transport: asyncio.Transport
+
+    @property
+    def is_idle(self) -> bool: ...
+
+
+def has_place(newcomer: Placed, connections: Set[Any]) -> bool:
+    """Whether a connection that has just joined ``connections`` may stay; another may have to go for it."""
+    mine = newcomer.client and newcomer.client[0]
+    if sum(other.client is not None and other.client[0] == mine for other in connections) > CONNECTIONS_PER_ADDRESS:
+        return False
+    if len(connections) <= CONNECTIONS:
+        return True
+    idle = [other for other in connections if other is not newcomer and other.is_idle]
+    if idle:
+        min(idle, key=lambda other: other.since_s).transport.abort()
+    return bool(idle)
 
 
 def _on_the_wire(status: int, detail: str) -> bytes:

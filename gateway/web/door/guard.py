@@ -17,6 +17,9 @@ from gateway.web.door.tokens import Scope, TokenFile
 PUBLIC: Final = ("/assets/", "/swagger/")
 PUBLIC_PATHS: Final = frozenset({"/", "/docs", "/openapi.json", "/health/live"})
 _SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+_FORWARDED: Final = frozenset(
+    {b"forwarded", b"via", b"x-forwarded-for", b"x-forwarded-host", b"x-forwarded-proto", b"x-real-ip"}
+)
 _LOCAL_NAMES: Final = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
 WITHIN_S: Final = 60.0
@@ -85,6 +88,8 @@ def _refuse_strangers(scope: AsgiScope) -> Response | None:
     client = scope.get("client")
     if client is not None and not is_loopback(client[0]):
         return _problem(scope, 403, "without tokens only this machine is answered: create one on the gateway")
+    if any(name in _FORWARDED for name, _ in scope["headers"]):  # the proxy is local, its clients are not
+        return _problem(scope, 403, "without tokens nobody is answered through a proxy: create one on the gateway")
     host = (_header(scope, b"host") or "").lower()
     name = host if host.endswith("]") else host.rpartition(":")[0] or host
     if name not in _LOCAL_NAMES:

@@ -11,6 +11,7 @@ from fastapi import FastAPI
 from gateway.errors import ConfigurationError
 from gateway.web.door.connection import GuardedConnection
 from gateway.web.door.guard import is_loopback
+from gateway.web.door.tls import TlsConfig, TlsDoor
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +34,13 @@ def refuse_open_address(host: str, *, has_tokens: bool) -> None:
 
 def server_config(app: FastAPI, host: str, port: int, tls: Tls | None = None) -> uvicorn.Config:
     """uvicorn's settings for a gateway. Raises ConfigurationError for TLS files that cannot be used."""
-    return uvicorn.Config(
+    kind = uvicorn.Config if tls is None else TlsConfig
+    return kind(
         app,
         host=host,
         port=port,
         loop="uvloop",
-        http=GuardedConnection,
+        http=GuardedConnection if tls is None else TlsDoor,
         ws="none",
         lifespan="on",
         access_log=False,  # paths and addresses are nobody's business; /metrics counts the answers
@@ -58,8 +60,8 @@ def renew_certificate(config: uvicorn.Config, tls: Tls) -> None:
     as they are: a context can only learn more of them, never forget one.
     """
     _tls_settings(tls)  # tried elsewhere first: a key that does not fit would leave the context half changed
-    if config.ssl is not None:
-        config.ssl.load_cert_chain(tls.certificate, tls.key)
+    if isinstance(config, TlsConfig):
+        config.context.load_cert_chain(tls.certificate, tls.key)
 
 
 def _tls_settings(tls: Tls) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from gateway.web.reader import Reader
 
 GRACE_S: Final = 0.2  # for the last words of a stream that ends
 RETRY_MS: Final = 3000
-_REPLAY_PAGE: Final = 100
+_REPLAY_PAGE: Final = 20  # events in memory for each client that reads what it missed
 _REMEMBERED: Final = 1024  # replayed rows that may still arrive live: a row is published right after it is stored
 
 EVENT_SCHEMA: Final[dict[str, Any]] = {
@@ -93,11 +93,17 @@ class EventStream(Response):
     async def _missed(self, behind: str) -> AsyncIterator[StreamEvent]:
         cursor: str | None = behind
         while cursor is not None:
-            page = await asyncio.to_thread(self._reader.estimates, cursor=cursor, limit=_REPLAY_PAGE)
-            for text, place in zip(page.items, page.cursors, strict=True):
-                kind = REJECTION if json.loads(text)["rejected"] else ESTIMATE  # the store keeps no provisional ones
-                yield StreamEvent.of(kind, text, place)
-            cursor = page.next_cursor
+            events, cursor = await asyncio.to_thread(self._missed_page, cursor)
+            for event in events:
+                yield event
+
+    def _missed_page(self, behind: str) -> tuple[list[StreamEvent], str | None]:
+        """Some events behind a cursor, and where to go on. Blocks, in a thread of its own."""
+        page = self._reader.estimates(cursor=behind, limit=_REPLAY_PAGE)
+        rows = zip(page.items, page.cursors, strict=True)
+        kinds = {True: REJECTION, False: ESTIMATE}  # the store keeps no provisional ones
+        events = [StreamEvent.of(kinds[bool(json.loads(text)["rejected"])], text, place) for text, place in rows]
+        return events, page.next_cursor
 
 
 async def _hung_up(receive: Receive) -> None:

@@ -2,15 +2,15 @@
 
 import asyncio
 import re
-from collections.abc import Callable
-from typing import Annotated, Final, Literal
+from collections.abc import AsyncIterator, Callable
+from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Header, Query, Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
 
 from gateway.history import Page
 from gateway.records import json_line
@@ -25,6 +25,7 @@ from gateway.web.settings import PAGE_LIMIT, WebSettings
 
 PREFIX: Final = "/api/v1"
 JSON: Final = "application/json"
+_AT_A_TIME: Final = 25  # records in memory for each answer that is being sent
 _CURSOR: Final = r"^[0-9a-z]{1,32}-[0-9]{1,18}$"
 
 
@@ -68,17 +69,10 @@ def api_router(board: Board, reader: Reader, status: Callable[[], Status], setti
     @router.get("/estimates", response_model=EstimatesPage, responses=problem_responses(422, 503))
     async def estimates(query: Annotated[EstimatesQuery, Query()]) -> Response:
         """Estimates and rejections in the order they were made. Follow next_cursor: nothing is missed or repeated."""
-        page = await _asked(
-            "query.cursor",
-            reader,
-            since_ns=query.since,
-            until_ns=query.until,
-            limit=query.limit,
-            cursor=query.cursor,
-            newest_first=query.order == "newest_first",
-            with_spectra=query.spectra,
-        )
-        return Response(_page_json(page), media_type=JSON)
+        first = await _asked("query.cursor", reader, **_question(query, query.limit, query.cursor))
+        if len(first.items) == query.limit or first.next_cursor is None:
+            return Response(_page_json(first), media_type=JSON)
+        return StreamingResponse(_page_by_page(reader, query, first), media_type=JSON)
 
     @router.get("/status", response_model=Status)
     async def status_now() -> Status:
@@ -115,6 +109,35 @@ async def _asked(where: str, reader: Reader, **question: object) -> Page:
         raise RequestValidationError([{"loc": tuple(where.split(".")), "msg": str(error)}]) from None
 
 
+def _question(query: EstimatesQuery, n_left: int, cursor: str | None) -> dict[str, Any]:
+    """What to ask of the store for the next records of an answer."""
+    return {
+        "since_ns": query.since,
+        "until_ns": query.until,
+        "limit": min(n_left, _AT_A_TIME),
+        "cursor": cursor,
+        "newest_first": query.order == "newest_first",
+        "with_spectra": query.spectra,
+    }
+
+
+async def _page_by_page(reader: Reader, query: EstimatesQuery, first: Page) -> AsyncIterator[bytes]:
+    """A long answer, read from the store as fast as the client reads it."""
+    page, n_left = first, query.limit - len(first.items)
+    newest = first.last_cursor
+    yield b'{"items":[' + ",".join(first.items).encode()
+    while n_left > 0 and page.next_cursor is not None:
+        page = await asyncio.to_thread(reader.estimates, **_question(query, n_left, page.next_cursor))
+        n_left -= len(page.items)
+        if page.items:
+            yield ("," + ",".join(page.items)).encode()
+            newest = newest if query.order == "newest_first" else page.last_cursor
+    yield _tail(page.next_cursor, newest)
+
+
 def _page_json(page: Page) -> bytes:
-    tail = json_line({"next_cursor": page.next_cursor, "last_cursor": page.last_cursor})[1:]
-    return f'{{"items":[{",".join(page.items)}],{tail}'.encode()
+    return b'{"items":[' + ",".join(page.items).encode() + _tail(page.next_cursor, page.last_cursor)
+
+
+def _tail(next_cursor: str | None, last_cursor: str | None) -> bytes:
+    return b"]," + json_line({"next_cursor": next_cursor, "last_cursor": last_cursor})[1:].encode()

@@ -1,0 +1,93 @@
+"""Answers that take memory: few at a time for each, some more for all, and never more of one than its reader reads."""
+
+import asyncio
+from collections import Counter
+from typing import Final
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from gateway.web.door.problems import problem_response
+
+ANSWERS: Final = 48  # from the history that are under way at a time
+ANSWERS_PER_CLIENT: Final = 16  # of one token, or of one address where there are none
+STREAMS_PER_CLIENT: Final = 32
+WAIT_S: Final = 5.0  # for a turn
+PIECE_BYTES: Final = 32_768
+
+_HISTORY: Final = ("/api/v1/estimates", "/api/v1/export", "/rfms/")
+_STREAM: Final = "/api/v1/stream"
+_LOOK_S: Final = 0.05
+
+
+class Turns:
+    """ASGI middleware behind the guard: a client that asks for too much of the history at once waits for itself.
+
+    Answers to others go on: each has a share of its own. A turn ends when the answer is read, or its client gone.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+        self._under_way: Counter[tuple[str, bool]] = Counter()  # by client, streams apart
+        self._n_answers = 0
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        path = scope.get("path", "")
+        is_stream = path == _STREAM
+        if scope["type"] != "http" or not (is_stream or path.startswith(_HISTORY)):
+            await self._app(scope, receive, send)
+            return
+        mine = (_client_of(scope), is_stream)
+        if not await self._has_turn(mine):
+            detail = "too many answers are under way: read them, or ask for less at a time"
+            await problem_response(503, detail, path, headers={"retry-after": "5"})(scope, receive, send)
+            return
+        self._under_way[mine] += 1
+        self._n_answers += not is_stream
+        try:
+            await self._app(scope, receive, send)
+        finally:
+            self._n_answers -= not is_stream
+            self._under_way[mine] -= 1
+            self._under_way += Counter()  # forgets those with none
+
+    async def _has_turn(self, mine: tuple[str, bool]) -> bool:
+        for _ in range(round(WAIT_S / _LOOK_S)):
+            if self._is_free(mine):
+                return True
+            await asyncio.sleep(_LOOK_S)
+        return self._is_free(mine)
+
+    def _is_free(self, mine: tuple[str, bool]) -> bool:
+        _, is_stream = mine
+        if is_stream:
+            return self._under_way[mine] < STREAMS_PER_CLIENT
+        return self._under_way[mine] < ANSWERS_PER_CLIENT and self._n_answers < ANSWERS
+
+
+class InPieces:
+    """ASGI middleware: a long body leaves piece by piece, each when the one before has been read far enough."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def send_in_pieces(message: Message) -> None:
+            body: bytes = message.get("body", b"")
+            if message["type"] != "http.response.body" or len(body) <= PIECE_BYTES:
+                await send(message)
+                return
+            last = (len(body) - 1) // PIECE_BYTES * PIECE_BYTES
+            for begin in range(0, last, PIECE_BYTES):
+                piece = body[begin : begin + PIECE_BYTES]
+                await send({"type": "http.response.body", "body": piece, "more_body": True})
+            await send({**message, "body": body[last:]})
+
+        await self._app(scope, receive, send_in_pieces)
+
+
+def _client_of(scope: Scope) -> str:
+    name = scope.get("state", {}).get("token_name")
+    if name is not None:
+        return f"token {name}"
+    client = scope.get("client")
+    return client[0] if client else ""
