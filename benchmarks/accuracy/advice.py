@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.calibration.inspection import SplitRun
-from gateway.calibration.judgement import errors_of
-from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all, triples_at_different_positions
+from gateway.calibration.judgement import errors_of, judge
+from gateway.calibration.judgement.learning_curve import calibrated_on, triples_at_different_positions
 from gateway.calibration.plan import Design, PlacedLoad, Spread, usual_drive, weighed_loads
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
@@ -160,7 +160,7 @@ class _Tried:
         return self._made[key]
 
     def _scored(self, calibrated: CalibratedVehicle) -> Scored:
-        judged = judged_all((one.validation for one in self._split.values()), calibrated, ESTIMATOR)
+        judged = judge((one.validation for one in self._split.values()), calibrated, ESTIMATOR)
         errors = errors_of(judged, self._vehicle)
         payload, share = errors.payload, errors.front_share
         return (

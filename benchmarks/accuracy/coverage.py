@@ -23,7 +23,8 @@ from benchmarks.accuracy.coverage_drives import (
     unseen_load,
 )
 from benchmarks.accuracy.coverage_table import CoverageTable, JudgedBatch, coverage_table, judged_batches
-from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all
+from gateway.calibration.judgement import judge
+from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError
 
@@ -70,7 +71,7 @@ def of_one_van(scope: Scope, seed: int, number: int) -> Found:
             refused.append(f"{vehicle.name}: {estimator}: {fault}")
             continue
         for kind, run in tested:
-            batches += judged_batches(judged_all([run], calibrated, estimator), vehicle, kind, estimator)
+            batches += judged_batches(judge([run], calibrated, estimator), vehicle, kind, estimator)
     return batches, refused
 
 

@@ -156,7 +156,7 @@ def judge_campaign(
     Raises CalibrationImpossibleError where that part holds no batch, for then there is nothing to judge.
     """
     runs = split_runs(campaign, settings, on_run=on_run)
-    judged = [one for run in runs for part in _judged_parts(run, split) for one in judge(part, calibrated, estimator)]
+    judged = judge((part for run in runs for part in _judged_parts(run, split)), calibrated, estimator)
     if not judged:
         raise CalibrationImpossibleError(
             f"{campaign.path}: the {split} part of its runs holds no batch: identification_fraction "

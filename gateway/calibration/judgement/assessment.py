@@ -69,8 +69,8 @@ def assess_calibration(campaign: Campaign, outcome: Outcome) -> Assessment:
     for estimator in file.estimators:
         judged = {
             Part.LEFT_OUT: judged_left_out(outcome, estimator),
-            Part.VALIDATION: [j for run in outcome.split for j in judge(run.validation, calibrated, estimator)],
-            Part.IDENTIFICATION: [j for run in outcome.split for j in judge(run.identification, calibrated, estimator)],
+            Part.VALIDATION: judge([run.validation for run in outcome.split], calibrated, estimator),
+            Part.IDENTIFICATION: judge([run.identification for run in outcome.split], calibrated, estimator),
         }
         tables = {part: error_table(rows, vehicle, estimator) for part, rows in judged.items() if rows}
         judgements.append(Judgement(estimator, tables, _dof(file, estimator)))
@@ -97,7 +97,7 @@ def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:
         cross = outcome.cross_spectrum
         without = {n: replace(whole, cross_spectrum=taught) for n, taught in (cross.without if cross else {}).items()}
     runs = [one.identification for one in outcome.split if one.identification.number in without]
-    return [one for run in runs for one in judge(run, without[run.number], estimator)]
+    return [one for run in runs for one in judge([run], without[run.number], estimator)]
 
 
 def _dof(file: CalibrationFile, estimator: str) -> dict[Target, float]:

@@ -1,6 +1,6 @@
 """The error table of equation (12): estimates against what was weighed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, NamedTuple, get_args
 
@@ -210,9 +210,10 @@ def _batch_record(one: Judged) -> dict[str, Any]:
     return record
 
 
-def judge(run: KnownRun, calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:
-    """Every batch of a known run with its estimate."""
+def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:
+    """Every batch of every known run with its estimate."""
     return [
         Judged(run.number, run.name, run.payload_kg, run.front_share_pct, estimate(batch, calibrated, estimator))
+        for run in runs
         for batch in run.batches
     ]

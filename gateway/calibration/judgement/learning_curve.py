@@ -4,7 +4,7 @@ Runs that were driven are left out, and what is calibrated on the rest is held a
 calibrates from nothing but its own runs, as ``springscale calibrate --runs`` would.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations
 from math import comb
@@ -253,9 +253,9 @@ def trial_of(split: Sequence[SplitRun], vehicle: Vehicle, numbers: tuple[int, ..
         calibrated = calibrated_on([one.identification for one in chosen], vehicle, estimator)
     except CalibrationImpossibleError as fault:
         return Trial(numbers, estimator, refused=str(fault))
-    unseen = judged_all([one.identification for one in left_out], calibrated, estimator)
-    later = judged_all([one.validation for one in left_out], calibrated, estimator)
-    own_later = judged_all([one.validation for one in chosen], calibrated, estimator)
+    unseen = judge([one.identification for one in left_out], calibrated, estimator)
+    later = judge([one.validation for one in left_out], calibrated, estimator)
+    own_later = judge([one.validation for one in chosen], calibrated, estimator)
     return Trial(
         numbers,
         estimator,
@@ -287,8 +287,3 @@ def calibrated_on(runs: Sequence[KnownRun], vehicle: Vehicle, estimator: str) ->
         ratio_index=fit_ratio_index(runs, vehicle).calibration if is_ratio_index else None,
         cross_spectrum=None if is_ratio_index else calibrate_cross_spectrum(runs, vehicle),
     )
-
-
-def judged_all(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:
-    """Every batch of every run with its estimate."""
-    return [one for run in runs for one in judge(run, calibrated, estimator)]

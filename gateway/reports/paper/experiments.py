@@ -75,7 +75,7 @@ class Method:
     calibrated: CalibratedVehicle
 
     def judge(self, runs: Sequence[KnownRun]) -> list[Judged]:
-        return [one for run in runs for one in judge(run, self.calibrated, self.estimator)]
+        return judge(runs, self.calibrated, self.estimator)
 
 
 @dataclass(frozen=True, slots=True)
