@@ -26,7 +26,8 @@ from benchmarks.accuracy.coverage_drives import (
 )
 from benchmarks.accuracy.coverage_table import CoverageTable, JudgedBatch, coverage_table, judged_batches
 from benchmarks.accuracy.disturbed import DISTURBANCES, Disturbance
-from gateway.calibration.judgement.learning_curve import calibrated_on, judged_all
+from gateway.calibration.judgement import judge
+from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.records import Motion
 from gateway.sim.sensors import REFERENCE, Sensors
 from gateway.sim.vehicle import Load, Vehicle
@@ -73,7 +74,7 @@ def of_one_van(scope: Scope, seed: int, number: int) -> list[JudgedBatch]:
                 drives[carried, one.sensors] = rows_of(van, carried, trip, scope, seeds, one.sensors)
             rows, today, on_board = drives[carried, one.sensors]
             run = known_run(_disturbed(rows, one, seed), len(batches), trip.kind, today, on_board)
-            batches += judged_batches(judged_all([run], calibrated, ESTIMATOR), vehicle, name, ESTIMATOR)
+            batches += judged_batches(judge([run], calibrated, ESTIMATOR), vehicle, name, ESTIMATOR)
             if one.sensors is not REFERENCE:
                 del drives[carried, one.sensors]
     return batches
