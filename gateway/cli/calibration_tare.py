@@ -15,6 +15,7 @@ import click
 from gateway.cli.options import FILE, as_json
 from gateway.config import load_settings
 from gateway.errors import ConfigurationError, SpringscaleError
+from gateway.estimate import Z95
 from gateway.records import json_line
 
 PATH: Final = "/api/v1/calibration/tare"
@@ -192,10 +193,9 @@ def _tare_text(entry: dict[str, Any]) -> str:
 
 
 def _zero_text(zero: dict[str, Any]) -> str:
-    return (
-        f"{zero['payload_kg']:+.1f} ± {zero['payload_std_kg']:.1f} kg and "
-        f"{zero['front_share_pct']:+.2f} ± {zero['front_share_std_pct']:.2f} pp from {_batches(zero['n_batches'])}"
-    )
+    payload = f"{zero['payload_kg']:+.1f} ± {Z95 * zero['payload_std_kg']:.1f} kg"
+    share = f"{zero['front_share_pct']:+.2f} ± {Z95 * zero['front_share_std_pct']:.2f} pp"
+    return f"{payload} and {share} (95 %) from {_batches(zero['n_batches'])}"
 
 
 def _batches(n: int) -> str:

@@ -44,11 +44,11 @@ def test_set_show_and_undo_with_a_token_from_the_environment(
     token = tokens.create("workshop", Scope.OPERATE)
     made = run("set", "--empty", "--note", "yard", "--url", url, SPRINGSCALE_TOKEN=token)
     assert made.exit_code == 0, made.exception
-    assert "+12.0 ± 5.0 kg and +1.00 ± 0.40 pp from one batch, set " in made.output
+    assert "+12.0 ± 9.8 kg and +1.00 ± 0.78 pp (95 %) from one batch, set " in made.output
     assert "by workshop (yard)" in made.output
     shown = run("show", "--url", url + "/", "--token", token)
     assert shown.output.splitlines()[0] == "in use: " + made.output.strip()
-    assert "a tare now would take off +12.0 ± 5.0 kg" in shown.output
+    assert "a tare now would take off +12.0 ± 9.8 kg" in shown.output
     assert "nothing speaks for a drift" not in shown.output
     pipeline.weigh(9.0, share_pct=50.5)
     assert "nothing speaks for a drift" in run("show", "--url", url, "--token", token).output

@@ -77,7 +77,7 @@ class CalibrationFile(Part):
 
     @property
     def estimators(self) -> tuple[str, ...]:
-        """Estimators that this file holds a calibration for, the better first."""
+        """Estimators that this file holds a calibration for; the service runs the first unless told otherwise."""
         held = {"cross_spectrum": self.cross_spectrum, "ratio_index": self.ratio_index}
         return tuple(name for name, part in held.items() if part is not None)
 

@@ -28,6 +28,7 @@ from gateway.core.cross_spectrum.expected import expected_spectra, spectral_mode
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
 from gateway.core.cross_spectrum.parameters import INDEX, Ground
 from gateway.core.vehicle import Load, Vehicle
+from gateway.estimate import Z95
 from gateway.records import C128, F64
 
 LEAST_COHERENCE: Final = 0.4  # behind the axles right axes have 0.45 and more, roll or yaw for pitch below 0.35
@@ -211,7 +212,8 @@ def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) ->
     doubt_m = 3.0 * float(np.hypot(std_m, vehicle.sensor_position_std_m))
     if off_m > max(POSITION_OFF_M, doubt_m):
         is_wrong = off_m > max(POSITION_WRONG_M, doubt_m)
-        text = f"sensor_position_m is {vehicle.sensor_position_m:g}, the spectra say {position_m:.2f} +- {std_m:.2f}"
+        by_spectra = f"{position_m:.2f} ± {Z95 * std_m:.2f} m (95 %)"
+        text = f"sensor_position_m is {vehicle.sensor_position_m:g}, the spectra say {by_spectra}"
         yield finding_of(Kind.SENSOR_POSITION, Severity.FAULT if is_wrong else Severity.WARNING, text)
 
 

@@ -18,6 +18,7 @@ from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Ta
 from gateway.calibration.plan import Expected
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.vehicle import Vehicle
+from gateway.estimate import Z95
 from gateway.words import counted
 
 FIT_ERROR_PCT: Final = 10.0  # of the range (12)
@@ -65,18 +66,12 @@ class Verdict:
 
 
 def verdicts_of(assessment: Assessment, expected: Expected | None = None) -> tuple[Verdict, ...]:
-    """A verdict for every estimator judged, the best first: by grade, then by payload error.
+    """A verdict for every estimator judged, first that of the one which the service runs unless told otherwise.
 
     ``expected`` is what the half-car states of itself over all the loads that the vehicle carries.
     """
-    judged = [(_verdict(assessment, one, expected), _unseen_error_pct(one)) for one in assessment.judgements]
-    return tuple(verdict for verdict, _ in sorted(judged, key=lambda each: (each[0].grade.rank, each[1])))
-
-
-def _unseen_error_pct(judgement: Judgement) -> float:
-    part = judgement.unseen
-    error_pct = judgement.tables[part].errors.payload.mean_abs_pct_with_misses if part else None
-    return math.inf if error_pct is None else error_pct
+    in_order = sorted(assessment.judgements, key=lambda one: ESTIMATOR_NAMES.index(one.estimator))
+    return tuple(_verdict(assessment, one, expected) for one in in_order)
 
 
 def _verdict(assessment: Assessment, judgement: Judgement, expected: Expected | None) -> Verdict:
@@ -145,7 +140,7 @@ def _stated(expected: Expected, vehicle: Vehicle) -> Reason:
     return Reason(
         "stated_spread",
         _graded(percent, FIT_ERROR_PCT, MOST_ERROR_PCT),
-        f"Over all loads that the vehicle may carry it states ± {expected.payload_std_kg:.0f} kg (standard deviation), "
+        f"Over all loads that the vehicle may carry it states ± {Z95 * expected.payload_std_kg:.0f} kg (95 %), "
         f"a mean error of {percent:.1f} % of the range.",
     )
 

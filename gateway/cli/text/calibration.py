@@ -1,6 +1,6 @@
 """A calibration file for people to read."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, Figure, figures_of
 
@@ -11,7 +11,7 @@ def calibration_text(held: CalibrationFile) -> str:
         "vehicle (as the campaign stated it)": _vehicle(held),
         "calibrated for": _ranges(held),
         "expected errors (runs left out of the fit)": _expected(held),
-        **{f"{part}: {len(figures)} parameters": map(_figure, figures) for part, figures in figures_of(held).items()},
+        **{_title(part, figures): map(_figure, figures) for part, figures in figures_of(held).items()},
         "warnings": iter(held.warnings or ("none",)),
         "made by": _provenance(held),
     }
@@ -42,7 +42,8 @@ def _ranges(held: CalibrationFile) -> Iterator[str]:
 def _expected(held: CalibrationFile) -> Iterator[str]:
     for estimator in held.estimators:
         errors = held.expected_errors.get(estimator)
-        yield f"{estimator:28}{'unknown' if errors is None else _errors(errors)}"
+        running = "; the service runs this one unless told otherwise" if estimator == held.estimators[0] else ""
+        yield f"{estimator:28}{'unknown' if errors is None else _errors(errors)}{running}"
 
 
 def _errors(errors: ExpectedErrorsPart) -> str:
@@ -50,6 +51,10 @@ def _errors(errors: ExpectedErrorsPart) -> str:
     parts = ["payload unknown" if payload is None else f"payload {payload:.1f} kg rms"]
     parts.append("front share unknown" if share is None else f"front share {share:.2f} percentage points rms")
     return ", ".join(parts)
+
+
+def _title(part: str, figures: Sequence[Figure]) -> str:
+    return f"{part}: {len(figures)} parameters ± their standard deviations"
 
 
 def _figure(figure: Figure) -> str:

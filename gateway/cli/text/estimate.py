@@ -1,6 +1,6 @@
 """An estimate as a line for people."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gateway.units import si_factor
@@ -12,7 +12,12 @@ def sentence(record: Mapping[str, Any]) -> str:
     if record["rejected"]:
         return f"{when}  no estimate: {', '.join(record['rejected'])}"
     return (
-        f"{when}  payload {record['payload_kg']:7.1f} kg ± {record['payload_std_kg']:5.1f}   "
-        f"front share {record['front_share_pct']:5.2f} % ± {record['front_share_std_pct']:4.2f}   "
+        f"{when}  payload {record['payload_kg']:7.1f} kg ± {_half(record['payload_interval95_kg']):5.1f} (95 %)   "
+        f"front share {record['front_share_pct']:5.2f} % ± {_half(record['front_share_interval95_pct']):4.2f} (95 %)   "
         f"{record['mean_speed_mps'] / si_factor('speed', 'km/h'):5.1f} km/h"
     )
+
+
+def _half(interval95: Sequence[float]) -> float:
+    """Half its width: what stands behind ±."""
+    return (interval95[1] - interval95[0]) / 2.0

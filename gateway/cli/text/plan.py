@@ -1,6 +1,7 @@
 """A plan as sentences a fitter understands."""
 
 from gateway.calibration.plan import Expected, LoadPlan, PlacedLoad
+from gateway.estimate import Z95
 
 
 def plan_sentences(plan: LoadPlan) -> str:
@@ -32,7 +33,8 @@ def _load(load: PlacedLoad) -> str:
 
 
 def _expected(expected: Expected) -> str:
-    text = f"+- {expected.payload_std_kg:.0f} kg and +- {expected.front_share_std_pct:.1f} percentage points"
+    payload_kg, share_pct = Z95 * expected.payload_std_kg, Z95 * expected.front_share_std_pct
+    text = f"± {payload_kg:.0f} kg and ± {share_pct:.1f} percentage points (95 %)"
     if expected.reach_share is None:
         return text
     return f"{text}, {100.0 * expected.reach_share:.0f} % of the loads it may carry within reach"

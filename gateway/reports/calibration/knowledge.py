@@ -35,9 +35,9 @@ def knowledge_of(calibration: CrossSpectrumCalibration, vehicle: Vehicle) -> lis
         i = INDEX[name]
         before, after, std = float(prior.mean[i]), float(calibration.parameters[i]), float(stds[i])
         if is_positive(name):
-            before, after, spread = float(np.exp(before)), float(np.exp(after)), f"± {100.0 * std:.1f} %"
+            before, after, spread = float(np.exp(before)), float(np.exp(after)), f"{100.0 * std:.1f} %"
         else:
-            spread = f"± {std:.3g}"
+            spread = f"{std:.3g}"
         known.append(Known(name, before, after, spread, std / float(prior.std[i]), name.startswith("slack_")))
     return known
 

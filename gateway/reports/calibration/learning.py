@@ -73,7 +73,10 @@ def _table(curve: LearningCurve) -> Table:
     )
     errors = ("worst", "95 % covers")
     columns = ("Runs", "estimator", "choices", "judged on", "payload", *errors, "share", *errors)
-    caption = "Mean |error| in percent of the ranges (12) over choices of runs, and that of the worst choice"
+    caption = (
+        "Mean |error| in percent of the ranges (12) over choices of runs ± its standard deviation between them, and "
+        "that of the worst choice"
+    )
     return Table(caption, columns, rows, n_heads=2)
 
 

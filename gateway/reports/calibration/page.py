@@ -59,12 +59,12 @@ def _asset(name: str) -> str:
 
 
 def _verdict(page: Page) -> str:
-    best = page.verdicts[0]
-    several = ", the better of two here" if len(page.verdicts) > 1 else ""
+    running = page.verdicts[0]
+    several = ", which the service runs unless it is told otherwise" if len(page.verdicts) > 1 else ""
     next_run = f"<h3>What to drive next</h3><p>{prose(page.next_run)}</p>" if page.next_run else ""
     return (
-        f'<section id="verdict" class="{best.grade}"><h2>{_mark(best.grade)} {GRADE_TEXT[best.grade]}</h2>'
-        f"<p>By the {escape(estimator_name(best.estimator))}{several}. {prose(page.in_short)}</p>{next_run}"
+        f'<section id="verdict" class="{running.grade}"><h2>{_mark(running.grade)} {GRADE_TEXT[running.grade]}</h2>'
+        f"<p>By the {escape(estimator_name(running.estimator))}{several}. {prose(page.in_short)}</p>{next_run}"
         f"{''.join(_reasons(verdict) for verdict in page.verdicts)}</section>"
     )
 

@@ -136,9 +136,9 @@ def _subtitle(assessment: Assessment) -> str:
     )
 
 
-def _in_short(assessment: Assessment, best: Verdict) -> str:
+def _in_short(assessment: Assessment, running: Verdict) -> str:
     """What a fitter wants to know in a sentence."""
-    judgement = next(one for one in assessment.judgements if one.estimator == best.estimator)
+    judgement = next(one for one in assessment.judgements if one.estimator == running.estimator)
     if judgement.unseen is None:
         return "How well it weighs is not known: nothing was held back to judge by."
     errors = judgement.tables[judgement.unseen].errors

@@ -4,6 +4,7 @@ from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import Finding, RunVerdict, SplitRun
 from gateway.calibration.judgement import Assessment
 from gateway.calibration.plan import Advice, Expected, LoadPlan
+from gateway.estimate import Z95
 from gateway.records import Why
 from gateway.reports.calibration.text import NONE, decimal, percent, span
 from gateway.reports.charts import Section, Table
@@ -62,7 +63,7 @@ def plan_section(plan: LoadPlan) -> Section:
     rows += [(f"{number}. {_load(step)}", *_expected(step.expected)) for number, step in enumerate(plan.advice, 1)]
     rows += [(f"least useful: {_load(plan.least)}", *_expected(plan.least.expected))] if plan.least else []
     columns = ("After driving", "payload", "front share", "loads within reach")
-    caption = f"Expected standard deviations of a five-minute batch; each run {minutes:.0f} minutes near {kmh:.0f} km/h"
+    caption = f"Expected of a five-minute batch, ± spans 95 %; each run {minutes:.0f} minutes near {kmh:.0f} km/h"
     text = (
         "The runs after which loads would be weighed best, each with those above it. The half-car says so of itself, "
         "to first order: it tells which run to drive rather than how good the result will be."
@@ -79,7 +80,7 @@ def best_next(plan: LoadPlan) -> str | None:
     now = _expected(plan.now) if plan.now else None
     before = f" (now {now[0]} and {now[1]})" if now else ""
     load = _load(first)
-    after = f"expected {payload} and {share} afterwards{before}, {reach} of the loads it may carry within reach."
+    after = f"expected {payload} and {share} (95 %) afterwards{before}, {reach} of the loads it may carry within reach."
     if plan.is_enough_driven:
         return f"Enough is driven: no further run would narrow answers by a tenth. Most would bring {load}: {after}"
     return f"{load.capitalize()}: {after}"
@@ -94,7 +95,8 @@ def _load(advice: Advice) -> str:
 
 def _expected(expected: Expected) -> tuple[str, str, str]:
     reach = percent(expected.reach_share)
-    return f"± {expected.payload_std_kg:.1f} kg", f"± {expected.front_share_std_pct:.2f} pp", reach
+    payload_kg, share_pct = Z95 * expected.payload_std_kg, Z95 * expected.front_share_std_pct
+    return f"± {payload_kg:.1f} kg", f"± {share_pct:.2f} pp", reach
 
 
 def provenance_section(assessment: Assessment) -> Section:
