@@ -73,8 +73,7 @@ class Gateway:
         self._settings = settings
         self._on_started = on_started
         token_file = TokenFile(settings.store.directory / "tokens.json")
-        tokens = token_file if token_file.are_in_use() else None
-        refuse_open_address(settings.web.host, has_tokens=tokens is not None)
+        refuse_open_address(settings.web.host, has_tokens=token_file.are_in_use())
         forwarding = uplink_settings(settings.uplink, settings.vehicle)
         self.store = store_of(settings.store, forwarding)
         if setup.calibration is not None:
@@ -108,7 +107,7 @@ class Gateway:
             self.store.reader(),
             self.status,
             calibrated=setup.calibrated,
-            tokens=tokens,
+            tokens=token_file,
             tare=self.tare,
             known_loads=known_loads,
         )

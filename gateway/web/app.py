@@ -105,7 +105,7 @@ def create_app(
     if known_loads is not None:
         app.include_router(known_loads_router(known_loads))
     pages.install(app, KNOWN_LOADS_PATH if known_loads else "")
-    _describe(app, is_guarded=tokens is not None)
+    _describe(app, tokens)
     return app
 
 
@@ -120,17 +120,19 @@ class _Application(FastAPI):
         return self._wrap(super().build_middleware_stack())
 
 
-def _describe(app: FastAPI, *, is_guarded: bool) -> None:
-    """Let the description say that problems come as application/problem+json, and that tokens are needed."""
+def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
+    """Let the description say that problems come as application/problem+json, and when tokens are needed."""
     describe = app.openapi
+    told: dict[bool, dict[str, Any]] = {}
 
     def openapi() -> dict[str, Any]:
-        is_known = app.openapi_schema is not None
-        schema = describe()
-        if not is_known:
+        is_guarded = tokens is not None and tokens.are_asked_for()
+        if is_guarded not in told:
+            app.openapi_schema = None
+            schema = told[is_guarded] = describe()
             problems.describe_problems(schema)
             if is_guarded:
                 describe_guard(schema)
-        return schema
+        return told[is_guarded]
 
     app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's documented way to extend the description

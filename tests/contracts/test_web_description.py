@@ -52,7 +52,9 @@ PATIENT = WebSettings(n_wrong_tokens_per_min=1_000_000)  # schemathesis tries ma
 @pytest.fixture(scope="module")
 def token_file() -> Iterator[TokenFile]:
     with tempfile.TemporaryDirectory() as directory:
-        yield TokenFile(Path(directory) / "tokens.json")
+        tokens = TokenFile(Path(directory) / "tokens.json")
+        tokens.create("somebody", Scope.READ)  # from the first token on they are asked for
+        yield tokens
 
 
 @pytest.fixture(scope="module")

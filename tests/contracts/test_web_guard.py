@@ -25,7 +25,9 @@ GUARDED += ["/assets", "/assetsx/../api/v1/status", "/health/live/../ready", "/a
 
 @pytest.fixture
 def tokens(tmp_path: Path) -> TokenFile:
-    return TokenFile(tmp_path / "tokens.json")
+    found = TokenFile(tmp_path / "tokens.json")
+    found.create("somebody", Scope.READ)  # from the first token on they are asked for
+    return found
 
 
 @pytest.fixture
@@ -227,3 +229,42 @@ def test_a_handshake_takes_a_place_and_is_soon_over(tmp_path: Path, monkeypatch:
             late.settimeout(PATIENCE_S)
             with suppress(ConnectionError):
                 assert late.recv(1) == b""  # the handshake it never began is over
+
+
+def test_the_first_token_counts_from_its_first_moment_on(tmp_path: Path) -> None:
+    """It once did nothing until the service was started anew: open before, open after."""
+    path, elsewhere = tmp_path / "tokens.json", TokenFile(tmp_path / "tokens.json")  # the command line's own
+    with Gateway(tmp_path / "store", tokens=TokenFile(path)) as gateway:
+        client = Client(gateway.app)
+        assert client.get("/api/v1/status").status_code == 200
+        assert "security" not in client.get("/openapi.json").json()
+        text = elsewhere.create("reader", Scope.READ)
+        assert client.get("/api/v1/status").status_code == 401
+        assert client.get("/api/v1/status", headers=bearer(text)).status_code == 200
+        assert client.get("/openapi.json").json()["security"] == [{"bearer": []}]
+        elsewhere.revoke("reader")
+        assert client.get("/api/v1/status").status_code == 200
+        assert client.get("/api/v1/status", headers=bearer(text)).status_code == 200  # asked for none, shown one
+
+
+def test_tokens_that_have_gone_with_their_file_leave_the_door_shut(tmp_path: Path) -> None:
+    tokens = TokenFile(tmp_path / "tokens.json")
+    with Gateway(tmp_path / "store", tokens=tokens) as gateway:
+        client = Client(gateway.app)
+        tokens.create("reader", Scope.READ)
+        assert client.get("/api/v1/status").status_code == 401
+        (tmp_path / "tokens.json").unlink()
+        assert client.get("/api/v1/status").status_code == 401
+        assert "has gone while tokens were in use" in str(tokens.fault)
+        text = tokens.create("reader", Scope.READ)
+        assert client.get("/api/v1/status", headers=bearer(text)).status_code == 200
+
+
+def test_a_stranger_is_refused_before_and_after_the_first_token(tmp_path: Path) -> None:
+    tokens = TokenFile(tmp_path / "tokens.json")
+    with Gateway(tmp_path / "store", tokens=tokens) as gateway:
+        stranger = Client(gateway.app, address="192.0.2.7")
+        assert stranger.get("/api/v1/status").status_code == 403
+        text = tokens.create("reader", Scope.READ)
+        assert stranger.get("/api/v1/status").status_code == 401
+        assert stranger.get("/api/v1/status", headers=bearer(text)).status_code == 200

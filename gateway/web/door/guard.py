@@ -60,7 +60,7 @@ class Guard:
         await (self._app if refusal is None else refusal)(scope, receive, send)
 
     def _refusal(self, scope: AsgiScope) -> Response | None:
-        if self._tokens is None:
+        if self._tokens is None or not self._tokens.are_asked_for():  # the first token counts from its first moment
             return _refuse_strangers(scope)
         path: str = scope["path"]
         if path in PUBLIC_PATHS or path.startswith(PUBLIC):

@@ -79,6 +79,14 @@ class _Read:
     by_id: dict[str, Token]
 
 
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """Whether a token was asked for when the file was as it is."""
+
+    stamp: tuple[int, int, int] | None
+    are_in_use: bool
+
+
 class TokenFile:
     """The tokens of one service. The command line writes the file; the service follows its changes.
 
@@ -91,6 +99,7 @@ class TokenFile:
         self._files = KeptFiles(path.parent)
         self._clock_s = clock_s
         self._read = _Read(None, {})
+        self._asked_at: _Asked | None = None
         self.fault: str | None = None  # why no token is accepted, for the status
 
     def create(self, name: str, scope: Scope, lifetime_s: float | None = None) -> str:
@@ -159,6 +168,23 @@ class TokenFile:
             )
             return True
         return bool(tokens)
+
+    def are_asked_for(self) -> bool:
+        """``are_in_use``, quick enough for every request: the file is read again when it has changed.
+
+        A file that is there and holds no token asks for none; one that has gone while tokens were in use does.
+        """
+        stamp = self._files.stamp(self._path.name)
+        if self._asked_at is not None and stamp == self._asked_at.stamp:
+            return self._asked_at.are_in_use
+        was_asked = self._asked_at is not None and self._asked_at.are_in_use
+        if stamp is None and was_asked:
+            self.fault = self.fault or f"{self._path} has gone while tokens were in use: no token is accepted"
+            are_in_use = True
+        else:
+            are_in_use = self.are_in_use()
+        self._asked_at = _Asked(self._files.stamp(self._path.name), are_in_use)
+        return are_in_use
 
     def _tokens_or_set_aside(self) -> tuple[Token, ...]:
         """The tokens. Raises ConfigurationError saying where a broken file lies now."""
