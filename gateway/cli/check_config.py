@@ -8,7 +8,9 @@ import click
 from gateway.calibration.tare_file import FILE_NAME
 from gateway.cli.options import FILE, as_json
 from gateway.config import load_settings
+from gateway.errors import ConfigurationError
 from gateway.records import json_line
+from gateway.service.startable import startable_faults
 from gateway.setup import setup_of
 from gateway.uplink import uplink_settings
 
@@ -23,6 +25,9 @@ def check_config(config: Path, as_json: bool) -> None:
     tares = settings.store.directory / FILE_NAME
     if os.access(tares, os.R_OK):  # the service's own; others may not be allowed to see it
         setup = setup.with_tare_of(tares)
+    faults = tuple(startable_faults(settings))
+    if faults:
+        raise ConfigurationError("\n".join(f"{config}: {fault}" for fault in faults))
     forwarding = uplink_settings(settings.uplink, settings.vehicle)
     summary = {
         "config": str(config),

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from gateway.bus.live import usable_interfaces
 from gateway.bus.sink import Speed
 from gateway.config import ESTIMATOR_NAMES, BatchSection
 from gateway.core.settings import BatchSettings
@@ -39,7 +40,11 @@ def batch_settings(window_s: float | None) -> BatchSettings:
     return BatchSection().for_core(window_s=window_s)
 
 
-interface = click.option("--interface", required=True, help="python-can's name: socketcan, virtual, udp_multicast, ...")
+interface = click.option(
+    "--interface",
+    required=True,
+    help=f"python-can's name; on this computer {', '.join(usable_interfaces())} (an adapter's wants its driver)",
+)
 channel = click.option("--channel", required=True, help="of that interface: can0, vcan0, ...")
 
 

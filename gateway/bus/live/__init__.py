@@ -5,7 +5,15 @@ every loss counted. Errors of a bus end in waiting and opening it anew, never in
 """
 
 from gateway.bus.live.inbox import Inbox
-from gateway.bus.live.python_can import require_known_interface
+from gateway.bus.live.python_can import require_known_interface, usable_interfaces, what_lacks
 from gateway.bus.live.source import LiveSource, OpenReceiver, SourceState
 
-__all__ = ["Inbox", "LiveSource", "OpenReceiver", "SourceState", "require_known_interface"]
+__all__ = [
+    "Inbox",
+    "LiveSource",
+    "OpenReceiver",
+    "SourceState",
+    "require_known_interface",
+    "usable_interfaces",
+    "what_lacks",
+]

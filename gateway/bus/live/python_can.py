@@ -1,5 +1,8 @@
 """Any python-can interface but SocketCAN (slcan, pcan, virtual, ...), only listened to."""
 
+import importlib.util
+import socket
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
@@ -23,6 +26,21 @@ _LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
     "nixnet": {"listen_only": True},
     "virtual": {"rx_queue_size": VIRTUAL_QUEUE_FRAMES},
 }
+
+
+# The package that python-can's own code for an interface imports, by module and by the name to install
+_PACKAGES: Final[Mapping[str, tuple[str, str]]] = {
+    "canalystii": ("canalystii", "canalystii"),
+    "cantact": ("cantact", "cantact"),
+    "gs_usb": ("gs_usb", "gs-usb"),
+    "neovi": ("ics", "python-ics"),
+    "robotell": ("serial", "pyserial"),
+    "seeedstudio": ("serial", "pyserial"),
+    "serial": ("serial", "pyserial"),
+    "slcan": ("serial", "pyserial"),
+    "udp_multicast": ("msgpack", "msgpack"),
+}
+_WINDOWS_ONLY: Final = frozenset({"etas", "ixxat", "nican", "nixnet", "systec", "usb2can", "vector"})
 
 
 class PythonCanReceiver:
@@ -86,6 +104,30 @@ def require_known_interface(interface: str) -> None:
     """Raise BusError, naming those there are, for an interface python-can does not know."""
     if interface not in can.VALID_INTERFACES:
         raise BusError(f"[bus] interface {interface!r} is unknown; there are {', '.join(sorted(can.VALID_INTERFACES))}")
+
+
+def what_lacks(interface: str) -> str | None:
+    """Why this interface cannot be used on this computer, and how to mend it; None where nothing is known to lack.
+
+    Drivers of adapters are not looked for: only opening the channel would tell.
+    """
+    try:
+        require_known_interface(interface)
+    except BusError as fault:
+        return str(fault)
+    module, package = _PACKAGES.get(interface, ("can", "python-can"))
+    if interface in _WINDOWS_ONLY and sys.platform != "win32":
+        return f"[bus] interface {interface!r} exists on Windows only; choose another"
+    if interface == "socketcan" and not hasattr(socket, "AF_CAN"):
+        return "[bus] interface 'socketcan' exists on Linux only; choose another"
+    if importlib.util.find_spec(module) is None:
+        return f"[bus] interface {interface!r} needs the Python package {package}: pip install {package}"
+    return None
+
+
+def usable_interfaces() -> tuple[str, ...]:
+    """Those that lack nothing we know of, but for the in-process one, which leads to no other program."""
+    return tuple(sorted(name for name in can.VALID_INTERFACES if name != "virtual" and what_lacks(name) is None))
 
 
 def _can_filters(filters: Sequence[IdFilter]) -> list[dict[str, Any]]:

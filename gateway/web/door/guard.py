@@ -22,6 +22,7 @@ _FORWARDED: Final = frozenset(
 )
 _LOCAL_NAMES: Final = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
+HOW_TO_MAKE_ONE: Final = "`springscale token create NAME --config springscale.toml` on the gateway"
 WITHIN_S: Final = 60.0
 _ADDRESSES: Final = 1024
 
@@ -76,7 +77,7 @@ class Guard:
             scope.setdefault("state", {})["token_name"] = token.name
             return None if token.scope.allows(wanted) else _forbidden(scope, wanted)
         if shown is None:
-            return _unauthorised(scope, "a bearer token is needed: `springscale token create` makes one", "")
+            return _unauthorised(scope, f"a bearer token is needed: {HOW_TO_MAKE_ONE} makes one", "")
         wait_s = self._failures.note(scope["client"][0] if scope.get("client") else "")
         if wait_s is not None:
             return _problem(scope, 429, "too many wrong tokens from this address", {"retry-after": str(wait_s)})
@@ -87,9 +88,9 @@ def _refuse_strangers(scope: AsgiScope) -> Response | None:
     """Without tokens: only from this machine, and only under a local name (else a web page could ask by DNS tricks)."""
     client = scope.get("client")
     if client is not None and not is_loopback(client[0]):
-        return _problem(scope, 403, "without tokens only this machine is answered: create one on the gateway")
+        return _problem(scope, 403, f"without tokens only this machine is answered: {HOW_TO_MAKE_ONE} makes one")
     if any(name in _FORWARDED for name, _ in scope["headers"]):  # the proxy is local, its clients are not
-        return _problem(scope, 403, "without tokens nobody is answered through a proxy: create one on the gateway")
+        return _problem(scope, 403, f"without tokens nobody is answered through a proxy: {HOW_TO_MAKE_ONE} makes one")
     host = (_header(scope, b"host") or "").lower()
     name = host if host.endswith("]") else host.rpartition(":")[0] or host
     if name not in _LOCAL_NAMES:

@@ -28,7 +28,7 @@ def refuse_open_address(host: str, *, has_tokens: bool) -> None:
     if not has_tokens and not is_loopback(host):
         raise ConfigurationError(
             f"[web] host = {host!r} can be reached from elsewhere, and there is no token: "
-            'make one with `springscale token create NAME`, or set host = "127.0.0.1"'
+            'make one with `springscale token create NAME --config springscale.toml`, or set host = "127.0.0.1"'
         )
 
 

@@ -136,7 +136,7 @@ class TokenFile:
             kept = tuple(token for token in tokens if name not in (token.name, token.id))
             if len(kept) == len(tokens):
                 raise ConfigurationError(
-                    f"{self._path}: there is no token {name!r}: `springscale token list` shows them"
+                    f"{self._path}: there is no token {name!r}: `springscale token list --config FILE` shows them"
                 )
             self._write(kept)
 
@@ -164,7 +164,7 @@ class TokenFile:
         if earlier and self._files.stamp(self._path.name) is None:
             self.fault = (
                 f"{self._path} was broken and is now {earlier[-1]}: no token is accepted until "
-                "`springscale token create` has made new ones, or that file is moved away"
+                "`springscale token create NAME --config FILE` has made new ones, or that file is moved away"
             )
             return True
         return bool(tokens)
@@ -197,7 +197,7 @@ class TokenFile:
         except OSError as refusal:
             aside = f"and cannot be set aside: {refusal}"
         log_event(Event.TOKENS_SET_ASIDE, level=logging.ERROR, fault=broken, set_aside=aside)
-        raise ConfigurationError(f"{broken}; {aside}: `springscale token create` begins a new one")
+        raise ConfigurationError(f"{broken}; {aside}: `springscale token create NAME --config FILE` begins a new one")
 
     @contextmanager
     def _alone(self) -> Iterator[None]:

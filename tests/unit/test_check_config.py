@@ -1,0 +1,79 @@
+"""check-config calls good only what can run; the help of replay offers only what works here."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from gateway.bus.live import usable_interfaces, what_lacks
+from gateway.cli import springscale
+from gateway.errors import ConfigurationError
+from gateway.web import Scope, TokenFile
+
+SOUND = {"bus": 'interface = "virtual"\nchannel = "x"', "web": "port = 0", "batch": "window_s = 300.0"}
+
+
+def checked(folder: Path, **sections: str) -> Result:
+    tables = "\n".join(f"[{name}]\n{text}" for name, text in (SOUND | sections).items())
+    path = folder / "springscale.toml"
+    path.write_text(f'signals = "springscale:reference"\n[store]\ndirectory = "{folder / "state"}"\n{tables}\n')
+    return CliRunner().invoke(springscale, ["check-config", str(path)])
+
+
+def test_a_sound_configuration_is_good(tmp_path: Path) -> None:
+    assert checked(tmp_path).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("sections", "words"),
+    [
+        ({"bus": 'interface = "socketcn"\nchannel = "can0"'}, "interface 'socketcn' is unknown; there are "),
+        ({"bus": 'interface = "udp_multicast"\nchannel = "239.0.0.1"'}, "needs the Python package msgpack"),
+        ({"web": 'host = "0.0.0.0"'}, "springscale token create NAME --config"),
+        ({"web": "stale_after_s = 200.0"}, "stale_after_s = 200 is below [batch] window_s = 300"),
+    ],
+)
+def test_what_cannot_run_is_not_called_good(
+    sections: dict[str, str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found_spec = importlib.util.find_spec
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda name, *rest: None if name == "msgpack" else found_spec(name, *rest)
+    )
+    found = checked(tmp_path, **sections)
+    assert isinstance(found.exception, ConfigurationError)
+    assert words in str(found.exception)
+    assert "springscale.toml: " in str(found.exception)
+
+
+def test_every_fault_is_named_at_once(tmp_path: Path) -> None:
+    found = checked(tmp_path, bus='interface = "socketcn"', web='host = "0.0.0.0"\nstale_after_s = 20.0')
+    assert len(str(found.exception).splitlines()) == 3
+
+
+def test_an_open_address_with_a_token_is_good(tmp_path: Path) -> None:
+    (tmp_path / "state").mkdir(mode=0o700)
+    TokenFile(tmp_path / "state" / "tokens.json").create("fleet", Scope.READ)
+    assert checked(tmp_path, web='host = "0.0.0.0"').exit_code == 0
+
+
+def test_the_help_offers_only_interfaces_that_work() -> None:
+    told = " ".join(CliRunner().invoke(springscale, ["replay", "--help"]).output.split())
+    usable = usable_interfaces()
+    assert f"on this computer {', '.join(usable)}" in told
+    assert ("udp_multicast" in usable) is (importlib.util.find_spec("msgpack") is not None)
+    assert "virtual" not in usable  # it leads to no other program
+    assert all(what_lacks(name) is None for name in usable)
+    assert ("socketcan" in usable) is (sys.platform == "linux")
+
+
+def test_messages_that_ask_for_a_token_say_which_service_it_is_for(tmp_path: Path) -> None:
+    """`token create` needs --config, which they once did not mention."""
+    tokens = TokenFile(tmp_path / "tokens.json")
+    with pytest.raises(ConfigurationError, match=r"token list --config FILE"):
+        tokens.revoke("nobody")
+    (tmp_path / "tokens.json").write_text("{")
+    assert tokens.are_in_use()
+    assert "token create NAME --config FILE" in str(tokens.fault)
