@@ -1,6 +1,7 @@
 """CAN databases through cantools, reduced to what decoding needs. The only room's corner that knows cantools."""
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,9 @@ from cantools.database.errors import UnsupportedDatabaseFormatError
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID
+
+_LONG_SIGNAL = re.compile(rb"^\s*SG_\s+(\w+)[^:\n]*:\s*\d+\s*\|\s*0*[1-9]\d{3,}\s*@", re.MULTILINE)
+_FRAME_ID = re.compile(rb"^\s*BO_\s+0*(\d+)\s", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +70,7 @@ def closest(name: str, known: Iterable[str]) -> str:
 def _load(map_path: Path, path: Path) -> list[CantoolsMessage]:
     if not path.is_file():
         raise SignalMapError(f"{map_path}: dbc: no such file: {path}; paths are relative to the map")
+    _refuse_absurd(map_path, path)
     try:
         # not strict: vendors' databases with overlapping signals are common, and a field is checked when it is mapped
         database = cantools.database.load_file(path, strict=False)
@@ -74,6 +79,19 @@ def _load(map_path: Path, path: Path) -> list[CantoolsMessage]:
     if not isinstance(database, cantools.database.can.Database):
         raise SignalMapError(f"{map_path}: dbc: {path} describes diagnostics; a DBC, KCD, ARXML or SYM is wanted")
     return list(database.messages)
+
+
+def _refuse_absurd(map_path: Path, path: Path) -> None:
+    """cantools takes a minute for a signal of a billion bits, and cuts an identifier of 33 bits down to another."""
+    text = path.read_bytes()
+    long = _LONG_SIGNAL.search(text)
+    if long is not None:
+        raise SignalMapError(f"{map_path}: dbc: {path}: signal {long[1].decode()!r} is longer than any message")
+    for found in _FRAME_ID.finditer(text):
+        if len(found[1]) > 10 or int(found[1]) >= 1 << 32:
+            raise SignalMapError(
+                f"{map_path}: dbc: {path}: {found[1][:20].decode()} is no identifier: 32 bits hold one"
+            )
 
 
 def _message(message: CantoolsMessage, path: Path) -> DatabaseMessage:

@@ -21,6 +21,7 @@ QUANTITIES: Final[Mapping[Signal, str]] = {
     Signal.AMBIENT_TEMPERATURE: "temperature",
     Signal.AXLE_WEIGHT: "mass",
 }
+LONGEST_BYTES = 64  # of a CAN FD frame
 FEWEST_COUNTER_BITS: Final = 2
 MOST_COUNTER_BITS: Final = 32  # and no frames are lost round a longer one
 _EXACT_INTEGERS: Final = 1 << 53  # a double holds every integer up to here
@@ -98,6 +99,12 @@ def _require_decodable(where: str, signal: DatabaseSignal, message: DatabaseMess
         raise SignalMapError(f"{where}: {signal.name!r} is a float of {field.length} bits; 16, 32 or 64 are possible")
     if not 1 <= field.length <= 64:
         raise SignalMapError(f"{where}: {signal.name!r} has {field.length} bits; 1 to 64 are possible")
+    if not 0 <= message.length <= LONGEST_BYTES:
+        raise SignalMapError(f"{where}: {message.name!r} has {message.length} bytes; a CAN frame carries at most 64")
+    if field.start < 0:
+        raise SignalMapError(f"{where}: {signal.name!r} begins at bit {field.start}; correct {message.source.name}")
+    if not (math.isfinite(field.scale) and math.isfinite(field.offset)):
+        raise SignalMapError(f"{where}: {signal.name!r} has no finite scale and offset; correct {message.source.name}")
     if field.n_bytes > message.length:
         raise SignalMapError(
             f"{where}: {signal.name!r} ends in byte {field.n_bytes}, but {message.name!r} has {message.length}; "
