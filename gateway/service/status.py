@@ -48,7 +48,7 @@ class StatusReport:
     def __call__(self) -> Status:
         """The status as of now."""
         state = self.state()
-        not_ready = self._source.reason if state is State.READER_FAULT else None
+        not_ready = self._why_not_ready(state)
         return Status(
             version=self._version,
             state=state,
@@ -73,6 +73,14 @@ class StatusReport:
             not_ready_reason=not_ready,
             warnings=self._warnings(),
         )
+
+    def _why_not_ready(self, state: State) -> str | None:
+        """Why no estimate can come; None where it can. A sleeping bus or a parked vehicle is no reason."""
+        if state is State.READER_FAULT:
+            return self._source.reason
+        if self._setup.calibration is None:
+            return "no calibration: batches carry spectra only; name a calibration file in the configuration"
+        return None
 
     def state(self) -> State:
         """The first that holds, worst first."""

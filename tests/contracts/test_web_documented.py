@@ -28,3 +28,23 @@ def test_the_columns_of_the_export_are_fields_of_an_estimate() -> None:
     fields = set(Estimate.model_fields)
     bounds = {name.replace("low95", "interval95").replace("high95", "interval95") for name in COLUMNS}
     assert bounds <= fields
+
+
+def test_every_order_of_the_history_is_named_with_its_meaning(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway:
+        history = Client(gateway.app).get("/openapi.json").json()["paths"]["/api/v1/estimates"]["get"]
+    (order,) = [one for one in history["parameters"] if one["name"] == "order"]
+    (row,) = [line for line in API.splitlines() if line.startswith("| `/api/v1/estimates` ")]
+    for value in order["schema"]["enum"]:
+        assert f"`{value}`" in row
+        assert value in order["description"]
+
+
+def test_what_a_load_epoch_tells_is_described(tmp_path: Path) -> None:
+    """The fields epoch_* were once in no schema."""
+    with Gateway(tmp_path) as gateway:
+        shapes = Client(gateway.app).get("/openapi.json").json()["components"]["schemas"]
+    described = {name: one for name, one in shapes["Estimate"]["properties"].items() if name.startswith("epoch_")}
+    figures = {f"epoch_{name}" for name in ("payload_kg", "payload_std_kg", "front_share_pct", "front_share_std_pct")}
+    assert figures | {"epoch_n_batches"} <= set(described)
+    assert all(one.get("description") for one in described.values())

@@ -51,7 +51,9 @@ class EstimatesQuery(BaseModel):
     until: Instant | SkipJsonSchema[None] = Field(None, description="batches that end before this")
     limit: int = Field(100, ge=1, le=PAGE_LIMIT)
     cursor: Cursor | SkipJsonSchema[None] = Field(None, description="next_cursor or last_cursor of an earlier answer")
-    order: Literal["oldest_first", "newest_first"] = "oldest_first"
+    order: Literal["oldest_first", "newest_first"] = Field(
+        "oldest_first", description="oldest_first to follow what comes, newest_first for the last ones"
+    )
     spectra: bool = Field(True, description="false leaves the spectra out")
 
 
