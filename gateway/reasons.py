@@ -147,7 +147,8 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.OUT_OF_RANGE: Explanation(
             Cause.ANSWER,
-            "the 95 % interval lies wholly outside the loads or shares of the calibration plus a margin",
+            "the 95 % interval lies wholly outside the loads or shares of the calibration plus a margin; for the ratio "
+            "index, R itself does: its intervals grow as fast as its errors",
             "calibrate with such loads, or suspect vehicle and sensor",
         ),
         Why.TOO_UNCERTAIN: Explanation(

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum.estimator import by_cross_spectrum
+from gateway.core.cross_spectrum.estimator import MOST_PAYLOAD_STD_SHARE, by_cross_spectrum
 from gateway.core.ratio_index.estimator import by_ratio_index
 from gateway.core.ratio_index.index import indexes_of
 from gateway.core.spectrum import roughness_mps2, spectra_of
@@ -63,7 +63,10 @@ def _by_ratio_index(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate
     """The paper's estimator, kept for comparison."""
     if calibrated.ratio_index is None:
         return replace(blank, rejected=(Why.NO_CALIBRATION,))
-    return by_ratio_index(batch, calibrated.ratio_index, blank)
+    found = by_ratio_index(batch, calibrated.ratio_index, blank)
+    if found.counted and found.payload.std > MOST_PAYLOAD_STD_SHARE * calibrated.vehicle.empty_mass_kg:
+        return replace(found, payload=UNKNOWN, front_share=UNKNOWN, rejected=(Why.TOO_UNCERTAIN,))
+    return found
 
 
 ESTIMATORS: Mapping[str, Estimator] = MappingProxyType(

@@ -17,7 +17,7 @@ def constant_model(answer: float, std: float) -> RegressionModel:
     return RegressionModel(
         terms=("ra",),
         lows=np.array([0.0]),
-        highs=np.array([1.0]),
+        highs=np.array([100.0]),  # no index lies beyond
         coefficients=np.array([answer, 0.0]),
         gram_inverse=np.zeros((2, 2)),
         residual_std=std,

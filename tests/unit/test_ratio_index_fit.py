@@ -10,6 +10,9 @@ from gateway.calibration.file import RatioIndexPart
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.ratio_index.structures import StructureChoice
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.estimator import estimate
+from gateway.core.ratio_index import RatioIndexCalibration, RegressionModel
 from gateway.core.ratio_index.index import PAPER_BANDS, indexes_of
 from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
@@ -20,6 +23,7 @@ from gateway.core.ratio_index.regression import (
 )
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
+from gateway.estimate import UNKNOWN
 from gateway.records import F64, Batch, Why
 
 VAN = Vehicle("van", empty_mass_kg=1240.0, wheelbase_m=2.8)
@@ -83,6 +87,41 @@ def test_unseen_loads_are_told_within_the_stated_spread(fit: RatioIndexFit) -> N
         assert abs(found_kg - kg) < 3.5 * std_kg
         assert abs(found_pct - pct) < 3.5 * std_pct
     assert n_covered >= 3
+
+
+def calibrated(calibration: RatioIndexCalibration) -> CalibratedVehicle:
+    return CalibratedVehicle("van", VAN, (0.0, 450.0), (46.0, 53.0), ratio_index=calibration)
+
+
+def test_white_noise_has_no_weight_however_wide_its_interval(fit: RatioIndexFit) -> None:
+    rng = np.random.default_rng(4)
+    noise = replace(
+        batch_of(0.0, 50.0, 1),
+        vertical_acceleration_mps2=rng.standard_normal(N),
+        pitch_rate_radps=rng.standard_normal(N),
+    )
+    found = estimate(noise, calibrated(fit.calibration), "ratio_index")
+    assert (found.rejected, found.payload) == ((Why.OUT_OF_RANGE,), UNKNOWN)
+    assert np.isfinite(found.ratio_index_acceleration)
+
+
+def test_an_index_beyond_the_calibrated_ones_is_refused_from_a_quarter_of_their_span_on() -> None:
+    model = RegressionModel(
+        ("ra", "log_rg"), np.array([1.0, 0.0]), np.array([2.0, 1.0]), np.ones(3), np.eye(3), 1.0, 3.0
+    )
+    assert not model.extrapolates(2.249, np.exp(-0.249), 0.25)
+    assert model.extrapolates(2.251, 1.0, 0.25)
+    assert model.extrapolates(1.5, np.exp(-0.251), 0.25)
+
+
+def test_an_answer_too_wide_to_be_of_use_is_refused_as_the_other_estimator_does(fit: RatioIndexFit) -> None:
+    model = fit.calibration.payload
+    assert model is not None
+    vague = replace(fit.calibration, payload=replace(model, residual_std=0.16 * VAN.empty_mass_kg))
+    batch = batch_of(225.0, 48.0, 1001)
+    assert estimate(batch, calibrated(fit.calibration), "ratio_index").counted
+    found = estimate(batch, calibrated(vague), "ratio_index")
+    assert (found.rejected, found.payload) == ((Why.TOO_UNCERTAIN,), UNKNOWN)
 
 
 def test_the_order_of_runs_and_rejected_batches_change_no_bit(fit: RatioIndexFit) -> None:

@@ -1,7 +1,8 @@
 """The paper's estimator: R_a and R_g by (7), (8), then the static regression (9), (10) or (11).
 
 Its gates are narrow, because the index moves with speed: the speed's spread within the batch and its
-distance from the calibrated speeds are bounded.
+distance from the calibrated speeds are bounded. Beyond the indexes that calibration saw the regression is a guess,
+and its interval the wider the worse the guess is, so that it would hold any load: the indexes are bounded too.
 """
 
 from dataclasses import replace
@@ -15,6 +16,7 @@ from gateway.estimate import UNKNOWN, Estimate, Quantity
 from gateway.records import Batch, Why
 
 SPEED_MARGIN: Final = 0.15  # how far a batch's mean speed may lie outside those calibrated, as a share
+INDEX_MARGIN: Final = 0.25  # likewise every term of the indexes, as a share of its span; that of payloads is the same
 
 
 def by_ratio_index(batch: Batch, calibration: RatioIndexCalibration, blank: Estimate) -> Estimate:
@@ -29,6 +31,9 @@ def by_ratio_index(batch: Batch, calibration: RatioIndexCalibration, blank: Esti
     wanted = [ra] * (calibration.acceleration_bands is not None) + [rg] * (calibration.pitch_rate_bands is not None)
     if not all(np.isfinite(wanted)):
         return replace(indexed, rejected=(Why.NOT_ENOUGH_EXCITATION,))
+    models = [model for model in (calibration.payload, calibration.front_share) if model is not None]
+    if any(model.extrapolates(ra, rg, INDEX_MARGIN) for model in models):
+        return replace(indexed, rejected=(Why.OUT_OF_RANGE,))
     return replace(
         indexed,
         payload=_predicted(calibration.payload, ra, rg),

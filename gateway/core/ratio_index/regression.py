@@ -63,6 +63,11 @@ class RegressionModel:
         half = float(stdtrit(self.dof, 0.975)) * std
         return centre, std, (centre - half, centre + half)
 
+    def extrapolates(self, ra: float, rg: float, margin: float) -> bool:
+        """True where a term lies outside what calibration saw of it by more than ``margin``, a share of its span."""
+        scaled = scaled_columns(self.terms, np.array([ra]), np.array([rg]), self.lows, self.highs)[0, 1:]
+        return not bool(np.all(np.abs(scaled) <= 1.0 + 2.0 * margin))
+
 
 def term_columns(terms: tuple[str, ...], ra: F64, rg: F64) -> F64:
     """Raw columns (..., n, p) of the named terms for indexes (..., n)."""
