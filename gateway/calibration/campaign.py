@@ -37,7 +37,8 @@ class VehicleTable(_Table):
     empty_front_share_pct: Percent = Field(50.0, description="share of `empty_mass_kg` that rests on the front axle")
     sensor_position_m: Metres = Field(description="the sensor's, behind the front axle; negative: ahead of it")
     payload_range_kg: tuple[Kilograms, Kilograms] = Field(
-        (0.0, 450.0), description="payloads the vehicle may carry, rising; scales percentages and plans, never clips"
+        (0.0, 450.0),
+        description="payloads the vehicle may carry, rising; scales percentages, never clips; a plan asks for it",
     )
     front_share_range_pct: tuple[Percent, Percent] = Field(
         (40.0, 60.0), description="front shares it may have, rising; scales percentages and plans, never clips"
@@ -128,6 +129,7 @@ class Campaign:
         self.runs = table.runs
         self.identification_fraction = table.identification_fraction
         self.vehicle = Vehicle(**table.vehicle.model_dump())
+        self.states_payload_range = "payload_range_kg" in table.vehicle.model_fields_set
         self._signals = table.signals
 
     @property

@@ -1,7 +1,6 @@
 """springscale calibrate: known-load drives to a calibration file."""
 
 import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
@@ -22,7 +21,7 @@ from gateway.cli.text.plan import plan_sentences
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
-from gateway.errors import CalibrationImpossibleError, ConfigurationError
+from gateway.errors import CalibrationImpossibleError, CampaignError, ConfigurationError
 from gateway.offline import inspect
 from gateway.records import json_line
 
@@ -46,7 +45,12 @@ from gateway.records import json_line
     show_default=True,
     help="of the ratio index: single is (9) and (10), joint is (11)",
 )
-@click.option("--plan", "wants_plan", is_flag=True, help="advise which load to drive next; [vehicle] alone is enough")
+@click.option(
+    "--plan",
+    "wants_plan",
+    is_flag=True,
+    help="advise which load to drive next; [vehicle] with its payload_range_kg is enough",
+)
 @click.option("--check", "only_checks", is_flag=True, help="inspect the drives and write nothing; exits 1 on a refusal")
 @click.option("--report", type=FILE, default=None, help="directory to write a report into: report.html, figures")
 @click.option(
@@ -75,6 +79,7 @@ def calibrate(
         raise click.UsageError("--learning-curve is part of a report: name its directory with --report")
     _require_places(output, report)
     loaded = load_campaign(campaign, may_lack_runs=wants_plan)
+    _ask_for_payload_range(loaded, is_needed=wants_plan)
     if not loaded.runs:
         _plan_first(loaded.vehicle, as_json=as_json)
         return
@@ -91,7 +96,7 @@ def calibrate(
             estimators=estimators or ESTIMATOR_NAMES,
             bands=bands,
             structure=structure,
-            command=shlex.join(["springscale", *sys.argv[1:]]),
+            command=_command(campaign, estimators, numbers, bands, structure, window_s),
             on_fit=on_share(on_step, estimators or ESTIMATOR_NAMES),
         )
     if output is not None:
@@ -105,10 +110,42 @@ def calibrate(
         click.echo(_sentences(outcome.file, output, plan, said=inspection.warnings))
 
 
+def _command(
+    campaign: Path,
+    estimators: Sequence[str],
+    numbers: Sequence[int] | None,
+    bands: BandChoice,
+    structure: StructureChoice,
+    window_s: float | None,
+) -> str:
+    """What decides the result, as it would be asked for again: the calibration's id comes from it too.
+
+    Not where the file lies or is written to, for the same drives give the same calibration under any name.
+    """
+    words = ["springscale", "calibrate", campaign.name]
+    words += [word for name in estimators for word in ("--estimator", name)]
+    words += [] if numbers is None else ["--runs", ",".join(map(str, numbers))]
+    words += ["--bands", bands, "--structure", structure]
+    words += [] if window_s is None else ["--window-s", f"{window_s:g}"]
+    return shlex.join(words)
+
+
 def _plan_first(vehicle: Vehicle, *, as_json: bool) -> None:
     """--plan before any drive."""
     plan = plan_first(vehicle)
     click.echo(json_line({"plan": plan.to_json()}) if as_json else plan_sentences(plan))
+
+
+def _ask_for_payload_range(campaign: Campaign, *, is_needed: bool) -> None:
+    """Errors are in percent of it, and a plan keeps within it: a van of 3.5 t carries far more than the default."""
+    if campaign.states_payload_range:
+        return
+    low_kg, high_kg = campaign.vehicle.payload_range_kg
+    missing = f"{campaign.path}: vehicle.payload_range_kg: not stated"
+    ask = "write what the vehicle may carry, such as payload_range_kg = [0.0, 1200.0]"
+    if is_needed:
+        raise CampaignError(f"{missing}; a plan keeps within it: {ask}")
+    click.echo(f"{missing}: {low_kg:g} to {high_kg:g} kg is taken, errors are in percent of it; {ask}", err=True)
 
 
 def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> None:

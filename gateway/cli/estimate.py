@@ -37,15 +37,22 @@ def estimate(
     window_s: float | None,
     as_json: bool,
 ) -> None:
-    """One line per batch of every LOG, rejected ones included with their reasons."""
+    """One line per batch of every LOG, rejected ones included with their reasons.
+
+    With several logs each line says of which it is: in front of the line, or as "log" in its JSON.
+    """
     if tare is not None and no_tare:
         raise click.UsageError("give --tare FILE or --no-tare, not both")
     setup, settings, state = _prepared(config_path, signals, calibration, estimator, window_s)
     if not no_tare:
         setup = _tared(setup, tare, state)
-    for weighed in estimates_of_logs(logs, setup, settings):
-        record = estimate_to_json(weighed)
-        click.echo(json_line(record) if as_json else sentence(record))
+    for log in logs:
+        for weighed in estimates_of_logs([log], setup, settings):
+            record = estimate_to_json(weighed)
+            if len(logs) == 1:
+                click.echo(json_line(record) if as_json else sentence(record))
+            else:
+                click.echo(json_line({"log": str(log), **record}) if as_json else f"{log}: {sentence(record)}")
 
 
 def _prepared(

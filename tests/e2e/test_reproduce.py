@@ -46,6 +46,16 @@ def test_every_figure_stands_in_the_page_and_beside_it(reproduced: Path) -> None
         assert (reproduced / "figures" / f"{plate.name}.svg").read_text(encoding="utf-8").startswith("<?xml")
 
 
+def test_a_quick_try_signs_itself_as_one(reproduced: Path) -> None:
+    for name in ("report.html", "accuracy.md"):
+        assert "A quick try with a part of the driving" in (reproduced / name).read_text(encoding="utf-8")
+    assert "--quick" in (reproduced / "accuracy.md").read_text(encoding="utf-8")
+    results = json.loads((reproduced / "results.json").read_text(encoding="utf-8"))
+    assert results["is_whole"] is False
+    assert "quick" not in accuracy_page(results | {"is_whole": True})
+    assert Extent(seed=7, workers=2).is_whole
+
+
 def test_the_page_needs_nothing_from_elsewhere(reproduced: Path) -> None:
     page = (reproduced / "report.html").read_text(encoding="utf-8")
     assert not re.search(r"<script|<link|src=\"http|url\(http", page)

@@ -1,6 +1,7 @@
 """Plans: a first campaign from [vehicle] alone, and what to drive after a calibration."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
 from gateway.cli import springscale
 from gateway.cli.text.plan import plan_sentences
 from gateway.core.weights import weights_of
-from gateway.errors import CalibrationImpossibleError
+from gateway.errors import CalibrationImpossibleError, CampaignError
 from gateway.estimate import Quantity
 from gateway.reports.calibration.runs import best_next
 
@@ -28,6 +29,7 @@ name = "van"
 empty_mass_kg = 1240.0
 wheelbase_m = 2.8
 sensor_position_m = 3.1
+payload_range_kg = [0.0, 450.0]
 """
 
 
@@ -143,6 +145,14 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_read(
     done = CliRunner().invoke(springscale, ["calibrate", "campaign.toml", *options])
     assert done.exit_code == 2
     assert said in done.output
+
+
+def test_a_plan_asks_what_the_vehicle_may_carry(tmp_path: Path) -> None:
+    """A van of 3.5 t was told to drive the 450 kg of a small one."""
+    draft = tmp_path / "campaign.toml"
+    draft.write_text(re.sub("payload_range_kg.*\n", "", DRAFT), encoding="utf-8")
+    with pytest.raises(CampaignError, match=r"payload_range_kg: not stated.* write what the vehicle may carry"):
+        CliRunner().invoke(springscale, ["calibrate", str(draft), "--plan"], catch_exceptions=False)
 
 
 def test_neither_a_file_nor_a_plan_asked_for_is_a_usage_error(tmp_path: Path) -> None:

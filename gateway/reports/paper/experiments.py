@@ -38,6 +38,11 @@ class Extent:
     workers: int = 1
 
     @property
+    def is_whole(self) -> bool:
+        """False where less is driven, or in shorter batches, than in the paper."""
+        return self == Extent(self.seed, workers=self.workers)
+
+    @property
     def settings(self) -> BatchSettings:
         return BatchSettings(window_s=self.window_s)
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from gateway.core.ratio_index.index import PAPER_BANDS, Band
 from gateway.reports.paper import figures as draw
 from gateway.reports.paper.experiments import Experiments, Method
-from gateway.reports.paper.table import COLUMNS, Row
+from gateway.reports.paper.table import COLUMNS, QUICK, Row
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +106,12 @@ def page(experiments: Experiments, rows: Sequence[Row], drawings: Sequence[tuple
         f'<section id="{plate.name}"><h2>{escape(plate.heading)}</h2>{drawn}<p>{escape(plate.text)}</p></section>'
         for plate, drawn in drawings
     )
+    is_whole = experiments.extent.is_whole
+    title = f"Section 4, reproduced{'' if is_whole else ': a quick try'}"
+    quick = "" if is_whole else f"<p><strong>{QUICK}</strong></p>"
     return (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Section 4, reproduced</title>'
-        f"<style>{_STYLE}</style></head><body><h1>Section 4, reproduced</h1>"
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+        f"<style>{_STYLE}</style></head><body><h1>{title}</h1>{quick}"
         f"<p>The simulations and the experiment of Bottelli, Tanelli, Boniolo and Savaresi, driven again with our own "
         f"simulator (seed {experiments.extent.seed}, batches of {experiments.extent.window_s:g} s). Nothing here is "
         f"measured on a real vehicle. Errors are (12): percent of 450 kg and of 20 percentage points.</p>"

@@ -49,6 +49,7 @@ def results_of(experiments: Experiments) -> dict[str, Any]:
     return {
         "seed": experiments.extent.seed,
         "window_s": experiments.extent.window_s,
+        "is_whole": experiments.extent.is_whole,
         "tables": tables_of(experiments),
         "sensitivity": [
             {

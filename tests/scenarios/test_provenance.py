@@ -1,0 +1,58 @@
+"""Where a number comes from: the log of every line, and a calibration's id from its drives, not from file names."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from support.known_load_logs import SIGNALS, write_known_loads
+
+from gateway.calibration.file import load_calibration
+from gateway.cli import springscale
+
+WINDOW = ("--window-s", "100")
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_known_loads(tmp_path_factory.mktemp("provenance"), duration_s=110.0, identification_fraction=1.0)
+
+
+def run(*arguments: str) -> Result:
+    done = CliRunner().invoke(springscale, list(arguments), catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done
+
+
+def test_an_id_does_not_depend_on_where_files_lie(
+    campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    shutil.copytree(campaign.parent, elsewhere)
+    ids = set()
+    for where, name in ((campaign, "a.json"), (campaign, "b.json"), (elsewhere / "campaign.toml", "c.json")):
+        asked = ["calibrate", str(where), "--output", str(tmp_path / name), "--estimator", "ratio_index", *WINDOW]
+        monkeypatch.setattr("sys.argv", ["springscale", *asked])
+        done = run(*asked)
+        assert "payload_range_kg: not stated: 0 to 450 kg is taken" in done.stderr
+        ids.add(load_calibration(tmp_path / name).id)
+    assert len(ids) == 1
+    command = load_calibration(tmp_path / "a.json").provenance.command
+    assert command.startswith("springscale calibrate campaign.toml --estimator ratio_index")
+    assert command.endswith("--window-s 100")
+
+
+def test_every_line_of_several_logs_says_of_which_it_is(campaign: Path) -> None:
+    logs = [str(campaign.parent / name) for name in ("01.log", "02.log")]
+    asked = ("--signals", SIGNALS, *WINDOW)
+    together = [json.loads(line) for line in run("estimate", *logs, *asked, "--json").stdout.splitlines()]
+    alone = [
+        json.loads(line)
+        for log in logs
+        for line in run("estimate", log, *asked, "--json").stdout.splitlines()
+    ]  # fmt: skip
+    assert {record["log"] for record in together} == set(logs)
+    assert [{key: part for key, part in record.items() if key != "log"} for record in together] == alone
+    lines = run("estimate", *logs, *asked).stdout.splitlines()
+    assert [line.split(": ")[0] for line in lines] == [record["log"] for record in together]
