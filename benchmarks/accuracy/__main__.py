@@ -15,9 +15,11 @@ import click
 
 from benchmarks.accuracy import advice as on_advice
 from benchmarks.accuracy import coverage as on_coverage
+from benchmarks.accuracy import disturbances as on_disturbances
 from benchmarks.accuracy.bounds import limits, limits_table
 from benchmarks.accuracy.coverage_drives import Scope
 from benchmarks.accuracy.coverage_page import coverage_page
+from benchmarks.accuracy.disturbances_page import disturbances_page
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection import SplitRun
@@ -97,6 +99,18 @@ def coverage(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
     with counted("calibrating and driving vans") as on_van:
         found = on_coverage.coverage(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("coverage", found, coverage_page(found), output)
+
+
+@studies.command("disturbances")
+@click.option("--vans", "n_vans", type=click.IntRange(min=2), default=Scope().n_vans, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=on_disturbances.SEED, show_default=True)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that drive")
+@_output
+def disturbances(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
+    """What jitter, losses, lags and sensors that moved do to calibrated vans; ~40 s a van."""
+    with counted("calibrating, driving and disturbing vans") as on_van:
+        found = on_disturbances.disturbances(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
+    _hand_out("disturbances", found, disturbances_page(found), output)
 
 
 @studies.command("bounds")
