@@ -16,7 +16,7 @@ from gateway.core.cross_spectrum.friction import LEAST_LEFT, LEVELS, MOST, at_le
 from gateway.core.cross_spectrum.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.measured import log_amplitude_of
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, is_positive
-from gateway.records import F64, Batch
+from gateway.records import F64, Batch, Why
 
 ROADS_MPS2 = (0.4, 0.8, 1.4)
 MOVED_MPS2 = 0.8  # where friction makes up these shares of a rate
@@ -128,4 +128,5 @@ def test_a_load_reads_the_same_on_smooth_and_on_rough_roads(
     blind = calibration.parameters.copy()
     blind[[i for i, name in enumerate(PARAMETERS) if "_friction_" in name]] = 0.0
     without = weighed(batch, replace(calibration, parameters=blind))
-    assert abs(without.payload.number - 300.0) > 2.0 * abs(found.payload.number - 300.0)
+    is_refused = without.rejected == (Why.MODEL_MISFIT,)  # dampers that no drift explains
+    assert is_refused or abs(without.payload.number - 300.0) > 2.0 * abs(found.payload.number - 300.0)

@@ -136,6 +136,11 @@ def test_channels_mapped_to_each_others_place_are_named(folder: Path) -> None:
     text = (
         text.replace("AccelValid", "@valid", 1).replace("GyroValid", "AccelValid", 1).replace("@valid", "GyroValid", 1)
     )
+    text = (
+        text.replace("AccelCounter", "@counter", 1)
+        .replace("GyroCounter", "AccelCounter", 1)
+        .replace("@counter", "GyroCounter", 1)
+    )
     text = text.replace("@acceleration", 'message = "IMU_GYRO"\nsignal = "PitchRate"\nunit = "m/s^2"')
     text = text.replace("@pitch", 'message = "IMU_ACCEL"\nsignal = "AccelZ"\nunit = "deg/s"')
     (folder / "channels-signals.toml").write_text(text, encoding="utf-8")
