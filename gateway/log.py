@@ -37,6 +37,8 @@ class Event(StrEnum):
     RELOAD_REFUSED = "reload refused"
     NOT_RESTORED = "stored estimates cannot be shown yet"
     CALIBRATION_CHANGED = "calibration changed"
+    CALIBRATION_NOT_KEPT = "copy of the calibration cannot be kept"
+    SETUP_REFUSED = "signal map or calibration cannot be used"
     PIPELINE_DIED = "pipeline died"
     PIPELINE_LATE = "pipeline did not finish in time"
     BUS_RECEIVING = "bus receiving"

@@ -11,7 +11,7 @@ from gateway.cli.options import FILE
 from gateway.config import load_settings
 from gateway.log import set_up_log
 from gateway.service.gateway import Gateway
-from gateway.setup import setup_of
+from gateway.service.last_good import setup_or_last_good
 
 
 @click.command("run")
@@ -22,4 +22,5 @@ def run(config_path: Path) -> None:
     settings = load()
     faulthandler.enable()  # systemd's watchdog ends a hung process with SIGABRT: every stack goes to the journal
     set_up_log(settings.log.level, under_journald="JOURNAL_STREAM" in os.environ)
-    Gateway(settings, setup_of(settings), load=load).run()
+    setup, setup_fault = setup_or_last_good(settings)
+    Gateway(settings, setup, load=load, setup_fault=setup_fault).run()

@@ -16,6 +16,7 @@ from gateway.config import Settings
 from gateway.errors import SpringscaleError, StoreError
 from gateway.log import Event, log_event
 from gateway.service.changes import BatchLog, StateLog
+from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
 from gateway.service.parts import source_of, store_of, uplink_of
 from gateway.service.pipeline import Pipeline
@@ -65,9 +66,11 @@ class Gateway:
         on_started: OnStarted = lambda gateway: None,
         known_loads: KnownLoads | None = None,
         open_receiver: OpenReceiver | None = None,
+        setup_fault: str | None = None,
     ) -> None:
         """``load`` reads the settings anew for a reload; without it a reload finds them unchanged.
 
+        ``setup_fault`` says why the setup is not the one that the settings name (last_good).
         ``open_receiver`` stands in for the interface (the soak run).
         """
         self._settings = settings
@@ -78,6 +81,11 @@ class Gateway:
         self.store = store_of(settings.store, forwarding)
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
+        if setup.calibration is not None and setup_fault is None:
+            keep_copy(settings, setup.calibration)
+        if setup_fault is not None:
+            log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=setup_fault)
+            self.store.write_event("setup_fault", {"fault": setup_fault})
         self.board = Board(stale_after_s=settings.web.stale_after_s)
         self._restore_board(setup.calibration.id if setup.calibration else None)
         self.source = source_of(settings.bus, setup, open_receiver)
@@ -93,7 +101,7 @@ class Gateway:
             self.store,
             self.board,
             self.uplink,
-            warnings=lambda: tuple(fault for fault in (token_file.fault, self.tare.fault) if fault),
+            warnings=lambda: tuple(fault for fault in (token_file.fault, self.tare.fault, self._reload.fault) if fault),
         )
         self.tare = TareDesk(
             settings.store.directory,
@@ -113,7 +121,7 @@ class Gateway:
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = _Server(web)
-        self._reload = Reloader(settings, load or (lambda: settings), web)
+        self._reload = Reloader(settings, load or (lambda: settings), web, setup, setup_fault)
         self._notifier = Notifier()
         self._stopping = asyncio.Event()
         self._failure: str | None = None

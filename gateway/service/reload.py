@@ -1,8 +1,8 @@
 """What SIGHUP changes in a running service: the log's level and the web's certificate. The rest wants a restart.
 
 A calibration or a signal map in the middle of a batch would make numbers that no offline run could repeat, so they
-begin with a restart, which takes about two seconds and loses the open window only. Access tokens need neither: the
-service follows their file.
+begin with a restart, which takes about two seconds and loses the open window only; a reload checks them and says what
+the restart will find. Access tokens need neither: the service follows their file.
 """
 
 import logging
@@ -14,6 +14,7 @@ import uvicorn
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event, set_log_level
+from gateway.setup import Setup, setup_of
 from gateway.web import Tls, renew_certificate
 
 LIVE: Final = frozenset({"log.level", "web.tls_certificate", "web.tls_key"})
@@ -24,13 +25,26 @@ LoadSettings = Callable[[], Settings]
 class Reloader:
     """Reads the settings anew and applies what can change live; what it cannot use changes nothing."""
 
-    def __init__(self, running: Settings, load: LoadSettings, web: uvicorn.Config) -> None:
+    def __init__(
+        self,
+        running: Settings,
+        load: LoadSettings,
+        web: uvicorn.Config,
+        setup: Setup | None = None,
+        fault: str | None = None,
+    ) -> None:
+        """``setup`` is the one at work: files that changed at the same path are held against it.
+
+        ``fault`` is what is wrong with them from the start on; later reloads renew it, the status shows it.
+        """
         self._running = running
         self._load = load
         self._web = web
+        self._setup = setup
+        self.fault = fault
 
     def __call__(self) -> bool:
-        """True where the settings as they are now were good; the log tells what changed and what waits."""
+        """True where settings and files as they are now were good; the log tells what changed and what waits."""
         try:
             wanted = self._load()
             tls = tls_of(wanted)
@@ -40,10 +54,26 @@ class Reloader:
             log_event(Event.RELOAD_REFUSED, level=logging.ERROR, fault=str(fault))
             return False
         waiting = [key for key in changed_keys(self._running, wanted) if not self._is_live(key, tls)]
+        waiting = sorted({*waiting, *self._changed_files(wanted)})
         level = logging.WARNING if waiting else logging.INFO
         log_event(Event.RELOADED, level=level, log_level=wanted.log.level, waits_for_restart=waiting)
         set_log_level(wanted.log.level)  # last: "warning" would hide that it was done
-        return True
+        return self.fault is None
+
+    def _changed_files(self, wanted: Settings) -> list[str]:
+        """Keys whose files hold something else than what is at work. Files that cannot be used are a fault."""
+        if self._setup is None:
+            return []
+        try:
+            fresh = setup_of(wanted)
+        except SpringscaleError as fault:
+            self.fault = f"{fault}; what was loaded before goes on until it is mended and the service restarted"
+            log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=str(fault))
+            return []
+        self.fault = None
+        ids = [setup.calibration.id if setup.calibration else None for setup in (self._setup, fresh)]
+        has_changed = {"calibration": ids[0] != ids[1], "signals": self._setup.signal_map != fresh.signal_map}
+        return [key for key, it_has in has_changed.items() if it_has]
 
     def _is_live(self, key: str, tls: Tls | None) -> bool:
         """Turning TLS on or off changes the listening socket: for that a certificate's path is not live."""

@@ -1,0 +1,49 @@
+"""The last good copy of the calibration, for the start at which the file that was named cannot be used any more.
+
+The copy lies in the service's own folder, one for each path that was ever named: another path never gets its numbers.
+"""
+
+import hashlib
+import logging
+from pathlib import Path
+
+from gateway.calibration.file import CalibrationFile
+from gateway.config import Settings
+from gateway.errors import CalibrationFileError
+from gateway.files.kept import KeptFiles
+from gateway.log import Event, log_event
+from gateway.setup import Setup, setup_of
+
+
+def setup_or_last_good(settings: Settings) -> tuple[Setup, str | None]:
+    """The setup, and what is wrong with the calibration file where its last good copy stands in for it.
+
+    Raises as ``setup_of``; for a broken calibration file where there is no good copy of it.
+    """
+    try:
+        return setup_of(settings), None
+    except CalibrationFileError as broken:
+        if settings.calibration is None:
+            raise
+        fault, copy = broken, settings.store.directory / _name_of(settings.calibration)
+    try:
+        setup = setup_of(settings.model_copy(update={"calibration": copy}))
+    except CalibrationFileError:
+        raise fault from None
+    return setup, f"{fault}; weighing goes on with the last good copy of it: restore the file, then restart"
+
+
+def keep_copy(settings: Settings, calibration: CalibrationFile) -> None:
+    """Keep it for later starts; a disk that refuses is told and keeps nobody from weighing."""
+    if settings.calibration is None:
+        return
+    files, name, text = KeptFiles(settings.store.directory), _name_of(settings.calibration), calibration.to_json()
+    try:
+        if files.stamp(name) is None or files.read(name) != text.encode():
+            files.write(name, text.encode())
+    except OSError as fault:
+        log_event(Event.CALIBRATION_NOT_KEPT, level=logging.WARNING, fault=str(fault))
+
+
+def _name_of(path: Path) -> str:
+    return f"calibration-{hashlib.sha256(str(path).encode('utf-8', 'surrogateescape')).hexdigest()[:16]}.json"
