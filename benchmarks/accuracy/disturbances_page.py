@@ -5,12 +5,14 @@ from typing import Any, Final
 
 from benchmarks.accuracy.coverage_table import ALL_KINDS
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
+from gateway.records import Why
 
 COLUMNS: Final = (
     "Disturbance", "Batches", "Refused, and why", "Payload, mean abs. error %", "Share, mean abs. error %",
     "Payload held or refused", "Share held or refused",
 )  # fmt: skip
 WELL: Final = 0.9  # of the batches: held by their 95 % intervals, or refused for a right reason
+OF_ANY_DRIVE: Final = (Why.TOO_SLOW, Why.SPEED_SPREAD, Why.SPEED_MISSING, Why.NOT_ENOUGH_EXCITATION)
 MENDED_WITHIN: Final = 1.25  # of the undisturbed error
 
 
@@ -29,7 +31,7 @@ def disturbances_page(found: Mapping[str, Any]) -> str:
             "motorway). The same two drives are disturbed in every way below; in the last line half as much again "
             "is aboard as the van may carry. Errors are percent of the rated payload and of 20 percentage points, over "
             "the batches that were answered. The last two columns count batches whose 95 % interval held, and "
-            "those refused.",
+            "those refused for a reason that is right.",
             "",
             "| " + " | ".join(COLUMNS) + " |",
             "|" + "---|" * len(COLUMNS),
@@ -42,10 +44,12 @@ def disturbances_page(found: Mapping[str, Any]) -> str:
 
 
 def held_or_refused(line: Mapping[str, Any], quantity: str) -> float:
-    """The share (0..1) of a line's batches that did not mislead."""
+    """The share (0..1) of a line's batches that did not mislead: held, or refused for a right reason."""
     coverage, answered = line[f"{quantity}_coverage"], line["n_batches"] - line["n_rejected"]
     held = coverage["share"] * answered if coverage else 0.0
-    return float((held + line["n_rejected"]) / line["n_batches"])
+    right = {str(why) for why in (*DISTURBANCES[line["kind"]].reasons, *OF_ANY_DRIVE)}
+    wrong = sum(n for why, n in line["rejected_by_reason"].items() if why not in right)
+    return float((held + line["n_rejected"] - wrong) / line["n_batches"])
 
 
 def is_mended(line: Mapping[str, Any], undisturbed: Mapping[str, Any]) -> bool:

@@ -235,7 +235,7 @@ def _judged(
         "delay_s": spectra.delay_mean_s,
         "delay_std_s": spectra.delay_std_s,
     }
-    why = _disbelieved(located, payload_std_kg, calibration)
+    why = _disbelieved(located, payload_std_kg, reach, calibration)
     if why is not None:
         return replace(blank, rejected=(why,), diagnostics=diagnostics)
     return replace(
@@ -247,13 +247,16 @@ def _judged(
     )
 
 
-def _disbelieved(located: Located, payload_std_kg: float, calibration: CrossSpectrumCalibration) -> Why | None:
+def _disbelieved(
+    located: Located, payload_std_kg: float, reach: float, calibration: CrossSpectrumCalibration
+) -> Why | None:
+    """Beyond the known loads the half-car itself errs: what looks like another sensor there is no proof of one."""
     if located.is_reversed:
         return Why.WRONG_SIGN
     if not located.misfit <= calibration.misfit_limit:
         return Why.MODEL_MISFIT
     if located.scores.is_changed(calibration):
-        return Why.SENSOR_CHANGED
+        return Why.SENSOR_CHANGED if reach == 0.0 else Why.MODEL_MISFIT
     if located.tension > MOST_TENSION:
         return Why.MODEL_MISFIT
     if not payload_std_kg <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:
