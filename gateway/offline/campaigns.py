@@ -63,8 +63,8 @@ def _split_run(
     motion = rows_within(whole, Stretch(run.start_s, run.end_s))
     parts = []
     stretches = _parts(motion, run, campaign.identification_fraction)
-    for stretch in stretches:
-        rows = rows_within(motion, stretch) if stretch and len(motion) else motion.part(0, 0)
+    both = [rows_within(motion, stretch) if stretch and len(motion) else motion.part(0, 0) for stretch in stretches]
+    for rows in both:
         batches = batches_of_motion(rows, signal_map, settings)
         parts.append(KnownRun(number, str(run.log), run.payload_kg, campaign.front_share_pct(run), batches))
     log_facts = LogFacts(
@@ -75,7 +75,7 @@ def _split_run(
         damage=_damage(report),
         silent=_silent(log, motion, signal_map),
     )
-    facts = row_facts(motion, signal_map.traits)
+    facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
     return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)
 
 

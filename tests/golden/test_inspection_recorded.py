@@ -8,14 +8,17 @@ from pathlib import Path
 import pytest
 from support.recordings import recordings
 
-from gateway.bus.signals import load_signal_map
+from gateway.bus.logs import LogReport
+from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection import Inspection, SplitRun, row_facts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
+from gateway.offline import campaigns as offline_campaigns
 from gateway.offline import inspect
 from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
+from gateway.records import Motion, Signal
 
 SETTINGS = BatchSettings()
 
@@ -24,6 +27,20 @@ def findings(campaign: str) -> dict[int, list[str]]:
     found: Inspection = inspect(load_campaign(recordings() / campaign), SETTINGS)
     assert found.refusal is None
     return {one.number: [f"{finding.severity}:{finding.kind}" for finding in one.findings] for one in found.verdicts}
+
+
+def test_what_the_validation_part_holds_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+    def spoiled_at_the_end(path: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]:
+        motion, report = read_whole_log(path, signal_map)
+        columns = motion.columns.copy()
+        late = motion.t_ns > motion.t_ns[0] + 0.67 * (motion.t_ns[-1] - motion.t_ns[0])
+        columns[late, motion.signals.index(Signal.VERTICAL_ACCELERATION)] *= 3.0
+        return Motion(motion.signals, motion.t_ns, columns), report
+
+    monkeypatch.setattr(offline_campaigns, "read_whole_log", spoiled_at_the_end)
+    campaign = load_campaign(recordings() / "known_loads/campaign.toml")
+    (verdict,) = inspect(campaign, SETTINGS, numbers=[1]).verdicts
+    assert verdict.findings == ()
 
 
 @pytest.mark.parametrize("trip", ["a", "b"])

@@ -174,6 +174,24 @@ def _mostly_masked(batch: Batch) -> Batch:
     return replace(batch, usable=np.arange(len(batch.usable)) < 500)
 
 
+def _with_lost_frames(batch: Batch) -> Batch:
+    """Three frames in ten, one after the other here and there."""
+    usable = np.arange(len(batch.usable)) % 200 < 140
+    return replace(batch, usable=usable, shares={Why.TOO_SLOW: 0.0, Why.GAP: 0.3})
+
+
+def _slow_now_and_then(batch: Batch) -> Batch:
+    return replace(_with_lost_frames(batch), shares={Why.TOO_SLOW: 0.28, Why.GAP: 0.02})
+
+
+def _without_pitch_rate(batch: Batch) -> Batch:
+    return replace(batch, pitch_rate_radps=np.full(len(batch.pitch_rate_radps), np.nan))
+
+
+def _without_acceleration(batch: Batch) -> Batch:
+    return replace(batch, vertical_acceleration_mps2=np.full(len(batch.usable), np.nan))
+
+
 def _unrelated(batch: Batch) -> Batch:
     noise = np.random.default_rng(1).standard_normal(len(batch.pitch_rate_radps))
     return replace(batch, pitch_rate_radps=batch.pitch_rate_radps.std() * noise)
@@ -198,6 +216,10 @@ def _gyro_on_another_axis(batch: Batch) -> Batch:
         (_silent, Why.NOT_ENOUGH_EXCITATION),
         (_never_steady, Why.SPEED_SPREAD),
         (_mostly_masked, Why.TOO_SHORT),
+        (_with_lost_frames, Why.GAP),
+        (_slow_now_and_then, Why.TOO_SLOW),
+        (_without_pitch_rate, Why.PITCH_RATE_MISSING),
+        (_without_acceleration, Why.ACCELERATION_MISSING),
         (_unrelated, Why.SENSOR_DISAGREEMENT),
         (_reversed, Why.WRONG_SIGN),
         (_rejected, Why.GAP),

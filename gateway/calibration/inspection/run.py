@@ -154,8 +154,7 @@ def _is_standing(drive: SplitRun, settings: BatchSettings) -> bool:
 
 def _is_too_short(drive: SplitRun, settings: BatchSettings) -> bool:
     """True where not even the longest stretch of the drive, or of the part that identifies, makes one batch."""
-    part = drive.identification.batches if drive.has_identification else drive.batches
-    return all(batch.duration_s < _needed_s(settings) for batch in part)
+    return all(batch.duration_s < _needed_s(settings) for batch in drive.batches)
 
 
 def _speeds(drive: SplitRun, settings: BatchSettings) -> str:

@@ -12,7 +12,9 @@ from gateway.records import Batch
 class SplitRun:
     """One drive's two parts, either of which may hold no batch, with the facts of its rows and of its log.
 
-    has_identification is False where the campaign keeps the whole drive for validation.
+    has_identification is False where the campaign keeps the whole drive for validation. Only what identifies can spoil
+    a calibration, so facts, batches and run are of that part alone, and of validation only where there is no other:
+    judging a calibration shall not change it.
     """
 
     identification: KnownRun
@@ -23,11 +25,10 @@ class SplitRun:
 
     @property
     def batches(self) -> tuple[Batch, ...]:
-        """Of both parts."""
-        return self.identification.batches + self.validation.batches
+        """Those to inspect."""
+        return (self.identification if self.has_identification else self.validation).batches
 
     @property
     def run(self) -> KnownRun:
-        """The run with the batches of both parts."""
-        one = self.identification
-        return KnownRun(one.number, one.name, one.payload_kg, one.front_share_pct, self.batches)
+        """The part to inspect."""
+        return self.identification if self.has_identification else self.validation

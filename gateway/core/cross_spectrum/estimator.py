@@ -26,7 +26,7 @@ from gateway.core.cross_spectrum.drift import (
     tension_of,
 )
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
-from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
+from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
 from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found, most_probable
@@ -168,8 +168,7 @@ def _load_covariance(found: Found, moves: F64, calibration: CrossSpectrumCalibra
 def _unfit(batch: Batch, spectra: CrossSpectra | None, calibration: CrossSpectrumCalibration) -> Why | None:
     """Why there is no point in fitting, if so."""
     if spectra is None:
-        needed_n = 4 * calibration.n_segment
-        return Why.SPEED_SPREAD if np.count_nonzero(batch.usable) > needed_n else Why.TOO_SHORT
+        return why_no_spectra(batch, calibration.reading)
     if (
         spectra.acceleration_rms_mps2 < LEAST_POWER_SHARE * calibration.acceleration_rms_mps2
         or spectra.pitch_rate_rms_radps < LEAST_POWER_SHARE * calibration.pitch_rate_rms_radps

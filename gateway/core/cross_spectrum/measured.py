@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
-from gateway.records import C128, F64, I64, Batch
+from gateway.records import C128, F64, I64, Batch, Bool, Why
 
 SPEED_BIN = 0.03  # width of a group of segments in the logarithm of speed
 AMPLITUDE_BIN = 0.5  # and in the logarithm of how much it moves: friction and noise count for more where that is little
@@ -125,6 +125,26 @@ def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra
         np.concatenate([p.delays_s for p in parts]),
     )
     return _grouped(joined, freq_hz, reading)
+
+
+def why_no_spectra(batch: Batch, reading: Reading) -> Why:
+    """What a batch lacks of which :func:`cross_spectra_of` makes nothing: time, unbroken stretches, a sensor, or rest.
+
+    Stretches are broken by whatever masked most of the batch.
+    """
+
+    def is_enough(mask: Bool) -> bool:
+        return len(segment_starts(mask, reading.n_segment, reading.n_segment // 2)) >= LEAST_SEGMENTS
+
+    if np.count_nonzero(batch.usable) <= 4 * reading.n_segment:
+        return Why.TOO_SHORT
+    if not is_enough(batch.usable):
+        return max(batch.shares, key=lambda why: batch.shares[why], default=Why.GAP)
+    if not is_enough(batch.usable & np.isfinite(batch.vertical_acceleration_mps2)):
+        return Why.ACCELERATION_MISSING
+    if not is_enough(batch.usable & np.isfinite(batch.pitch_rate_radps)):
+        return Why.PITCH_RATE_MISSING
+    return Why.SPEED_SPREAD
 
 
 def log_amplitude_of(acceleration: F64, pitch_rate: F64) -> F64:
