@@ -12,7 +12,7 @@ from support.web import Gateway, serving
 
 from gateway.records import Why
 from gateway.status import State
-from gateway.web import TokenFile
+from gateway.web import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect
@@ -65,6 +65,7 @@ NUMBERS_COLOUR = "getComputedStyle(document.getElementById('payload')).color"
 
 def test_a_locked_page_claims_nothing(tmp_path: Path, watched: Watched) -> None:
     tokens = TokenFile(tmp_path / "tokens.json")
+    tokens.create("somebody else", Scope.READ)
     with Gateway(tmp_path / "store", tokens=tokens) as gateway, serving(gateway.app) as server:
         gateway.publish(make_estimate(0))
         watched.page.goto(server.url)
