@@ -25,7 +25,7 @@ from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection import SplitRun
 from gateway.calibration.judgement import learning_curve as on_learning
 from gateway.cli.options import FILE, batch_settings, window
-from gateway.cli.progress import counted
+from gateway.cli.text.progress import counted
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.vehicle import Vehicle

@@ -15,9 +15,9 @@ from gateway.calibration.judgement import LearningCurve, curve_of
 from gateway.calibration.plan import LoadPlan, plan_first, plan_next
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
-from gateway.cli.progress import counted, on_share
 from gateway.cli.text.inspection import inspection_json, inspection_sentences
 from gateway.cli.text.plan import plan_sentences
+from gateway.cli.text.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle

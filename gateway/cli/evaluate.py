@@ -8,7 +8,7 @@ from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.judgement import Errors, ErrorTable, Judged, Part, TargetErrors, assess_evaluation, error_table
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
-from gateway.cli.progress import counted
+from gateway.cli.text.progress import counted
 from gateway.errors import ConfigurationError
 from gateway.offline import judge_campaign
 from gateway.offline.campaigns import Split
