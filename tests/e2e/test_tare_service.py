@@ -125,10 +125,14 @@ def counted(texts: list[str]) -> list[str]:
 
 
 def estimated(config: Path, *logs: Path, options: tuple[str, ...] = ()) -> list[str]:
-    arguments = ["estimate", *map(str, logs), "--config", str(config), "--json", *options]
-    found = CliRunner().invoke(springscale, arguments, catch_exceptions=False)
-    assert found.exit_code == 0, found.output
-    return found.stdout.splitlines()
+    """Each log by itself: of several at once, every line would also say of which it is."""
+    lines: list[str] = []
+    for log in logs:
+        arguments = ["estimate", str(log), "--config", str(config), "--json", *options]
+        found = CliRunner().invoke(springscale, arguments, catch_exceptions=False)
+        assert found.exit_code == 0, found.output
+        lines += found.stdout.splitlines()
+    return lines
 
 
 @pytest.fixture

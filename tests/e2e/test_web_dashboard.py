@@ -220,6 +220,7 @@ def test_it_stays_readable_without_the_service_and_comes_back_with_it(gateway: G
 
 def test_it_asks_for_a_token_where_one_is_needed(tmp_path: Path, watched: Watched) -> None:
     tokens = TokenFile(tmp_path / "tokens.json")
+    tokens.create("somebody else", Scope.READ)
     with Gateway(tmp_path / "store", tokens=tokens) as gateway, serving(gateway.app) as server:
         gateway.publish(make_estimate(0))
         page = watched.page

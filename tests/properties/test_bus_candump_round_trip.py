@@ -6,7 +6,7 @@ from pathlib import Path
 
 import can
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from gateway.bus.frames import join
@@ -99,6 +99,7 @@ LINES = st.one_of(
 def test_the_fast_path_reads_what_the_exact_path_reads(lines, block_bytes, has_final_newline):
     """Any mixture of sound and dirty lines: whatever shapes were learned, each line is read as if alone."""
     text = b"\n".join(lines) + (b"\n" if has_final_newline else b"")
+    assume(not text.startswith(b"\x1f\x8b"))  # what begins so is read as gzip
     filters = (exact_filter(0x120), exact_filter(0x18FEF100 | EXTENDED_ID))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.log"

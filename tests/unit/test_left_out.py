@@ -14,13 +14,14 @@ from gateway.calibration.ratio_index import fit_regression, index_rows
 from gateway.core.settings import BatchSettings
 from gateway.offline import calibrate
 
-LOADS = ((0.0, None), (150.0, 0.5), (200.0, 2.6), (300.0, 1.4), (400.0, 0.7), (400.0, 2.4))
+FEW = ((0.0, None), (150.0, 0.5), (200.0, 2.6))
+LOADS = ((0.0, None), (0.0, None), (400.0, 0.5), (400.0, 0.5), (400.0, 2.4), (400.0, 2.4))  # none beyond the others
 
 
 @pytest.fixture(scope="module")
 def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
-    campaign = load_campaign(write_known_loads(tmp_path_factory.mktemp("left_out"), LOADS, duration_s=150.0))
-    return calibrate(campaign, BatchSettings(window_s=100.0), estimators=("ratio_index",))
+    campaign = load_campaign(write_known_loads(tmp_path_factory.mktemp("left_out"), LOADS, duration_s=450.0))
+    return calibrate(campaign, BatchSettings(), estimators=("ratio_index",))
 
 
 def errors_kg(outcome: Outcome) -> np.ndarray:
@@ -44,7 +45,7 @@ def test_every_run_is_judged_once_a_batch_with_an_interval_about_its_answer(outc
 
 def test_where_no_choice_can_be_made_anew_bands_and_terms_stay(tmp_path: Path) -> None:
     """Three runs: the error of each is that of the same regression fitted to the other two."""
-    campaign = load_campaign(write_known_loads(tmp_path, LOADS[:3], duration_s=150.0))
+    campaign = load_campaign(write_known_loads(tmp_path, FEW, duration_s=150.0))
     few = calibrate(campaign, BatchSettings(window_s=100.0), estimators=("ratio_index",))
     fit = few.ratio_index
     assert fit is not None
