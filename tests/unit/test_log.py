@@ -50,8 +50,8 @@ def test_the_level_holds_for_every_event_of_ours(
 @pytest.mark.usefixtures("restored")
 def test_others_come_through_from_warning_on_whatever_our_level(capsys: pytest.CaptureFixture[str]) -> None:
     set_up_log("error", under_journald=False)
-    logging.getLogger("some.library").info("chatter")
-    logging.getLogger("some.library").warning("careful")
+    logging.getLogger("some.package").info("chatter")
+    logging.getLogger("some.package").warning("careful")
     assert [json.loads(line)["event"] for line in capsys.readouterr().err.splitlines()] == ["careful"]
 
 
@@ -87,7 +87,7 @@ def test_an_event_that_comes_too_often_is_left_out_and_counted() -> None:
 
 def test_the_gate_is_for_our_events_alone() -> None:
     gate = FloodGate(most=1)
-    assert all(gate.filter(record_of("careful", "some.library")) for _ in range(5))
+    assert all(gate.filter(record_of("careful", "some.package")) for _ in range(5))
 
 
 @pytest.mark.usefixtures("restored")

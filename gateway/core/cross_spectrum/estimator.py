@@ -103,7 +103,7 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
         load_covariance=_load_covariance(found, moves, calibration),
         own_covariance=found.covariance[-2:, -2:],
         drift_covariance=drift_covariance(found.covariance, moves)[-2:, -2:],
-        gain_moves=gain_moves(whittle, point, found.covariance)[-2:],
+        gain_moves=gain_moves(whole, whittle, point, found.covariance)[-2:],
         misfit=misfit,
         tension=tension_of(found.x[:-2] - calibration.parameters[DRIFTING]),
         scores=scores_of(whole, point, found.covariance, calibration),

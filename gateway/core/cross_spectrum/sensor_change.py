@@ -61,11 +61,11 @@ def scores_of(whole: Curvature, point: Point, covariance: F64, calibration: Cros
     return SensorScores(score("sensor_position_m"), score("noise_acceleration_m2ps3"))
 
 
-def gain_moves(whittle: Whittle, point: Point, covariance: F64) -> F64:
+def gain_moves(whole: Curvature, whittle: Whittle, point: Point, covariance: F64) -> F64:
     """(k,) by how much drifting parameters and load move for each unit of the logarithm of the accelerometer's gain."""
     stronger = Whittle(whittle.spectra.with_acceleration_times(1.0 + STEP), whittle.ground)
-    here, there = (one.curvature(point, DRIFTING, is_load_free=True).gradient for one in (whittle, stronger))
-    moves: F64 = -covariance @ (there - here) / np.log1p(STEP)
+    there = stronger.curvature(point, DRIFTING, is_load_free=True).gradient
+    moves: F64 = -covariance @ (there - whole.gradient[FITTED]) / np.log1p(STEP)
     return moves
 
 
