@@ -12,10 +12,10 @@ from support.half_car_road import CAR, VAN, batch_over_road, weighed
 from gateway.calibration.half_car import calibrate_cross_spectrum, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.friction import LEAST_LEFT, LEVELS, MOST, at_levels, level_weights
-from gateway.core.cross_spectrum.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.measured import log_amplitude_of
-from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, is_positive
+from gateway.core.cross_spectrum.model.friction import LEAST_LEFT, LEVELS, MOST, at_levels, level_weights
+from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, is_positive
 from gateway.records import F64, Batch, Why
 
 ROADS_MPS2 = (0.4, 0.8, 1.4)

@@ -10,7 +10,7 @@ from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFTING, MOST_TENSION, tension_of
-from gateway.core.cross_spectrum.parameters import INDEX
+from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.estimate import Estimate
 from gateway.records import Batch, Why
 

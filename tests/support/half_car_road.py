@@ -4,7 +4,7 @@ import numpy as np
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.half_car import Axle, HalfCar, frequency_response
+from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar, frequency_response
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate

@@ -2,7 +2,7 @@
 
 from gateway.calibration.inspection import LogFacts, SplitRun
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.half_car import HalfCar
+from gateway.core.cross_spectrum.model.half_car import HalfCar
 from gateway.core.vehicle import front_share_pct
 from support.half_car_road import CAR, VAN, batch_over_road
 

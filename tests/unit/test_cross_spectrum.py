@@ -16,7 +16,7 @@ from gateway.core.cross_spectrum.estimator import (
     UNSEEN_SPEED_SCALE,
 )
 from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json

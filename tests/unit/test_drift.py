@@ -12,7 +12,7 @@ from gateway.core.cross_spectrum.drift import (
     STEADY,
     drift_covariance,
 )
-from gateway.core.cross_spectrum.parameters import PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.records import F64
 
 N_FITTED = len(DRIFTING) + 2  # and the load's two

@@ -10,7 +10,7 @@ from support.half_car_road import CAR
 from support.textbook import half_car as textbook_half_car
 from support.textbook import linearised
 
-from gateway.core.cross_spectrum.half_car import Axle, HalfCar, frequency_response
+from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar, frequency_response
 from gateway.sim.vans import PAPER_VAN, SMALL_VAN
 from gateway.sim.vehicle import Axle as SimulatedAxle
 from gateway.sim.vehicle import Load, Vehicle, front_share_pct

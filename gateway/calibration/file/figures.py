@@ -7,7 +7,7 @@ import numpy as np
 
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.file.parts import CrossSpectrumPart, RegressionPart
-from gateway.core.cross_spectrum.parameters import is_positive
+from gateway.core.cross_spectrum.model.parameters import is_positive
 
 
 @dataclass(frozen=True, slots=True)

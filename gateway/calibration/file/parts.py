@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
-from gateway.core.cross_spectrum.parameters import PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import TERMS, RegressionModel
 from gateway.core.vehicle import Load

@@ -25,7 +25,7 @@ from gateway.core.cross_spectrum.drift import MOST_TENSION
 from gateway.core.cross_spectrum.estimator import locate
 from gateway.core.cross_spectrum.likelihood import Curvature
 from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.cross_spectrum.parameters import PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.vehicle import Vehicle

@@ -9,7 +9,7 @@ import numpy as np
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
-from gateway.core.cross_spectrum.parameters import Ground
+from gateway.core.cross_spectrum.model.parameters import Ground
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectrum.parameters import BEND_SHARES, INDEX, PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import BEND_SHARES, INDEX, PARAMETERS
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 

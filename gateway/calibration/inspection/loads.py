@@ -20,7 +20,7 @@ from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import locate
 from gateway.core.cross_spectrum.likelihood import Point
-from gateway.core.cross_spectrum.parameters import PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found
 from gateway.core.vehicle import Load, Vehicle

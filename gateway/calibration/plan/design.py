@@ -23,7 +23,7 @@ from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import Reading
-from gateway.core.cross_spectrum.parameters import PARAMETERS, Ground
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, Ground
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.core.cross_spectrum.measured import Reading
-from gateway.core.cross_spectrum.parameters import Ground
+from gateway.core.cross_spectrum.model.parameters import Ground
 from gateway.core.vehicle import Load
 from gateway.records import F64
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model
 from gateway.core.cross_spectrum.measured import CrossSpectra
-from gateway.core.cross_spectrum.parameters import INDEX
+from gateway.core.cross_spectrum.model.expected import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.records import F64, Bool, Spectra
 
 

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from scipy.stats import chi2
 
-from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
 
 DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(

@@ -27,7 +27,7 @@ from gateway.core.cross_spectrum.drift import (
 )
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
-from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import (

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
-from gateway.core.cross_spectrum.parameters import Ground
+from gateway.core.cross_spectrum.model.expected import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.model.parameters import Ground
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import F64
 

@@ -17,9 +17,9 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectrum.expected import expected_spectra, spectral_model, spectral_slopes
 from gateway.core.cross_spectrum.measured import CrossSpectra
-from gateway.core.cross_spectrum.parameters import Ground
+from gateway.core.cross_spectrum.model.expected import expected_spectra, spectral_model, spectral_slopes
+from gateway.core.cross_spectrum.model.parameters import Ground
 from gateway.core.vehicle import Load
 from gateway.records import C128, F64
 

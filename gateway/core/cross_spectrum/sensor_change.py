@@ -18,7 +18,7 @@ import numpy as np
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
-from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
 
 FITTED: Final = [*DRIFTING, len(PARAMETERS), len(PARAMETERS) + 1]  # of all parameters, then payload and front share

@@ -8,7 +8,7 @@ import numpy as np
 
 from gateway.calibration.half_car import prior_of
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.parameters import INDEX, PARAMETERS, is_positive
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, is_positive
 from gateway.core.vehicle import Vehicle
 from gateway.reports.charts import Axis, Chart, Panel, Points, Rule, Table
 

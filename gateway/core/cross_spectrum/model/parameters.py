@@ -4,7 +4,7 @@ Springs, dampers, masses and the like enter as logarithms, so that they stay pos
 standard deviation is a share; the rest enters as it is. The vector also holds the slack: the share
 of each sensor's power, as a function of frequency, that does not come through the modelled path; the
 sensors' own noise as spectral densities; and which share of each spring's and damper's rate is friction
-(core.cross_spectrum.friction).
+(core.cross_spectrum.model.friction).
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectrum.half_car import Axle, HalfCar
+from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 from gateway.units import STANDARD_GRAVITY_MPS2

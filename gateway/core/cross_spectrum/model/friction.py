@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectrum.parameters import INDEX
+from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.records import F64
 
 LEVELS: Final = (-0.8, 0.0, 0.8)  # logarithms of amplitude over the usual one at which a vehicle is solved

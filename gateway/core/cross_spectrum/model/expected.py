@@ -15,10 +15,10 @@ from typing import Final
 import numpy as np
 from scipy.special import k0, k1
 
-from gateway.core.cross_spectrum.friction import at_levels, level_weights
-from gateway.core.cross_spectrum.half_car import frequency_response
 from gateway.core.cross_spectrum.measured import CrossSpectra
-from gateway.core.cross_spectrum.parameters import (
+from gateway.core.cross_spectrum.model.friction import at_levels, level_weights
+from gateway.core.cross_spectrum.model.half_car import frequency_response
+from gateway.core.cross_spectrum.model.parameters import (
     HALF_CAR_PARAMETERS,
     INDEX,
     SLACK_ACCELERATION,
