@@ -1,4 +1,4 @@
-"""Writes docs/estimate.md from gateway/estimate_json.py; with --check only tells whether it is up to date."""
+"""Writes docs/estimate.md from gateway/estimate_json; with --check only tells whether it is up to date."""
 
 from pathlib import Path
 from typing import Final
@@ -14,6 +14,9 @@ UNITS: Final = (
     ("_std_pct", "pp"),
     ("tare_front_share_pct", "pp"),
     ("_pct", "%"),
+    ("_left_m", "m"),
+    ("_left_std_m", "m"),
+    ("_left_interval95_m", "m"),
     ("_mps2", "m/s²"),
     ("_mps", "m/s"),
     ("_ns", "ns"),
@@ -31,6 +34,12 @@ NULL: Final = {
     "payload": "null where rejected, or where the ratio index has no model of it",
     "front_share": "null where rejected, or where the ratio index has no model of it",
     "correlation": "null where rejected, and by the ratio index",
+    "cg_left": "null where rejected, by the ratio index, and without a roll rate",
+    "left_share": "as above",
+    "payload_cg_left_correlation": "as above",
+    "front_share_cg_left_correlation": "as above",
+    "roll_share_front": "as above",
+    "roll_share_front_std": "as above",
     "ratio_index_acceleration": "null where rejected before it was computed, and without a calibrated ratio index",
     "ratio_index_pitch_rate": "as above",
     "mean_speed_mps": "null where no speed is known",
@@ -71,7 +80,7 @@ DIAGNOSTICS: Final = {
 INTRODUCTION = """\
 # An estimate, field by field
 
-Generated from `gateway/estimate_json.py` by `python docs/make_estimate.py`; do not edit by hand.
+Generated from `gateway/estimate_json` by `python docs/make_estimate.py`; do not edit by hand.
 
 Each batch is one JSON object, the same from `springscale estimate --json`, in the store, over [HTTP](api.md) and by
 [MQTT](uplink.md). Unknown is null, never 0. Where `rejected` names [reasons](reasons.md), the numbers are null. Weights
@@ -131,7 +140,7 @@ def _diagnostics() -> str:
 
 def main() -> None:
     """Write the page, or compare it."""
-    keep_up_to_date(PAGE, estimate_page(), "gateway/estimate_json.py")
+    keep_up_to_date(PAGE, estimate_page(), "gateway/estimate_json")
 
 
 if __name__ == "__main__":

@@ -1,12 +1,12 @@
-"""What a batch taught: payload and front share with how sure they are, or why nothing.
+"""What a batch taught: payload, front share and where the load lies sideways, with how sure they are, or why nothing.
 
-Inside, a front share is in percent wherever it is a :class:`Quantity`, as everybody outside reads it.
+Inside, a share is in percent wherever it is a :class:`Quantity`, as everybody outside reads it.
 """
 
 import hashlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from gateway.records import Spectra, Why
@@ -19,8 +19,8 @@ UNKNOWN_INTERVAL: Final = (math.nan, math.nan)
 class Quantity:
     """A number, its standard deviation and its 95 % interval (low, high), all in one unit. NaN where unknown.
 
-    A payload is in kg. A front share, of the sprung mass on the front axle, is in percent, its standard
-    deviation in percentage points.
+    A payload is in kg, the lateral place of a centre of gravity in m. A share of the sprung mass, on the front axle
+    or on the left wheels, is in percent, its standard deviation in percentage points.
     """
 
     number: float = math.nan
@@ -58,7 +58,12 @@ class Correction:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What a batch taught: payload (kg) and front share (%), or why nothing. Unknown is NaN (null in JSON)."""
+    """What a batch taught: payload (kg) and front share (%), or why nothing. Unknown is NaN (null in JSON).
+
+    With a roll rate also ``cg_left``, where the sprung mass has its centre of gravity (m left of the centre line),
+    ``left_share``, its share on the left wheels (%), and ``roll_share_front``, the part of a sideways load's moment
+    that the front axle's springs and bar take (0 to 1). Correlations are of errors, -1 to 1.
+    """
 
     t_start_ns: int
     t_end_ns: int
@@ -81,12 +86,34 @@ class Estimate:
     tare: Correction | None = None
     vehicle_id: str | None = None
     vin: str | None = None
-    correlation: float = math.nan  # of the errors of payload and front share, -1 to 1
+    correlation: float = math.nan  # of payload and front share
+    cg_left: Quantity = UNKNOWN
+    left_share: Quantity = UNKNOWN
+    roll_share_front: float = math.nan
+    roll_share_front_std: float = math.nan
+    payload_cg_left_correlation: float = math.nan
+    front_share_cg_left_correlation: float = math.nan
 
     @property
     def counted(self) -> bool:
         """True where the batch gave an answer."""
         return not self.rejected
+
+    def refused(self, *whys: Why) -> "Estimate":
+        """The same batch without its answer, and why there is none."""
+        return replace(
+            self,
+            payload=UNKNOWN,
+            front_share=UNKNOWN,
+            correlation=math.nan,
+            cg_left=UNKNOWN,
+            left_share=UNKNOWN,
+            roll_share_front=math.nan,
+            roll_share_front_std=math.nan,
+            payload_cg_left_correlation=math.nan,
+            front_share_cg_left_correlation=math.nan,
+            rejected=whys,
+        )
 
     @property
     def id(self) -> str:

@@ -157,6 +157,11 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "mass)",
             "calibrate with loads nearer to this one; drive on a rougher road or for longer",
         ),
+        Why.AMBIGUOUS: Explanation(
+            Cause.ANSWER,
+            "two loads far from each other explain these spectra about equally well",
+            "drive on, on another road or at another speed; calibrate with more loads",
+        ),
         Why.MODEL_MISFIT: Explanation(
             Cause.ANSWER,
             "no payload and share explain these spectra as well as calibration leads to expect",

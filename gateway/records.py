@@ -66,6 +66,7 @@ class Why(StrEnum):
     OUT_OF_RANGE = "out_of_range"
     NOT_ENOUGH_EXCITATION = "not_enough_excitation"
     TOO_UNCERTAIN = "too_uncertain"
+    AMBIGUOUS = "ambiguous"
     MODEL_MISFIT = "model_misfit"
     SENSOR_DISAGREEMENT = "sensor_disagreement"
     SENSOR_CHANGED = "sensor_changed"

@@ -10,7 +10,7 @@ from gateway.core.cross_spectrum.estimator import MOST_PAYLOAD_STD_SHARE, by_cro
 from gateway.core.ratio_index.estimator import by_ratio_index
 from gateway.core.ratio_index.index import indexes_of
 from gateway.core.spectrum import roughness_mps2, spectra_of
-from gateway.estimate import UNKNOWN, Estimate
+from gateway.estimate import Estimate
 from gateway.records import Batch, Why
 
 
@@ -45,7 +45,7 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
         return blank
     found = ESTIMATORS[estimator](batch, calibrated, blank)
     if found.counted and calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
-        return replace(found, payload=UNKNOWN, front_share=UNKNOWN, rejected=(Why.OUT_OF_RANGE,))
+        return found.refused(Why.OUT_OF_RANGE)
     return found
 
 
@@ -65,7 +65,7 @@ def _by_ratio_index(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate
         return replace(blank, rejected=(Why.NO_CALIBRATION,))
     found = by_ratio_index(batch, calibrated.ratio_index, blank)
     if found.counted and found.payload.std > MOST_PAYLOAD_STD_SHARE * calibrated.vehicle.empty_mass_kg:
-        return replace(found, payload=UNKNOWN, front_share=UNKNOWN, rejected=(Why.TOO_UNCERTAIN,))
+        return found.refused(Why.TOO_UNCERTAIN)
     return found
 
 

@@ -36,6 +36,21 @@ estimates = st.builds(
     st.none() | st.builds(Correction, names, *[quantities] * 4),
     st.none() | names,
     st.none() | names,
+    numbers,
+    quantities,
+    quantities,
+    *[numbers] * 4,
+)
+OF_THE_LOAD = (
+    "payload",
+    "front_share",
+    "correlation",
+    "cg_left",
+    "left_share",
+    "roll_share_front",
+    "roll_share_front_std",
+    "payload_cg_left_correlation",
+    "front_share_cg_left_correlation",
 )
 
 
@@ -77,6 +92,26 @@ def test_a_line_of_csv_has_the_columns_and_no_other(estimate: Estimate) -> None:
     assert cells["rejected"] == " ".join(estimate.rejected)
     if (interval := told["payload_interval95_kg"]) is not None:
         assert [cells["payload_low95_kg"], cells["payload_high95_kg"]] == interval
+    if (interval := told["cg_left_interval95_m"]) is not None:
+        assert [cells["cg_left_low95_m"], cells["cg_left_high95_m"]] == interval
+
+
+@given(estimates)
+def test_what_was_stored_before_there_was_a_roll_rate_is_read_too(estimate: Estimate) -> None:
+    told = estimate_to_json(estimate)
+    early = {name: x for name, x in told.items() if not any(part in name for part in ("left", "roll"))}
+    assert estimate_to_json(read_back(early)) == {
+        name: None if any(part in name for part in ("left", "roll")) else x for name, x in told.items()
+    }
+
+
+@given(estimates, st.sampled_from(Why))
+def test_what_is_refused_tells_no_number_of_the_load(estimate: Estimate, why: Why) -> None:
+    told = estimate_to_json(estimate.refused(why))
+    of_the_load = [one for one in FIELDS if one.path.split(".")[0] in OF_THE_LOAD]
+    assert len(of_the_load) == 17
+    assert {told[one.name] for one in of_the_load} == {None}
+    assert told["rejected"] == [str(why)]
 
 
 def test_no_name_is_given_twice() -> None:

@@ -1,0 +1,26 @@
+"""The one JSON object of an estimate, in both directions: command line, store and HTTP all show this.
+
+``FIELDS`` is the one place that knows its names, its schema and its columns in a CSV file.
+"""
+
+from gateway.estimate_json.fields import COLUMNS, FIELDS, EstimateField, Presence
+from gateway.estimate_json.kinds import BY_NAME, INSTANT, REASONS, SPECTRA, Kind, spectra_from_json, spectra_to_json
+from gateway.estimate_json.objects import csv_cells, estimate_from_json, estimate_to_json, table_row
+
+__all__ = [
+    "BY_NAME",
+    "COLUMNS",
+    "FIELDS",
+    "INSTANT",
+    "REASONS",
+    "SPECTRA",
+    "EstimateField",
+    "Kind",
+    "Presence",
+    "csv_cells",
+    "estimate_from_json",
+    "estimate_to_json",
+    "spectra_from_json",
+    "spectra_to_json",
+    "table_row",
+]

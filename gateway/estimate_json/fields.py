@@ -1,0 +1,190 @@
+"""The names of an estimate's fields in JSON, their order, kinds, words and columns in a CSV file: one table."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from gateway.estimate_json.kinds import (
+    BY_NAME,
+    COUNT,
+    FLAG,
+    INSTANT,
+    INTERVAL,
+    NUMBER,
+    REASONS,
+    ROUGH_NUMBER,
+    SPECTRA,
+    TEXT,
+    WHOLE,
+    Kind,
+)
+
+_INTERVAL95: Final = "95 % interval [low, high]"
+
+
+class Presence(Enum):
+    """Whether a field stands in every object."""
+
+    ALWAYS = "always"
+    SINCE_LATER = "since_later"  # always now; not in what early versions stored
+    WHERE_KNOWN = "where_known"
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateField:
+    """One field: its JSON name; where in Estimate it is (attributes joined by dots); how it is described.
+
+    ``columns`` are its names in a CSV file; none: not there.
+    """
+
+    name: str
+    path: str
+    kind: Kind
+    description: str | None = None
+    example: Any = None
+    presence: Presence = Presence.ALWAYS
+    columns: tuple[str, ...] = ()
+
+
+def _field(
+    name: str, path: str, kind: Kind, description: str | None = None, example: Any = None, **more: Any
+) -> EstimateField:
+    """A field that is also a column of the CSV file, by the same name."""
+    return EstimateField(name, path, kind, description, example, **{"columns": (name,), **more})
+
+
+_LATER: Final = Presence.SINCE_LATER
+_KNOWN: Final = Presence.WHERE_KNOWN
+_ID: Final = "1795233300000000000-0f3a9c2b11de"
+_SHARE: Final = "share of the sprung mass on the front axle"
+_CG_LEFT: Final = "the sprung mass's centre of gravity, left of the centre line"
+_LEFT_SHARE: Final = "share of the sprung mass on the left wheels"
+_ROLL_SHARE: Final = "part of a sideways load's moment that the front axle takes, 0 to 1"
+_POINTS: Final = "its standard deviation, in percentage points"
+_STD: Final = "its standard deviation"
+_RAW: Final = "as the calibration alone has it"
+
+FIELDS: Final = (
+    _field("id", "id", TEXT, "the same for the same batch, whenever it is computed", _ID),
+    _field("vehicle_id", "vehicle_id", TEXT, "as the settings name it", "van-17"),
+    _field("t_start", "t_start_ns", INSTANT, "beginning of the batch, UTC", "2026-11-21T03:50:00.000000Z"),
+    _field("t_end", "t_end_ns", INSTANT, "its end, UTC", "2026-11-21T03:55:00.000000Z"),
+    _field("t_end_ns", "t_end_ns", WHOLE, "the same end, since 1970 UTC", 1795233300000000000),
+    _field("estimator", "estimator", TEXT, "who weighed: cross_spectrum or ratio_index", "ratio_index"),
+    _field("calibration_id", "calibration_id", TEXT, "hash of the calibration used", "sha256:9f86d081"),
+    _field("payload_kg", "payload.number", NUMBER, "what is aboard besides the empty vehicle", 271.3),
+    _field("payload_std_kg", "payload.std", NUMBER, _STD, 6.1),
+    _field(
+        "payload_interval95_kg",
+        "payload.interval95",
+        INTERVAL,
+        _INTERVAL95,
+        [259.3, 283.3],
+        columns=("payload_low95_kg", "payload_high95_kg"),
+    ),
+    _field("front_share_pct", "front_share.number", NUMBER, _SHARE, 50.4),
+    _field("front_share_std_pct", "front_share.std", NUMBER, _POINTS, 0.1),
+    _field(
+        "front_share_interval95_pct",
+        "front_share.interval95",
+        INTERVAL,
+        _INTERVAL95,
+        [50.2, 50.6],
+        columns=("front_share_low95_pct", "front_share_high95_pct"),
+    ),
+    EstimateField("payload_front_share_correlation", "correlation", NUMBER, "of both errors, -1 to 1", 0.62, _LATER),
+    _field("cg_left_m", "cg_left.number", NUMBER, _CG_LEFT, 0.021, presence=_LATER),
+    _field("cg_left_std_m", "cg_left.std", NUMBER, _STD, 0.004, presence=_LATER),
+    _field(
+        "cg_left_interval95_m",
+        "cg_left.interval95",
+        INTERVAL,
+        _INTERVAL95,
+        [0.013, 0.029],
+        presence=_LATER,
+        columns=("cg_left_low95_m", "cg_left_high95_m"),
+    ),
+    _field("left_share_pct", "left_share.number", NUMBER, _LEFT_SHARE, 51.2, presence=_LATER),
+    _field("left_share_std_pct", "left_share.std", NUMBER, _POINTS, 0.2, presence=_LATER),
+    _field(
+        "left_share_interval95_pct",
+        "left_share.interval95",
+        INTERVAL,
+        _INTERVAL95,
+        [50.8, 51.7],
+        presence=_LATER,
+        columns=("left_share_low95_pct", "left_share_high95_pct"),
+    ),
+    EstimateField(
+        "payload_cg_left_correlation",
+        "payload_cg_left_correlation",
+        NUMBER,
+        "of the errors of payload and `cg_left_m`, -1 to 1",
+        0.11,
+        _LATER,
+    ),
+    EstimateField(
+        "front_share_cg_left_correlation",
+        "front_share_cg_left_correlation",
+        NUMBER,
+        "of the errors of front share and `cg_left_m`, -1 to 1",
+        -0.06,
+        _LATER,
+    ),
+    EstimateField("roll_share_front", "roll_share_front", NUMBER, _ROLL_SHARE, 0.58, _LATER),
+    EstimateField("roll_share_front_std", "roll_share_front_std", NUMBER, _STD, 0.07, _LATER),
+    _field("ratio_index_acceleration", "ratio_index_acceleration", NUMBER, "R_a of the paper", 0.97),
+    _field("ratio_index_pitch_rate", "ratio_index_pitch_rate", NUMBER, "R_g of the paper", 1.21),
+    _field("mean_speed_mps", "mean_speed_mps", NUMBER, "over what every gate let through", 13.9),
+    _field("gap_share", "gap_share", NUMBER, "share of the batch without samples", 0.001),
+    _field("usable_share", "usable_share", NUMBER, "share of the batch that every gate let through", 0.93),
+    EstimateField(
+        "roughness_mps2",
+        "roughness_mps2",
+        ROUGH_NUMBER,
+        "of the road: rms vertical acceleration, 1 to 15 Hz, brought to 80 km/h",
+        1.1,
+        _LATER,
+    ),
+    EstimateField("shares", "shares", BY_NAME, "part of the batch that each cause masked", {}),
+    _field("rejected", "rejected", REASONS, "why there is no answer; empty: this batch counted", []),
+    EstimateField("diagnostics", "diagnostics", BY_NAME, "the estimator's own figures", {}, _LATER),
+    EstimateField(
+        "epoch_payload_kg", "epoch.payload.number", NUMBER, "all batches of this load together", 270.4, _KNOWN
+    ),
+    EstimateField("epoch_payload_std_kg", "epoch.payload.std", NUMBER, _STD, 4.9, _KNOWN),
+    EstimateField("epoch_front_share_pct", "epoch.front_share.number", NUMBER, _SHARE, 50.3, _KNOWN),
+    EstimateField("epoch_front_share_std_pct", "epoch.front_share.std", NUMBER, _POINTS, 0.1, _KNOWN),
+    EstimateField("epoch_n_batches", "epoch.n_batches", COUNT, "batches since the load last changed", 3.0, _KNOWN),
+    _field(
+        "tare_id",
+        "tare.tare_id",
+        TEXT,
+        "the zero taken off this answer; absent: the factory zero",
+        presence=_KNOWN,
+    ),
+    _field("tare_payload_kg", "tare.payload.number", NUMBER, "taken off the raw payload", 12.4, presence=_KNOWN),
+    EstimateField("tare_payload_std_kg", "tare.payload.std", NUMBER, _STD, presence=_KNOWN),
+    _field(
+        "tare_front_share_pct",
+        "tare.front_share.number",
+        NUMBER,
+        "percentage points taken off the raw front share",
+        presence=_KNOWN,
+    ),
+    EstimateField("tare_front_share_std_pct", "tare.front_share.std", NUMBER, _POINTS, presence=_KNOWN),
+    EstimateField("raw_payload_kg", "tare.raw_payload.number", NUMBER, _RAW, 283.7, _KNOWN),
+    EstimateField("raw_payload_std_kg", "tare.raw_payload.std", NUMBER, _STD, presence=_KNOWN),
+    EstimateField("raw_front_share_pct", "tare.raw_front_share.number", NUMBER, _RAW, presence=_KNOWN),
+    EstimateField("raw_front_share_std_pct", "tare.raw_front_share.std", NUMBER, _POINTS, presence=_KNOWN),
+    EstimateField("vin", "vin", TEXT, "vehicle identification number", presence=_KNOWN),
+    EstimateField(
+        "provisional",
+        "is_provisional",
+        FLAG,
+        "true: an early look at a batch that is still growing",
+        presence=_KNOWN,
+    ),
+    EstimateField("spectra", "spectra", SPECTRA, "of both sensors, for people to look at", presence=_KNOWN),
+)
+COLUMNS: Final = tuple(column for one in FIELDS for column in one.columns)

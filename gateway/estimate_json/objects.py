@@ -1,0 +1,100 @@
+"""An estimate as its JSON object, the object as an estimate, and either as a line of a CSV file."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+from gateway.estimate import UNKNOWN_INTERVAL, Correction, Epoch, Estimate, Quantity
+from gateway.estimate_json.fields import COLUMNS, FIELDS, Presence
+from gateway.estimate_json.kinds import NS_PER_US
+
+_FOLLOWS: Final = ("id", "t_end")  # from other fields: not read back
+
+
+def estimate_to_json(estimate: Estimate) -> dict[str, Any]:
+    """The JSON object of an estimate."""
+    record = {}
+    for one in FIELDS:
+        known = _at(estimate, one.path)
+        if one.presence is not Presence.WHERE_KNOWN or (known is not None and known is not False):
+            record[one.name] = one.kind.write(known)
+    return record
+
+
+def estimate_from_json(told: Mapping[str, Any]) -> Estimate:
+    """The inverse of :func:`estimate_to_json`, as exact as that rounds; the instants and the id are exact."""
+    known = {
+        one.path: one.kind.read(told[one.name])
+        for one in FIELDS
+        if one.name not in _FOLLOWS and told.get(one.name) is not None
+    }
+    whole = {path: x for path, x in known.items() if "." not in path}
+    estimate = Estimate(
+        **whole,
+        payload=_quantity(known, "payload"),
+        front_share=_quantity(known, "front_share"),
+        cg_left=_quantity(known, "cg_left"),
+        left_share=_quantity(known, "left_share"),
+        epoch=_epoch(known),
+        tare=_correction(known),
+    )
+    return _with_its_nanoseconds(estimate, told["id"])
+
+
+def _with_its_nanoseconds(estimate: Estimate, told_id: str) -> Estimate:
+    """``t_start`` leaves out the nanoseconds below a microsecond; the id, a hash, tells which of the 1000 they are.
+
+    Whole microseconds where none fits: the object was not written by this program.
+    """
+    within_us = (replace(estimate, t_start_ns=estimate.t_start_ns + ns) for ns in range(NS_PER_US))
+    return next((one for one in within_us if one.id == told_id), estimate)
+
+
+def _quantity(known: Mapping[str, Any], path: str) -> Quantity:
+    return Quantity(
+        known.get(f"{path}.number", math.nan),
+        known.get(f"{path}.std", math.nan),
+        known.get(f"{path}.interval95", UNKNOWN_INTERVAL),
+    )
+
+
+def _epoch(known: Mapping[str, Any]) -> Epoch | None:
+    if "epoch.n_batches" not in known:
+        return None
+    return Epoch(_quantity(known, "epoch.payload"), _quantity(known, "epoch.front_share"), known["epoch.n_batches"])
+
+
+def _correction(known: Mapping[str, Any]) -> Correction | None:
+    if "tare.tare_id" not in known:
+        return None
+    names = ("payload", "front_share", "raw_payload", "raw_front_share")
+    return Correction(known["tare.tare_id"], *(_quantity(known, f"tare.{name}") for name in names))
+
+
+def csv_cells(told: Mapping[str, Any]) -> dict[str, Any]:
+    """The object of :func:`estimate_to_json` as one line of a CSV file: a cell for each column that it fills."""
+    cells: dict[str, Any] = {}
+    for one in FIELDS:
+        if one.columns and (shown := told.get(one.name)) is not None:
+            is_split = len(one.columns) > 1
+            cells.update(zip(one.columns, shown if is_split else [_joined(shown)], strict=True))
+    return cells
+
+
+def table_row(estimate: Estimate) -> dict[str, Any]:
+    """The columns of a CSV file, all of them, for a table of estimates such as pandas makes; None where unknown."""
+    return {**dict.fromkeys(COLUMNS), **csv_cells(estimate_to_json(estimate))}
+
+
+def _joined(shown: Any) -> Any:
+    return " ".join(shown) if isinstance(shown, list) else shown
+
+
+def _at(estimate: Estimate, path: str) -> Any:
+    """What stands at the path; None where a part of it is None."""
+    known: Any = estimate
+    for name in path.split("."):
+        if known is not None:
+            known = getattr(known, name)
+    return known
