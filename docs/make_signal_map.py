@@ -17,6 +17,7 @@ MEANINGS: Final = {
     Signal.VERTICAL_ACCELERATION: "needed; z up, about +9.81 m/s² at rest (gravity is removed later)",
     Signal.PITCH_RATE: "needed; about y, positive **nose down**",
     Signal.SPEED: "needed; over ground, from GNSS",
+    Signal.ROLL_RATE: "about x, positive **left side up**; tells where the load lies sideways, never refuses a batch",
     Signal.LONGITUDINAL_ACCELERATION: "x forward; inspection names swapped axes with it",
     Signal.WHEEL_SPEED: "stands in for `speed` where that is missing",
     Signal.IGNITION: "1 while it is on; decoded and counted, nothing uses it yet",

@@ -33,6 +33,7 @@ class Signal(StrEnum):
     VERTICAL_ACCELERATION = "vertical_acceleration"
     PITCH_RATE = "pitch_rate"
     SPEED = "speed"
+    ROLL_RATE = "roll_rate"
     LONGITUDINAL_ACCELERATION = "longitudinal_acceleration"
     WHEEL_SPEED = "wheel_speed"
     IGNITION = "ignition"
@@ -179,7 +180,8 @@ class Batch:
     Arrays are (n,) at ``rate_hz`` from ``t_start_ns``; NaN where unknown. ``usable`` marks the
     samples that every gate lets through; no spectrum segment may cross a sample outside it.
     vertical_acceleration_mps2 has its mean over the usable samples removed (that mean is
-    ``gravity_mps2``); pitch_rate_radps keeps its bias (segments are detrended).
+    ``gravity_mps2``); pitch_rate_radps keeps its bias (segments are detrended). roll_rate_radps (positive
+    left side up) keeps its bias too; it is None where the signal map has none, and neither masks nor rejects.
     ``shares`` tells which part of the window each cause masked. ``rejected`` holds the reasons
     that no estimator can mend.
     """
@@ -198,6 +200,7 @@ class Batch:
     longest_stop_s: float = 0.0
     rejected: tuple[Why, ...] = ()
     is_provisional: bool = False
+    roll_rate_radps: F64 | None = None
 
     @property
     def duration_s(self) -> float:
@@ -206,6 +209,14 @@ class Batch:
     @property
     def usable_share(self) -> float:
         return float(np.mean(self.usable)) if self.usable.size else 0.0
+
+    @property
+    def roll_usable_share(self) -> float | None:
+        """Share of the usable samples whose roll rate is known: 0 where the sensor failed, None where there is none."""
+        if self.roll_rate_radps is None:
+            return None
+        known = np.isfinite(self.roll_rate_radps[self.usable])
+        return float(np.mean(known)) if known.size else 0.0
 
     @property
     def mean_speed_mps(self) -> float:

@@ -37,8 +37,12 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
     rows = rows.rows(inside)
     acceleration = _sensed(rows, Signal.VERTICAL_ACCELERATION, window, n, settings, traits)
     pitch_rate = _sensed(rows, Signal.PITCH_RATE, window, n, settings, traits)
+    roll_rate = _sensed(rows, Signal.ROLL_RATE, window, n, settings, traits)
     speed, frozen = _speed(rows, window, n, settings, traits)
-    causes = _merge_missing(_either(acceleration.causes, pitch_rate.causes)) | _speed_causes(speed, frozen, settings)
+    causes = _merge_missing(
+        _either(_causes(_ACCELERATION_FAULTS, acceleration), _causes(_PITCH_RATE_FAULTS, pitch_rate))
+    )
+    causes |= _speed_causes(speed, frozen, settings)
     usable = np.ones(n, bool)
     for masked in causes.values():
         usable &= ~masked
@@ -59,29 +63,35 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
         longest_stop_s=_longest_run(speed < settings.standstill_speed_mps) / settings.rate_hz,
         rejected=_reasons((acceleration, pitch_rate), window, n, usable, gravity, shares, settings),
         is_provisional=window.is_provisional,
+        roll_rate_radps=_known(roll_rate, settings) if Signal.ROLL_RATE in rows.signals else None,
     )
 
 
-_NAMES = {
-    Signal.VERTICAL_ACCELERATION: (Why.ACCELERATION_MISSING, Why.ACCELERATION_STUCK, Why.ACCELERATION_SATURATED),
-    Signal.PITCH_RATE: (Why.PITCH_RATE_MISSING, Why.PITCH_RATE_STUCK, Why.PITCH_RATE_SATURATED),
-}
+_ACCELERATION_FAULTS = (
+    Why.ACCELERATION_MISSING,
+    Why.TIME_STAMPS,
+    Why.ACCELERATION_STUCK,
+    Why.ACCELERATION_SATURATED,
+)
+_PITCH_RATE_FAULTS = (Why.PITCH_RATE_MISSING, Why.TIME_STAMPS, Why.PITCH_RATE_STUCK, Why.PITCH_RATE_SATURATED)
 _MISSING = (Why.GAP, Why.ACCELERATION_MISSING, Why.PITCH_RATE_MISSING)
 
 
 @dataclass(frozen=True, slots=True)
 class _Sensed:
-    """One inertial sensor on the grid (n,), where each cause says it cannot be used, and how often it sends."""
+    """One inertial sensor on the grid (n,), where each fault says it cannot be used, and how often it sends.
+
+    faults: missing, untimed, stuck, saturated, (n,) each; empty where the sensor is not mapped.
+    """
 
     on_grid: F64
-    causes: dict[Why, Bool]
+    faults: tuple[Bool, ...]
     rate_hz: float
 
 
 def _sensed(rows: Motion, signal: Signal, window: Window, n: int, settings: BatchSettings, traits: Traits) -> _Sensed:
     if signal not in rows.signals:
-        return _Sensed(np.full(n, np.nan), {}, 0.0)
-    missing, stuck, saturated = _NAMES[signal]
+        return _Sensed(np.full(n, np.nan), (), 0.0)
     trait = traits.get(signal, SensorTraits())
     arrived_ns, arrived = rows.of(signal)
     counter = rows.counter_of(signal)
@@ -92,13 +102,14 @@ def _sensed(rows: Motion, signal: Signal, window: Window, n: int, settings: Batc
     on_grid = onto_grid(t_ns[is_believed], x[is_believed], window.t_start_ns, n, settings.rate_hz, settings.gap_s)
     stuck_ns = settings.stuck_s * NS_PER_S
     untimed = _spans_onto_grid(_spans_of(t_ns, ~is_believed), window, n, settings.rate_hz)
-    causes = {
-        missing: np.isnan(on_grid) & ~untimed,
-        Why.TIME_STAMPS: untimed,
-        stuck: _spans_onto_grid(_constant_runs(t_ns, x, stuck_ns), window, n, settings.rate_hz),
-        saturated: _spans_onto_grid(_saturated_spans(t_ns, x, trait), window, n, settings.rate_hz),
-    }
-    return _Sensed(on_grid, causes, sample_rate_hz(t_ns[is_believed]))
+    missing = np.isnan(on_grid) & ~untimed
+    stuck = _spans_onto_grid(_constant_runs(t_ns, x, stuck_ns), window, n, settings.rate_hz)
+    saturated = _spans_onto_grid(_saturated_spans(t_ns, x, trait), window, n, settings.rate_hz)
+    return _Sensed(on_grid, (missing, untimed, stuck, saturated), sample_rate_hz(t_ns[is_believed]))
+
+
+def _causes(names: tuple[Why, ...], sensed: _Sensed) -> dict[Why, Bool]:
+    return dict(zip(names, sensed.faults, strict=True)) if sensed.faults else {}
 
 
 def _constant_runs(t_ns: I64, x: F64, at_least_ns: float) -> I64:
@@ -133,6 +144,13 @@ def _spans_onto_grid(spans_ns: I64, window: Window, n: int, rate_hz: float) -> B
     np.add.at(edges, bounds[:, 1], -1)
     covered: Bool = np.cumsum(edges[:n]) > 0
     return covered
+
+
+def _known(sensed: _Sensed, settings: BatchSettings) -> F64:
+    """A sensor on the grid (n,), NaN wherever a fault forbids its use; all of it where it is too slow."""
+    is_slow = sensed.rate_hz < RATE_MIN_SHARE * settings.rate_hz
+    unknown = np.logical_or.reduce([np.full(len(sensed.on_grid), is_slow), *sensed.faults])
+    return np.where(unknown, np.nan, sensed.on_grid)
 
 
 def _speed(rows: Motion, window: Window, n: int, settings: BatchSettings, traits: Traits) -> tuple[F64, Bool]:

@@ -28,7 +28,7 @@ class Scheduler:
     without a row, a step back of the clock, or when its stamps stand all but still: a window holds no
     more rows than a bus can carry in its time. Windows follow one another from its first row. After
     a standstill the next drive begins when the vehicle moves again. Rows that come later than their
-    window are counted in ``n_late_rows``.
+    window are counted in ``n_late_rows``. A row of nothing but a roll rate is kept, and decides nothing.
     """
 
     def __init__(self, settings: BatchSettings, traits: Traits) -> None:
@@ -67,10 +67,14 @@ class Scheduler:
 
     def _advance(self, motion: Motion) -> Generator[Batch, None, int]:
         """Take rows up to the end of the drive or of the rows; return how many were taken."""
+        decides = _decides(motion)
         if self._newest_ns is None:
+            if not decides[0]:
+                return int(np.argmax(decides)) if decides.any() else len(motion)
             self._begin_drive(int(motion.t_ns[0]))
-        n, broken_by = self._next_break(motion.t_ns)
-        newest_ns = np.maximum.accumulate(np.r_[self._newest_ns or 0, motion.t_ns[:n]])[1:]
+        t_ns = self._deciding_times(motion.t_ns, decides)
+        n, broken_by = self._next_break(t_ns)
+        newest_ns = np.maximum.accumulate(np.r_[self._newest_ns or 0, t_ns[:n]])[1:]
         still_since_ns = self._standing_since(motion.part(0, n))
         parked = np.flatnonzero(newest_ns - still_since_ns >= self._ns(self._settings.standstill_s))
         if parked.size:
@@ -84,6 +88,11 @@ class Scheduler:
         else:
             self._still_since_ns = int(still_since_ns[-1])
         return n
+
+    def _deciding_times(self, t_ns: I64, decides: Bool) -> I64:
+        """(n,) the stamp of each row; of one that decides nothing, that of the last one before it that does."""
+        last = np.maximum.accumulate(np.where(decides, np.arange(len(t_ns)), -1))
+        return np.where(last >= 0, t_ns[last], self._newest_ns or 0)
 
     def _next_break(self, t_ns: I64) -> tuple[int, Why | None]:
         """First row that silence or a backward clock step parts from those before it, and which."""
@@ -191,3 +200,13 @@ class Scheduler:
     @staticmethod
     def _ns(duration_s: float) -> int:
         return round(duration_s * NS_PER_S)
+
+
+def _decides(rows: Motion) -> Bool:
+    """(n,) False where a row carries nothing but a roll rate: drives and windows do not hang on it."""
+    if Signal.ROLL_RATE not in rows.signals:
+        return np.ones(len(rows), bool)
+    known = np.isfinite(rows.columns)
+    has_roll = known[:, rows.signals.index(Signal.ROLL_RATE)]
+    decides: Bool = ~has_roll | (np.count_nonzero(known, axis=1) > 1)
+    return decides

@@ -1,6 +1,6 @@
 """Arrays in, estimates out: for measurements that come from no CAN log."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -24,32 +24,40 @@ def estimate_arrays(
     speed_mps: F64,
     calibration: CalibrationFile,
     *,
+    roll_rate_radps: F64 | None = None,
     estimator: str | None = None,
     settings: BatchSettings = AS_THE_SERVICE,
 ) -> list[Estimate]:
     """Every batch of one drive, by the same path as the service's: one row of each array an instant.
 
     All of shape (n,): times in s since 1970 or any other start, in order; acceleration upwards with gravity in it;
-    pitch rate positive nose down (ISO 8855); NaN where a sensor says nothing at that instant. ``estimator`` is the
-    file's best where none is named. Raises ArraysError for arrays that do not fit, or an estimator that is not there.
+    pitch rate positive nose down, roll rate left side up (ISO 8855); NaN where a sensor says nothing at that instant.
+    ``estimator`` is the file's best where none is named. Raises ArraysError for arrays that do not fit, or an estimator
+    that is not there.
     """
     chosen = estimator or calibration.estimators[0]
     if chosen not in calibration.estimators:
         raise ArraysError(f"the calibration is for {', '.join(calibration.estimators)}, not for {chosen!r}")
-    motion = _motion(t_s, (vertical_acceleration_mps2, pitch_rate_radps, speed_mps))
+    columns = {
+        Signal.VERTICAL_ACCELERATION: vertical_acceleration_mps2,
+        Signal.PITCH_RATE: pitch_rate_radps,
+        Signal.SPEED: speed_mps,
+    }
+    if roll_rate_radps is not None:
+        columns[Signal.ROLL_RATE] = roll_rate_radps
+    motion = _motion(t_s, columns)
     flow = Flow(settings, {}, calibration.for_core(), chosen, _NOBODY)
     return [*flow.feed(motion), *flow.flush()]
 
 
-def _motion(t_s: F64, columns: Sequence[F64]) -> Motion:
+def _motion(t_s: F64, columns: Mapping[Signal, F64]) -> Motion:
     """The rows that a decoder would have given."""
     times_s = np.asarray(t_s, dtype=np.float64)
-    sensed = [np.asarray(column, dtype=np.float64) for column in columns]
+    sensed = [np.asarray(column, dtype=np.float64) for column in columns.values()]
     if times_s.ndim != 1 or any(column.shape != times_s.shape for column in sensed):
         shapes = ", ".join(str(column.shape) for column in (times_s, *sensed))
         raise ArraysError(f"times and sensors must be of one length and one dimension; their shapes are {shapes}")
     if not np.isfinite(times_s).all():
         raise ArraysError("a time is not a number")
     t_ns = np.round(times_s * NS_PER_S).astype(np.int64)
-    signals = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
-    return Motion(signals, t_ns, np.column_stack(sensed))
+    return Motion(tuple(columns), t_ns, np.column_stack(sensed))

@@ -1,12 +1,13 @@
 """Batches depend on the rows and their order alone, never on how the rows were chunked."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.drives import assert_same_batch, drive, joined, later, steady, without_rows
+from support.drives import assert_same_batch, drive, joined, later, steady, with_roll, without_rows
 
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
@@ -76,6 +77,22 @@ def test_chunks_of_a_few_rows_do_not_matter(name: str) -> None:
     chunked, _ = batches_of(motion, list(range(0, len(motion), 3)), 0.0)
     for one, other in zip(whole, chunked, strict=True):
         assert_same_batch(one, other)
+
+
+@pytest.mark.parametrize("provisional_every_s", [0.0, 7.0])
+@pytest.mark.parametrize("name", DRIVES)
+@settings(max_examples=3, derandomize=True)
+@given(share_cuts=st.lists(st.floats(0.0, 1.0), max_size=20))
+def test_frames_of_a_roll_rate_alone_change_no_other_number(
+    name: str, provisional_every_s: float, share_cuts: list[float]
+) -> None:
+    rolling = with_roll(DRIVES[name])
+    batches, _ = batches_of(rolling, [round(x * len(rolling)) for x in share_cuts], provisional_every_s)
+    whole, _ = WHOLE[name, provisional_every_s]
+    assert len(batches) == len(whole)
+    for one, other in zip(whole, batches, strict=True):
+        assert other.roll_rate_radps is not None
+        assert_same_batch(one, replace(other, roll_rate_radps=None))
 
 
 @pytest.mark.parametrize("name", DRIVES)

@@ -40,6 +40,18 @@ def drive(duration_s: float, speed: Speed | None = None, rate_hz: float = 100.0,
     return Motion(SIGNALS, t_ns[order], columns[order])
 
 
+def with_roll(motion: Motion, rate_hz: float = 100.0, seed: int = 5) -> Motion:
+    """The same rows, and between them frames of nothing but a white roll rate, from 0.4 s before the first on."""
+    t_ns = np.arange(motion.t_ns.min() - 400_000_000, motion.t_ns.max() + 400_000_000, round(1e9 / rate_hz))
+    columns = np.full((len(motion) + len(t_ns), len(motion.signals) + 1), np.nan)
+    columns[: len(motion), :-1] = motion.columns
+    columns[len(motion) :, -1] = 0.03 * np.random.default_rng(seed).standard_normal(len(t_ns))
+    # the rows that were there keep their order of arrival, whatever their stamps
+    arrival = np.r_[np.maximum.accumulate(motion.t_ns), t_ns]
+    order = np.argsort(arrival, kind="stable")
+    return Motion((*motion.signals, Signal.ROLL_RATE), np.r_[motion.t_ns, t_ns][order], columns[order])
+
+
 def changed(motion: Motion, signal: Signal, from_s: float, to_s: float, to: Callable[[F64], F64]) -> Motion:
     """The samples of one signal between two times, replaced by ``to`` of them."""
     columns = motion.columns.copy()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.drives import T0_NS, assert_same_batch, changed, drive, steady
+from support.drives import T0_NS, assert_same_batch, changed, drive, steady, with_roll
 
 from gateway.core.batch import Window, build_batch
 from gateway.core.settings import BatchSettings
@@ -19,9 +19,11 @@ WINDOW = Window(T0_NS, T0_NS + 100_000_000_000, T0_NS)
 TRAITS = {
     Signal.VERTICAL_ACCELERATION: SensorTraits(minimum=-20.0, maximum=39.0, resolution=0.01),
     Signal.PITCH_RATE: SensorTraits(minimum=-4.0, maximum=4.0, resolution=0.001),
+    Signal.ROLL_RATE: SensorTraits(minimum=-4.0, maximum=4.0, resolution=0.001),
 }
 WHOLE = drive(LENGTH_S)
 A, G, V = Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED
+R = Signal.ROLL_RATE
 
 
 def batch_of(motion: Motion) -> Batch:
@@ -159,3 +161,62 @@ def test_no_row_at_all_is_a_batch_of_nothing() -> None:
     assert batch.gap_share == 1.0
     assert Why.GAP in batch.rejected
     assert np.isnan(batch.mean_speed_mps)
+
+
+def roll_of(batch: Batch) -> F64:
+    assert batch.roll_rate_radps is not None
+    return batch.roll_rate_radps
+
+
+def test_without_a_roll_rate_in_the_map_there_is_none() -> None:
+    batch = batch_of(WHOLE)
+    assert batch.roll_rate_radps is None
+    assert batch.roll_usable_share is None
+
+
+def test_a_roll_rate_comes_onto_the_same_grid() -> None:
+    """What two sensors measure alike, sent at the same instants, is alike on the grid."""
+    columns = np.column_stack([WHOLE.columns, WHOLE.columns[:, 1]])
+    batch = batch_of(Motion((*WHOLE.signals, R), WHOLE.t_ns, columns))
+    np.testing.assert_array_equal(roll_of(batch)[batch.usable], batch.pitch_rate_radps[batch.usable])
+    assert batch.roll_usable_share == 1.0
+
+
+@pytest.mark.parametrize("fault", [silent, held_at(0.01), touching(4.0), touching(-4.0)])
+@pytest.mark.parametrize("length_s", [10.0, 50.0, LENGTH_S])
+def test_a_faulty_roll_rate_is_unknown_and_costs_nothing_else(length_s: float, fault: Callable[[F64], F64]) -> None:
+    faulty = changed(with_roll(WHOLE), R, 0.0, length_s, fault)
+    if length_s == LENGTH_S:
+        faulty = changed(faulty, R, -1.0, LENGTH_S + 1.0, fault)
+    batch = batch_of(faulty)
+    assert np.isnan(roll_of(batch)[: round((length_s - 0.5) * 50)]).all()
+    assert np.isfinite(roll_of(batch)[round((length_s + 0.5) * 50) :]).all()
+    assert batch.roll_usable_share == pytest.approx(1.0 - length_s / LENGTH_S, abs=0.01)
+    assert_same_batch(replace(batch, roll_rate_radps=None), batch_of(WHOLE))
+
+
+def test_a_roll_rate_too_slow_for_the_grid_is_unknown() -> None:
+    batch = batch_of(with_roll(WHOLE, rate_hz=25.0))
+    assert np.isnan(roll_of(batch)).all()
+    assert batch.roll_usable_share == 0.0
+    assert batch.rejected == ()
+
+
+@settings(max_examples=10, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 1.0))
+def test_no_roll_rate_whatever_changes_another_number(seed: int, share: float) -> None:
+    rng = np.random.default_rng(seed)
+    wild = [np.nan, np.inf, -np.inf, 0.0, 1e300]
+
+    def spoilt(x: F64) -> F64:
+        return np.where(rng.random(len(x)) < share, rng.choice(wild, len(x)), x)
+
+    batch = batch_of(changed(with_roll(WHOLE), R, -1.0, LENGTH_S + 1.0, spoilt))
+    assert_same_batch(replace(batch, roll_rate_radps=None), batch_of(WHOLE))
+
+
+def test_latency_moves_the_roll_rate_back() -> None:
+    step = changed(with_roll(WHOLE), R, 50.0, LENGTH_S + 1.0, lambda x: x + 5.0)
+    roll = roll_of(build_batch(step, WINDOW, SETTINGS, {R: SensorTraits(latency_s=2.0)}))
+    assert roll[round(47.5 * 50)] == pytest.approx(0.0, abs=0.3)
+    assert roll[round(48.5 * 50)] == pytest.approx(5.0, abs=0.3)

@@ -61,6 +61,14 @@ def test_arrays_are_weighed_as_rows_of_a_bus_are(motion: Motion, calibration: ga
     assert [gateway.estimate_to_json(each) for each in found] == [gateway.estimate_to_json(each) for each in told]
 
 
+def test_a_roll_rate_is_welcome_and_must_fit(motion: Motion, calibration: gateway.CalibrationFile) -> None:
+    roll_rate = 0.01 * np.sin(motion.t_ns / 1e9)
+    told = gateway.estimate_arrays(motion.t_ns / 1e9, *motion.columns.T, calibration, roll_rate_radps=roll_rate)
+    assert [each.t_end_ns for each in told] == [300_000_000_000, int(motion.t_ns[-1])]
+    with pytest.raises(ArraysError, match="shapes"):
+        gateway.estimate_arrays(motion.t_ns / 1e9, *motion.columns.T, calibration, roll_rate_radps=roll_rate[1:])
+
+
 def test_a_row_of_a_table_has_every_column(motion: Motion, calibration: gateway.CalibrationFile) -> None:
     first, *_ = gateway.estimate_arrays(motion.t_ns / 1e9, *motion.columns.T, calibration)
     row = gateway.table_row(first)

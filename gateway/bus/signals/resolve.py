@@ -15,6 +15,7 @@ QUANTITIES: Final[Mapping[Signal, str]] = {
     Signal.VERTICAL_ACCELERATION: "acceleration",
     Signal.PITCH_RATE: "angular_rate",
     Signal.SPEED: "speed",
+    Signal.ROLL_RATE: "angular_rate",
     Signal.LONGITUDINAL_ACCELERATION: "acceleration",
     Signal.WHEEL_SPEED: "speed",
     Signal.IGNITION: "state",
