@@ -32,7 +32,9 @@ name = "van"
 empty_mass_kg = 1240.0                # sprung mass: see "From axle weights" below
 empty_front_share_pct = 50.0
 wheelbase_m = 2.8
+track_width_m = 1.5
 sensor_position_m = 3.1
+sensor_offset_left_m = -0.25          # 25 cm right of the centre line
 
 [[runs]]
 log = "01_empty.log.gz"
@@ -42,6 +44,7 @@ payload_kg = 0.0
 log = "02_boxes.log.gz"
 payload_kg = 270.0
 payload_position_m = 0.5              # behind the front axle
+payload_left_m = 0.3                  # left of the centre line
 start_s = 30.0                        # only a piece of the log
 end_s = 930.0
 
@@ -58,10 +61,18 @@ RANGES = """\
 what plans and the error over all loads keep within. No estimate is clipped to them. Limits on weights are for warnings
 (`/api/v1/weights/latest`) and for plans. A weight on the road needs unsprung masses or kerb axle weights; without
 either it is null.
+
+**To the side.** The centre line runs midway between left and right tyres; left is the driver's left. Measure the sensor
+with a tape, from a side wall or sill, and take half of the vehicle's width there. A sensor off the centre line feels
+roll as heave, so a place that is not known makes intervals wider. Scales under single wheels of the empty vehicle give
+`empty_cg_left_m`, with w the track width and the two sums over the wheels of a side:
+
+$$y_0 = \\frac{w}{2} \\cdot \\frac{F_{left} - F_{right}}{F_{left} + F_{right}}$$
 """
 
 RUN_RULES = """\
 A loaded run needs `payload_position_m` or `front_share_pct`, never both. A load that would lift an axle is refused.
+So is one so far to the side that it would lift the wheels of the other, where the track width is given.
 Batches begin anew at the cut between identification and validation; with `identification_fraction = 1.0` nothing is
 left to validate.
 """

@@ -92,10 +92,11 @@ def _beyond(fault: dict[str, Any]) -> str:
 
 
 def _taken_for(key: str, number: float, bound: float) -> str | None:
-    """The unit in which ``number`` would keep the bound, and not be a speck."""
+    """The unit in which ``number`` would keep the bound, and not be a speck beside it."""
+    speck = min(1.0, abs(bound) / 20.0)
     for end, factor, unit in _TAKEN_FOR:
         meant = factor * number
         keeps_it = meant > bound if number < bound else meant < bound
-        if key.endswith(end) and keeps_it and abs(meant) >= 1.0:
+        if key.endswith(end) and keeps_it and abs(meant) >= speck:
             return unit
     return None

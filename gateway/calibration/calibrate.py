@@ -164,6 +164,7 @@ def _provenance(campaign: Campaign, split: Sequence[SplitRun], command: str) -> 
                 sha256=one.log.sha256,
                 payload_kg=one.identification.payload_kg,
                 front_share_pct=one.identification.front_share_pct,
+                payload_left_m=one.identification.payload_left_m,
                 n_batches=len([batch for batch in one.identification.batches if not batch.rejected]),
             )
             for one in split

@@ -7,7 +7,16 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from gateway.core.vehicle import Vehicle, front_share_pct
+from gateway.core.vehicle import (
+    MEASURED_OFFSET_STD_M,
+    PAYLOAD_LEFT_STD_M,
+    UNKNOWN_OFFSET_STD_M,
+    Vehicle,
+    cg_left_m,
+    front_share_pct,
+    left_share_pct,
+    sensor_offset_left,
+)
 from gateway.errors import CampaignError
 from gateway.toml_file import checked, read_toml
 
@@ -17,6 +26,7 @@ OnRun = Callable[[int, int], None]  # (runs done, runs in all)
 Percent = Annotated[float, Field(ge=1.0, le=99.0)]
 Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0)]
 Metres = Annotated[float, Field(ge=-10.0, le=30.0)]
+MetresLeft = Annotated[float, Field(ge=-2.0, le=2.0)]
 
 LEAST_PAYLOAD_SHARE: Final = 0.004
 """Of the empty mass. No vehicle carries four times its own, so that a load in tonnes reads less than this in kg."""
@@ -52,7 +62,25 @@ class VehicleTable(_Table):
         le=50.0,
         description="how sure the front share is, in percentage points; kept, not used",
     )
-    sensor_offset_left_m: Metres = Field(0.0, description="of the sensor, left of the centre line; kept, not used")
+    sensor_offset_left_m: MetresLeft | None = Field(
+        None, description="of the sensor, left of the centre line, negative: right of it; absent: not known"
+    )
+    sensor_offset_left_std_m: float | None = Field(
+        None,
+        gt=0.0,
+        le=2.0,
+        description=f"how sure that is; absent: {MEASURED_OFFSET_STD_M:g} with an offset, by tape, "
+        f"{UNKNOWN_OFFSET_STD_M:g} without one",
+    )
+    track_width_m: float | None = Field(
+        None,
+        ge=0.5,
+        le=4.0,
+        description="between the middles of left and right tyres; weights of single wheels need it",
+    )
+    empty_cg_left_m: MetresLeft = Field(
+        0.0, description="centre of gravity of the empty vehicle, driver aboard, left of the centre line"
+    )
     unsprung_front_kg: float | None = Field(
         None, gt=0.0, description="front axle, wheels and brakes; taken as known to 10 %"
     )
@@ -65,6 +93,10 @@ class VehicleTable(_Table):
     front_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the front axle")
     rear_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the rear axle")
     gross_limit_kg: float | None = Field(None, gt=0.0, description="permitted gross weight")
+    front_wheel_limit_kg: float | None = Field(
+        None, gt=0.0, description="permitted load of each front wheel or its tyre, both of twin tyres"
+    )
+    rear_wheel_limit_kg: float | None = Field(None, gt=0.0, description="the same at the rear")
 
     @model_validator(mode="after")
     def _ranges_rise(self) -> "VehicleTable":
@@ -73,6 +105,13 @@ class VehicleTable(_Table):
             if low >= high:
                 raise ValueError(f"{name} must rise: [low, high]")
         return self
+
+    @property
+    def stated(self) -> Vehicle:
+        """The vehicle in the core's terms."""
+        offset_m, offset_std_m = sensor_offset_left(self.sensor_offset_left_m, self.sensor_offset_left_std_m)
+        sensor = {"sensor_offset_left_m": offset_m, "sensor_offset_left_std_m": offset_std_m}
+        return Vehicle(**self.model_dump() | sensor)
 
 
 class RunTable(_Table):
@@ -85,6 +124,11 @@ class RunTable(_Table):
     )
     front_share_pct: Percent | None = Field(
         None, description="share of the whole sprung mass on the front axle, in place of the position"
+    )
+    payload_left_m: MetresLeft | None = Field(
+        None,
+        description="its centre of gravity left of the vehicle's centre line, negative: right of it; absent: about "
+        f"there, with a standard deviation of {PAYLOAD_LEFT_STD_M:g} m",
     )
     split: Literal["identification", "validation"] | None = Field(
         None, description="use the whole run for this alone; absent: cut at `identification_fraction`"
@@ -128,7 +172,7 @@ class Campaign:
         self.path = path
         self.runs = table.runs
         self.identification_fraction = table.identification_fraction
-        self.vehicle = Vehicle(**table.vehicle.model_dump())
+        self.vehicle = table.vehicle.stated
         self.states_payload_range = "payload_range_kg" in table.vehicle.model_fields_set
         self._signals = table.signals
 
@@ -188,6 +232,18 @@ def _faults(campaign: Campaign, run: RunTable) -> Iterator[str]:
         yield (
             f"payload_position_m: {run.payload_kg:g} kg at {run.payload_position_m:g} m would put {share_pct:.0f} % of "
             "the weight on the front axle and lift the other; it is measured from the front axle rearwards"
+        )
+    yield from _sideways_faults(campaign.vehicle, run)
+
+
+def _sideways_faults(vehicle: Vehicle, run: RunTable) -> Iterator[str]:
+    if run.payload_left_m is None or vehicle.track_width_m is None:
+        return
+    share_pct = left_share_pct(cg_left_m(vehicle, run.payload_kg, run.payload_left_m), vehicle.track_width_m)
+    if not 0.0 < share_pct < 100.0:
+        yield (
+            f"payload_left_m: {run.payload_kg:g} kg at {run.payload_left_m:g} m would put {share_pct:.0f} % of the "
+            "weight on the left wheels and lift the others; it is measured from the centre line to the left"
         )
 
 

@@ -2,21 +2,30 @@
 
 from dataclasses import dataclass
 
-from gateway.core.vehicle import Load
+from gateway.core.vehicle import PAYLOAD_LEFT_NOTED_STD_M, PAYLOAD_LEFT_STD_M, Load
 from gateway.records import Batch
 
 
 @dataclass(frozen=True, slots=True)
 class KnownRun:
-    """Batches of one drive with its true payload and front share. ``number`` counts runs of a campaign from 1."""
+    """Batches of one drive with its true payload and front share. ``number`` counts runs of a campaign from 1.
+
+    payload_left_m is the payload's centre of gravity left of the vehicle's centre line; None: nobody noted it.
+    """
 
     number: int
     name: str
     payload_kg: float
     front_share_pct: float
     batches: tuple[Batch, ...]
+    payload_left_m: float | None = None
 
     @property
     def load(self) -> Load:
         """What it carried."""
         return Load(self.payload_kg, self.front_share_pct)
+
+    @property
+    def payload_left_std_m(self) -> float:
+        """How sure the payload's place to the side is; where nobody noted it, it lies about the centre line."""
+        return PAYLOAD_LEFT_STD_M if self.payload_left_m is None else PAYLOAD_LEFT_NOTED_STD_M

@@ -19,7 +19,7 @@ from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
 from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
 from gateway.offline.look import why_silent
-from gateway.records import Motion, Signal
+from gateway.records import Batch, Motion, Signal
 from gateway.units import NS_PER_S
 
 Split = Literal["identification", "validation", "all"]
@@ -49,7 +49,7 @@ def split_runs(
         except LogUnreadableError as fault:
             if not keeps_unreadable:
                 raise
-            blank = KnownRun(number, str(run.log), run.payload_kg, campaign.front_share_pct(run), ())
+            blank = _known_run(campaign, number, run, ())
             drives.append(SplitRun(blank, blank, log=LogFacts(unreadable=str(fault))))
     on_run(len(runs), len(runs))
     return drives
@@ -66,7 +66,7 @@ def _split_run(
     both = [rows_within(motion, stretch) if stretch and len(motion) else motion.part(0, 0) for stretch in stretches]
     for rows in both:
         batches = batches_of_motion(rows, signal_map, settings)
-        parts.append(KnownRun(number, str(run.log), run.payload_kg, campaign.front_share_pct(run), batches))
+        parts.append(_known_run(campaign, number, run, batches))
     log_facts = LogFacts(
         sha256=file_sha256(log),
         duration_s=float(np.ptp(whole.t_ns)) / NS_PER_S,
@@ -77,6 +77,11 @@ def _split_run(
     )
     facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
     return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)
+
+
+def _known_run(campaign: Campaign, number: int, run: RunTable, batches: tuple[Batch, ...]) -> KnownRun:
+    share_pct = campaign.front_share_pct(run)
+    return KnownRun(number, str(run.log), run.payload_kg, share_pct, batches, run.payload_left_m)
 
 
 def _silent(log: Path, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:

@@ -52,11 +52,15 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
         "sensor_position_std_m": 0.1,
         "empty_front_share_std_pct": 0.5,
         "sensor_offset_left_m": 0.0,
+        "sensor_offset_left_std_m": 0.3,
+        "empty_cg_left_m": 0.0,
         "gross_limit_kg": 2000.0,
     }
     absent = ("unsprung_front_kg", "unsprung_rear_kg", "kerb_front_axle_kg", "kerb_rear_axle_kg", "wheel_radius_m")
-    absent += ("front_axle_limit_kg", "rear_axle_limit_kg")
+    absent += ("front_axle_limit_kg", "rear_axle_limit_kg", "front_wheel_limit_kg", "rear_wheel_limit_kg")
+    absent += ("track_width_m",)
     run = {"number": 1, "log": "a.log", "sha256": "0" * 64, "payload_kg": 0.0, "front_share_pct": 50.0, "n_batches": 2}
+    run["payload_left_m"] = None
     return CalibrationFile.model_validate(
         {
             "vehicle": vehicle | dict.fromkeys(absent),
@@ -77,9 +81,25 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
     )
 
 
-def first_version() -> dict[str, Any]:
-    """Today's made-up file as version 1 would have had it."""
+SINCE_VERSION_3 = ("sensor_offset_left_std_m", "track_width_m", "empty_cg_left_m")
+SINCE_VERSION_3 += ("front_wheel_limit_kg", "rear_wheel_limit_kg")
+
+
+def second_version() -> dict[str, Any]:
+    """Today's made-up file as version 2 would have had it."""
     content: dict[str, Any] = json.loads(calibration_file().to_json())
+    for name in SINCE_VERSION_3:
+        del content["vehicle"][name]
+    for run in content["provenance"]["runs"]:
+        del run["payload_left_m"]
+    content["version"] = 2
+    content["id"] = content_id(content)
+    return content
+
+
+def first_version() -> dict[str, Any]:
+    """The same of version 1."""
+    content = second_version()
     del content["migrated_from"], content["seen"]["roughness_mps2"]
     content["version"] = 1
     content["id"] = content_id(content)

@@ -4,10 +4,11 @@ import json
 from pathlib import Path
 
 import pytest
-from support.calibrated import first_version
+from support.calibrated import first_version, second_version
 
 from gateway.calibration.file import load_calibration
-from gateway.calibration.file.calibration_file import FIRST_VERSION, MIGRATIONS, VERSION, migrated
+from gateway.calibration.file.calibration_file import FIRST_VERSION, MIGRATIONS, VERSION, content_id, migrated
+from gateway.core.vehicle import MEASURED_OFFSET_STD_M, UNKNOWN_OFFSET_STD_M
 
 SHIPPED = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 
@@ -26,9 +27,27 @@ def test_an_old_file_keeps_its_id_and_all_it_said(tmp_path: Path) -> None:
     assert today.seen.roughness_mps2 is None
     said = json.loads(today.to_json())
     assert said["expected_errors"] == {"ratio_index": {"payload_rms_kg": None, "front_share_rms_pct": None}}
-    for part in ("vehicle", "ratio_index", "cross_spectrum", "warnings", "provenance"):
+    for part in ("ratio_index", "cross_spectrum", "warnings"):
         assert said[part] == old[part]
-    assert said["seen"].items() >= old["seen"].items()
+    for part in ("seen", "vehicle"):
+        assert said[part].items() >= old[part].items()
+    run, old_run = said["provenance"].pop("runs")[0], old["provenance"].pop("runs")[0]
+    assert said["provenance"] == old["provenance"]
+    assert run == old_run | {"payload_left_m": None}
+
+
+@pytest.mark.parametrize(("offset_m", "std_m"), [(0.0, UNKNOWN_OFFSET_STD_M), (-0.3, MEASURED_OFFSET_STD_M)])
+def test_a_file_of_version_2_knows_the_place_of_a_sensor_only_where_one_was_stated(
+    tmp_path: Path, offset_m: float, std_m: float
+) -> None:
+    old = second_version()
+    old["vehicle"]["sensor_offset_left_m"] = offset_m
+    old["id"] = content_id(old)
+    path = tmp_path / "van.json"
+    path.write_text(json.dumps(old))
+    vehicle = load_calibration(path).for_core().vehicle
+    assert (vehicle.sensor_offset_left_m, vehicle.sensor_offset_left_std_m) == (offset_m, std_m)
+    assert vehicle.track_width_m is None
 
 
 def test_a_migrated_file_written_anew_is_read_as_the_same_calibration(tmp_path: Path) -> None:

@@ -5,6 +5,13 @@ from pathlib import Path
 import pytest
 
 from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.known_run import KnownRun
+from gateway.core.vehicle import (
+    MEASURED_OFFSET_STD_M,
+    PAYLOAD_LEFT_NOTED_STD_M,
+    PAYLOAD_LEFT_STD_M,
+    UNKNOWN_OFFSET_STD_M,
+)
 from gateway.errors import CampaignError
 
 VEHICLE = {"name": '"van"', "empty_mass_kg": "1240.0", "wheelbase_m": "2.8", "sensor_position_m": "3.2"}
@@ -61,6 +68,27 @@ def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> N
     assert stated == 47.5
 
 
+def test_a_sensor_whose_place_to_the_side_is_not_stated_is_unsure(tmp_path: Path) -> None:
+    def placed(**keys: str) -> tuple[float, float]:
+        vehicle = loaded(tmp_path, campaign_text(vehicle=keys)).vehicle
+        return vehicle.sensor_offset_left_m, vehicle.sensor_offset_left_std_m
+
+    assert placed() == (0.0, UNKNOWN_OFFSET_STD_M)
+    assert placed(sensor_offset_left_m="0.0") == (0.0, MEASURED_OFFSET_STD_M)
+    assert placed(sensor_offset_left_m="-0.3") == (-0.3, MEASURED_OFFSET_STD_M)
+    assert placed(sensor_offset_left_m="0.3", sensor_offset_left_std_m="0.05") == (0.3, 0.05)
+    assert placed(sensor_offset_left_std_m="0.5") == (0.0, 0.5)
+
+
+def test_a_payload_whose_place_to_the_side_nobody_noted_lies_about_the_middle(tmp_path: Path) -> None:
+    noted = LOADED_RUN | {"payload_left_m": "-0.25"}
+    campaign = loaded(tmp_path, campaign_text('signals = "s"', {"track_width_m": "1.5"}, LOADED_RUN, noted))
+    somewhere, there = (KnownRun(1, "a.log", 270.0, 57.0, (), run.payload_left_m) for run in campaign.runs)
+    assert campaign.vehicle.track_width_m == 1.5
+    assert (somewhere.payload_left_m, somewhere.payload_left_std_m) == (None, PAYLOAD_LEFT_STD_M)
+    assert (there.payload_left_m, there.payload_left_std_m) == (-0.25, PAYLOAD_LEFT_NOTED_STD_M)
+
+
 FAULTS = [
     (campaign_text('signals = "s"\ncolour = 1'), "colour: unknown key"),
     (campaign_text('signals = ""'), "signals: "),
@@ -86,6 +114,20 @@ FAULTS = [
     (campaign_text('signals = "s"', None, LOADED_RUN | {"payload_kg": "0.27"}), "write 270 if these are tonnes"),
     (campaign_text('signals = "s"', None, LOADED_RUN | {"payload_kg": "1.3"}), "write 1300 if these are tonnes"),
     (campaign_text(vehicle={"payload_range_kg": "[0.0, 0.45]"}), "vehicle.payload_range_kg: 0.45 kg is no load"),
+    (campaign_text(vehicle={"track_width_m": "1500"}), "vehicle.track_width_m: 1500 is above 4: millimetres?"),
+    (
+        campaign_text(vehicle={"sensor_offset_left_m": "-300"}),
+        "vehicle.sensor_offset_left_m: -300 is below -2: millimetres?",
+    ),
+    (campaign_text(vehicle={"sensor_offset_left_std_m": "20"}), "vehicle.sensor_offset_left_std_m: 20 is above 2"),
+    (
+        campaign_text('signals = "s"', None, LOADED_RUN | {"payload_left_m": "35"}),
+        "runs[1].payload_left_m: 35 is above 2: centimetres?",
+    ),
+    (
+        campaign_text('signals = "s"', {"track_width_m": "0.6"}, LOADED_RUN | {"payload_left_m": "-1.8"}),
+        "runs[1].payload_left_m: 270 kg at -1.8 m would put -4 % of the weight on the left wheels",
+    ),
     ('signals = "s"\n[vehicle]\n' + lines(VEHICLE), "runs: missing"),
     ('signals = "s"\nruns = []\n[vehicle]\n' + lines(VEHICLE), "runs: "),
     ("signals = \n", "line 1"),

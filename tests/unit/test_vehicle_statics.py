@@ -1,10 +1,12 @@
 """Front share and payload position: statics of the sprung mass."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.core.vehicle import Vehicle, front_share_pct, payload_position_m
+from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct, payload_position_m
 
 vehicles = st.builds(
     Vehicle,
@@ -46,3 +48,21 @@ def test_without_payload_the_share_is_the_empty_one(van: Vehicle) -> None:
     assert front_share_pct(van, 0.0, 1.0) == van.empty_front_share_pct
     with pytest.raises(ZeroDivisionError):
         payload_position_m(van, 0.0, 50.0)
+
+
+@given(van=vehicles, load_kg=loads_kg, left_m=st.floats(-0.7, 0.7), empty_left_m=st.floats(-0.05, 0.05))
+def test_the_wheels_of_a_side_carry_what_the_moments_say(
+    van: Vehicle, load_kg: float, left_m: float, empty_left_m: float
+) -> None:
+    van = replace(van, empty_cg_left_m=empty_left_m)
+    track_m, total_kg = 1.5, van.empty_mass_kg + load_kg
+    left_kg = left_share_pct(cg_left_m(van, load_kg, left_m), track_m) / 100.0 * total_kg
+    moment_kgm = (left_kg - (total_kg - left_kg)) * track_m / 2.0
+    assert moment_kgm == pytest.approx(van.empty_mass_kg * empty_left_m + load_kg * left_m, abs=1e-6)
+
+
+def test_a_load_over_the_left_wheels_rests_on_them_alone() -> None:
+    van = Vehicle("van", empty_mass_kg=1240.0, wheelbase_m=2.8)
+    assert left_share_pct(cg_left_m(van, 0.0, 0.0), 1.5) == 50.0
+    assert left_share_pct(cg_left_m(van, 310.0, 0.75), 1.5) == pytest.approx(100.0 * (620.0 + 310.0) / 1550.0)
+    assert left_share_pct(cg_left_m(van, 310.0, -0.75), 1.5) == pytest.approx(100.0 * 620.0 / 1550.0)

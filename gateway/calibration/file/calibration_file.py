@@ -20,7 +20,7 @@ from gateway.calibration.file.parts import (
     VehiclePart,
 )
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import Vehicle, sensor_offset_left
 from gateway.errors import CalibrationFileError
 from gateway.toml_file import describe_faults
 
@@ -28,14 +28,14 @@ Content = dict[str, Any]
 FIRST_VERSION: Final = 1
 
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 2
+VERSION: Final = 3
 
 
 class CalibrationFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-calibration"] = FORMAT
-    version: Literal[2] = VERSION
+    version: Literal[3] = VERSION
     migrated_from: str | None = Field(
         None, description="id of the file of an older version that this content was read from; null: written as it is"
     )
@@ -161,8 +161,18 @@ def _to_version_2(content: Content) -> None:
             content["expected_errors"].setdefault(estimator, {"payload_rms_kg": None, "front_share_rms_pct": None})
 
 
+def _to_version_3(content: Content) -> None:
+    """Version 3 says where things are to the side. An offset of 0 was what stood there when nobody stated one."""
+    vehicle = content["vehicle"]
+    _, offset_std_m = sensor_offset_left(vehicle["sensor_offset_left_m"] or None)
+    vehicle |= {"sensor_offset_left_std_m": offset_std_m, "track_width_m": None, "empty_cg_left_m": 0.0}
+    vehicle |= {"front_wheel_limit_kg": None, "rear_wheel_limit_kg": None}
+    for run in content["provenance"]["runs"]:
+        run["payload_left_m"] = None
+
+
 # Entry v turns version v into v + 1. Entries are never edited, only added.
-MIGRATIONS: Final[Mapping[int, Callable[[Content], None]]] = MappingProxyType({1: _to_version_2})
+MIGRATIONS: Final[Mapping[int, Callable[[Content], None]]] = MappingProxyType({1: _to_version_2, 2: _to_version_3})
 
 
 def migrated(content: Content, version: int) -> Content:

@@ -204,6 +204,9 @@ class VehiclePart(Part):
     sensor_position_std_m: float
     empty_front_share_std_pct: float
     sensor_offset_left_m: float
+    sensor_offset_left_std_m: float
+    track_width_m: float | None
+    empty_cg_left_m: float
     unsprung_front_kg: float | None
     unsprung_rear_kg: float | None
     kerb_front_axle_kg: float | None
@@ -212,6 +215,8 @@ class VehiclePart(Part):
     front_axle_limit_kg: float | None
     rear_axle_limit_kg: float | None
     gross_limit_kg: float | None
+    front_wheel_limit_kg: float | None
+    rear_wheel_limit_kg: float | None
 
 
 class SeenPart(Part):
@@ -233,6 +238,7 @@ class RunPart(Part):
     sha256: str
     payload_kg: float
     front_share_pct: float
+    payload_left_m: float | None = Field(description="left of the vehicle's centre line; null: not noted")
     n_batches: int
 
 
