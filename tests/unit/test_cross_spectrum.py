@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.half_car_road import CAR, VAN, batch_of, batch_over_road, weighed
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.half_car import calibrate_cross_spectrum, fit_cross_spectrum
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
@@ -247,3 +247,21 @@ def test_a_vehicle_without_a_pitch_rate_is_told_that_both_sensors_are_needed() -
     silent = replace(batch, pitch_rate_radps=np.full(len(batch.pitch_rate_radps), np.nan))
     with pytest.raises(CalibrationImpossibleError, match="both sensors"):
         calibrate_cross_spectrum([KnownRun(1, "run", 0.0, 52.0, (silent,))], VAN)
+
+
+def test_a_run_left_out_teaches_the_others_nothing_by_its_label() -> None:
+    """What the others weigh it at must not have started from a fit that was told the answer."""
+    runs = [known_run(i, *load) for i, load in enumerate(KNOWN[:3])]
+    as_told = fit_cross_spectrum(runs, VAN).without
+    for i, run in enumerate(runs):
+        relabelled = [*runs[:i], replace(run, payload_kg=run.payload_kg + 80.0), *runs[i + 1 :]]
+        otherwise = fit_cross_spectrum(relabelled, VAN).without[run.number]
+        assert np.array_equal(as_told[run.number].parameters, otherwise.parameters)
+        assert np.array_equal(as_told[run.number].covariance, otherwise.covariance)
+        assert as_told[run.number].known_loads == otherwise.known_loads
+
+
+def test_every_step_of_a_fit_is_told() -> None:
+    told: list[tuple[int, int]] = []
+    fit_cross_spectrum([known_run(i, *load) for i, load in enumerate(KNOWN)], VAN, lambda *step: told.append(step))
+    assert told == [(i, len(told)) for i in range(1, len(told) + 1)]
