@@ -2,6 +2,8 @@
 
 import os
 import sys
+import threading
+from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -64,7 +66,19 @@ def springscale() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Entry point. A person's mistake ends in one clear line, never in a traceback."""
+    """Entry point. A person's mistake ends in one clear line, never in a traceback.
+
+    Without ``arguments`` they are the process's own, and it ends with the command.
+    """
+    try:
+        _call(arguments)
+    except SystemExit as leaving:
+        if arguments is None and any(thread.daemon for thread in threading.enumerate()):
+            _leave_threads_behind(leaving)
+        raise
+
+
+def _call(arguments: list[str] | None) -> None:
     try:
         springscale.main(args=arguments, prog_name="springscale")
     except SpringscaleError as fault:
@@ -78,6 +92,18 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+
+
+def _leave_threads_behind(leaving: SystemExit) -> None:
+    """End the process while threads that would not stop in time still work.
+
+    Python's own end unwinds them wherever they are; C++ code that must not throw (scipy's) then aborts the process.
+    """
+    code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # nobody reads it any more
+            stream.flush()
+    os._exit(code)
 
 
 def _workbench_install() -> str:

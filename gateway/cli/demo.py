@@ -50,8 +50,10 @@ def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
             store=StoreSection(directory=Path(folder)),
         )
         driver = _Driver(speed, is_endless=not once)
-        Gateway(settings, setup_of(settings), on_started=driver.start, known_loads=driver.known_loads).run()
-        driver.end()
+        try:
+            Gateway(settings, setup_of(settings), on_started=driver.start, known_loads=driver.known_loads).run()
+        finally:
+            driver.end()
         if once:
             _print_estimates(Path(folder), as_json)
 

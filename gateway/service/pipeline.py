@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from gateway.units import NS_PER_S
 from gateway.web import Board, boot_clock_s
 
 DRAIN_S = 0.1  # how long the inbox may gather before it is decoded: a hundred frames in one array operation
+STOP_WITHIN_S: Final = 6.0  # a full inbox holds several windows
 
 
 class SignalWatch:
@@ -85,7 +87,7 @@ class Pipeline:
         """Begin to read the inbox."""
         self._thread.start()
 
-    def stop(self, timeout_s: float = 1.0) -> None:
+    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
         """Take what is left in the inbox, close the open window, and end."""
         self._stop.set()
         self._thread.join(timeout_s)

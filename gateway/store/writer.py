@@ -23,6 +23,7 @@ from gateway.store.rows import CalibrationRow, EstimateRow, EventRow
 IDLE_S: Final = 60.0  # without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5
 RETRY_LAST_S: Final = 30.0
+STOP_WITHIN_S: Final = 3.0
 PAGE_OF_BAD: Final = 1000  # numbers of bad records that wait to be set aside; readers name them again
 
 
@@ -136,7 +137,7 @@ class Store:
         """False once the writer has ended, whether closed or dead."""
         return self._thread.is_alive()
 
-    def close(self, timeout_s: float = 1.0) -> int:
+    def close(self, timeout_s: float = STOP_WITHIN_S) -> int:
         """Write what is held, end the writer -> rows that could not be stored."""
         self._closing.set()
         self._held.wake()

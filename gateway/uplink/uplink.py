@@ -22,6 +22,7 @@ LOOK_S: Final = 5.0  # how often the backlog is counted
 ANSWER_TIMEOUT_S: Final = 30.0  # a broker that takes longer is as good as gone
 PAGE: Final = 100
 FIRST_PAUSE_S: Final = 1.0
+STOP_WITHIN_S: Final = 1.0
 
 
 class Link(Protocol):
@@ -62,7 +63,7 @@ class Uplink:
         """Begin to connect and to deliver."""
         self._thread.start()
 
-    def stop(self, timeout_s: float = 1.0) -> None:
+    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
         """Say goodbye to the broker and end; what is not delivered goes out after the next start."""
         self._stop.set()
         self._thread.join(timeout_s)

@@ -28,6 +28,7 @@ POLL_S: Final = 0.1  # longest wait inside a receiver: how soon a stop is heeded
 FIRST_PAUSE_S: Final = 0.25
 LONGEST_PAUSE_S: Final = 5.0
 START_WAIT_S: Final = 2.0
+STOP_WITHIN_S: Final = 2.0
 
 OpenReceiver = Callable[[], Receiver]
 
@@ -138,7 +139,7 @@ class LiveSource:
         self._thread.start()
         self._has_tried.wait(START_WAIT_S)
 
-    def stop(self, timeout_s: float = 2.0) -> None:
+    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
         """End the thread and close the channel. What the inbox holds can still be drained."""
         self._stopping.set()
         self.inbox.close()

@@ -3,7 +3,7 @@
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import uvicorn
 from fastapi import FastAPI
@@ -12,6 +12,8 @@ from gateway.errors import ConfigurationError
 from gateway.web.door.connection import GuardedConnection
 from gateway.web.door.guard import is_loopback
 from gateway.web.door.tls import TlsConfig, TlsDoor
+
+STOP_WITHIN_S: Final = 1  # for answers under way
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,7 @@ def server_config(app: FastAPI, host: str, port: int, tls: Tls | None = None) ->
         server_header=False,
         proxy_headers=False,  # the address of a client is the one it has, not the one it claims
         timeout_keep_alive=30,
-        timeout_graceful_shutdown=1,
+        timeout_graceful_shutdown=STOP_WITHIN_S,
         **({} if tls is None else _tls_settings(tls)),
     )
 

@@ -1,0 +1,35 @@
+"""``python -m support.stuck_service run --config FILE``: a service whose pipeline never ends, busy in compiled code."""
+
+import threading
+from collections.abc import Iterable
+
+import numpy as np
+import scipy.fft
+
+from gateway.cli import main
+from gateway.core.flow import Flow
+from gateway.estimate import Estimate
+from gateway.service.pipeline import Pipeline
+
+N_THREADS = 3  # so that one of them is inside whenever the process ends
+
+
+def spin() -> None:
+    """Without end in code that lets go of Python's lock."""
+    samples = np.ones((64, 600))
+    while True:
+        scipy.fft.rfft(samples)
+
+
+def never_flush(_flow: Flow) -> Iterable[Estimate]:
+    """The last window is never closed."""
+    for _ in range(N_THREADS - 1):
+        threading.Thread(target=spin, daemon=True).start()
+    spin()
+    return ()
+
+
+if __name__ == "__main__":
+    Flow.flush = never_flush  # type: ignore[assignment,method-assign]  # a fault, put in
+    Pipeline.stop.__defaults__ = (0.2,)
+    main()
