@@ -57,6 +57,12 @@ signal = "PitchRate"
 sign = 1                              # -1 where the device counts nose up
 valid_when = { GyroValid = 1 }
 
+[signals.roll_rate]                   # optional; the same sensor nearly always sends it
+message = "IMU_GYRO"
+signal = "RollRate"
+sign = 1                              # -1 where the device counts left side down
+valid_when = { GyroValid = 1 }
+
 [signals.speed]
 message = "GPS_SPEED"
 signal = "Speed"
@@ -91,6 +97,10 @@ signal = "VerticalAcceleration"
 message = "ARI"
 signal = "AngularRate1"
 
+[signals.roll_rate]
+message = "ARI"
+signal = "AngularRate2"
+
 [signals.speed]
 message = "CCVS1"
 signal = "WheelBasedVehicleSpeed"
@@ -98,6 +108,9 @@ signal = "WheelBasedVehicleSpeed"
 
 **channel.** Only for log files that hold several buses: frames of other channels are left out. The live channel is the
 one in `springscale.toml` ([settings](settings.md)).
+
+**roll_rate.** Without it a sensor beside the centre line takes roll for heave, and nothing tells where a load lies
+sideways. Where it fails (silent, stuck, saturated, too slow) a batch counts as if it were not mapped.
 
 **latency_s.** Samples are moved back by it, so that a late speed stands beside the motion it belongs to.
 
@@ -168,7 +181,7 @@ def _shipped() -> str:
     head = (
         'Say `signals = "springscale:NAME"`, or copy one from `dbc/` and change it: each says which axes its device\n'
     )
-    head += "has and where its pitch sign comes from.\n\n| map | device |\n|---|---|\n"
+    head += "has and where the signs of its rates come from.\n\n| map | device |\n|---|---|\n"
     return head + "\n".join(rows) + "\n"
 
 

@@ -23,7 +23,7 @@ def test_the_map_of_a_real_car_is_found_from_its_log(trip: str, tmp_path: Path) 
     assert not any(one["fits"] for one in told["maps"])  # mounted otherwise than canmod_gps.toml says
     mine, theirs = (
         {m.signal: (m.dbc_signal, m.to_si, m.valid_when) for message in one.messages for m in message.signals}
-        for one in (load_signal_map(tmp_path / "s.toml"), load_signal_map(folder / "signals.toml"))
+        for one in (load_signal_map(tmp_path / "s.toml"), load_signal_map(folder / "signals_roll.toml"))
     )
     assert {signal: mine[signal] for signal in theirs} == theirs
     assert mine.keys() - theirs.keys() == {Signal.LONGITUDINAL_ACCELERATION}

@@ -11,6 +11,7 @@ from gateway.records import Signal
 TYPICAL = {
     Signal.VERTICAL_ACCELERATION: (9.81, 2.0),
     Signal.PITCH_RATE: (0.0, 0.1),
+    Signal.ROLL_RATE: (0.0, 0.1),
     Signal.SPEED: (15.0, 1.0),
     Signal.LONGITUDINAL_ACCELERATION: (0.0, 1.0),
     Signal.WHEEL_SPEED: (15.0, 1.0),
@@ -77,7 +78,8 @@ def test_signals_of_one_message_travel_together():
 def test_messages_are_merged_in_order_of_time():
     signal_map = load_signal_map("springscale:reference")
     t_ns, samples = samples_of(signal_map, 50)
-    t_ns[Signal.PITCH_RATE] = t_ns[Signal.PITCH_RATE] + 3_000_000
+    for rate in (Signal.PITCH_RATE, Signal.ROLL_RATE):
+        t_ns[rate] = t_ns[rate] + 3_000_000
     frames = encode_signals(signal_map, t_ns, samples)
     assert (np.diff(frames.t_ns) >= 0).all()
     assert len(frames) == 150

@@ -11,9 +11,10 @@ from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import EXTENDED_ID, Frames, Signal
 
 RAD = math.pi / 180
-A, P, V, W, X = (
+A, P, R, V, W, X = (
     Signal.VERTICAL_ACCELERATION,
     Signal.PITCH_RATE,
+    Signal.ROLL_RATE,
     Signal.SPEED,
     Signal.WHEEL_SPEED,
     Signal.LONGITUDINAL_ACCELERATION,
@@ -39,29 +40,33 @@ J1939_RATES = (0x18F02A45 | EXTENDED_ID, struct.pack("<HHHH", 32256, 31360, 0xFF
 FRAMES = {
     "reference": [
         (0x120, struct.pack("<hhhBB", -1500, 20, 9810, 7, 1), {A: 9.81, X: -1.5}),
-        (0x121, struct.pack("<hhhBB", 10, -400, 30, 7, 1), {P: -2.0 * RAD}),
+        (0x121, struct.pack("<hhhBB", 10, -400, 30, 7, 1), {P: -2.0 * RAD, R: 0.05 * RAD}),
         (0x130, struct.pack("<HBB", 10_000, 12, 3), {V: 20.0}),
     ],
     "canmod_gps": [
-        # z: (9.75 + 64) / 0.125 = 590; y rate: (3.5 + 256) / 0.25 = 1038
-        (0x009, bits((0, 1), (1, 512), (11, 512), (21, 590), (31, 1024), (42, 1038)), {A: 9.75, P: 3.5 * RAD}),
+        # z: (9.75 + 64) / 0.125 = 590; x rate: (-1.25 + 256) / 0.25 = 1019; y rate: (3.5 + 256) / 0.25 = 1038
+        (
+            0x009,
+            bits((0, 1), (1, 512), (11, 512), (21, 590), (31, 1019), (42, 1038)),
+            {A: 9.75, P: 3.5 * RAD, R: -1.25 * RAD},
+        ),
         (0x007, bits((0, 1), (1, 12_345), (21, 99), length=5), {V: 12.345}),
     ],
-    "j1939": [*(f for f in J1939_FRAMES), (*J1939_RATES, {P: 2.0 * RAD})],
-    "j1939_aceinna": [(*J1939_RATES, {P: 5.0 * RAD})],
+    "j1939": [*(f for f in J1939_FRAMES), (*J1939_RATES, {P: 2.0 * RAD, R: -5.0 * RAD})],
+    "j1939_aceinna": [(*J1939_RATES, {P: 5.0 * RAD, R: 2.0 * RAD})],
     "pcan_gps": [
         (0x600, struct.pack("<hhhh", 0, 0, 256, 0), {A: 256 * 3.91e-3 * 9.80665}),
-        (0x610, struct.pack("<ff", 1.0, -2.5), {P: -2.5 * RAD}),
+        (0x610, struct.pack("<ff", 1.0, -2.5), {P: -2.5 * RAD, R: 1.0 * RAD}),
         (0x621, struct.pack("<ff", 123.0, 36.0), {V: 10.0}),
     ],
     "race_technology": [
         (0x094A6C21 | EXTENDED_ID, struct.pack("<hhhh", 0, 0, 0, 1000), {A: 9.80665}),
-        (0x094A6D21 | EXTENDED_ID, struct.pack("<hhhh", 0, 0, -150, 0), {P: -1.5 * RAD}),
+        (0x094A6D21 | EXTENDED_ID, struct.pack("<hhhh", 0, 70, -150, 25), {P: -1.5 * RAD, R: 0.25 * RAD}),
         (0x09567C22 | EXTENDED_ID, bits((16, 250_000)), {V: 25.0}),
     ],
     "xsens_mti": [
         (0x34, struct.pack(">hhh", 0, 0, 2511), {A: 2511 / 256}),
-        (0x32, struct.pack(">hhh", 0, -64, 0), {P: -0.125}),
+        (0x32, struct.pack(">hhh", 32, -64, 0), {P: -0.125, R: 0.0625}),
     ],
 }  # fmt: skip
 
@@ -88,7 +93,9 @@ def test_hand_computed_frames(name):
 
 
 @pytest.mark.parametrize("name", FRAMES)
-def test_every_shipped_map_says_which_axes_and_whence_the_pitch_sign(name):
+def test_every_shipped_map_says_which_axes_and_whence_its_signs(name):
     text = shipped_map(name).read_text()
     assert "Axes of the device" in text or "# Axes" in text
     assert "Pitch sign" in text
+    assert "Roll sign" in text
+    assert Signal.ROLL_RATE in load_signal_map(f"springscale:{name}").signals

@@ -98,6 +98,9 @@ def test_a_box_on_its_side_is_mapped_by_gravity_and_braking(box: Path, tmp_path:
     assert (mapped[Signal.VERTICAL_ACCELERATION].dbc_signal, mapped[Signal.VERTICAL_ACCELERATION].to_si) == ("AccY", -1)
     assert mapped[Signal.PITCH_RATE].dbc_signal == "GyroX"
     assert mapped[Signal.PITCH_RATE].to_si == pytest.approx(np.pi / 180.0)
+    # the rate about +z is positive right side up where z points rearward
+    assert mapped[Signal.ROLL_RATE].dbc_signal == "GyroZ"
+    assert mapped[Signal.ROLL_RATE].to_si == pytest.approx(-np.pi / 180.0)
     assert mapped[Signal.LONGITUDINAL_ACCELERATION].dbc_signal == "AccZ"
     assert mapped[Signal.LONGITUDINAL_ACCELERATION].to_si == -1
     assert mapped[Signal.VERTICAL_ACCELERATION].counter is not None

@@ -40,6 +40,7 @@ def test_what_goes_onto_the_bus_comes_back(name: str, recording: Recording) -> N
     wanted = {
         Signal.VERTICAL_ACCELERATION: (recording.imu_t_ns, recording.accel_mps2[:, 2]),
         Signal.PITCH_RATE: (recording.imu_t_ns, recording.gyro_radps[:, 1]),
+        Signal.ROLL_RATE: (recording.imu_t_ns, recording.gyro_radps[:, 0]),
         Signal.SPEED: (recording.gps_t_ns[recording.gps_fix], recording.gps_speed_mps[recording.gps_fix]),
     }
     assert 0.5 < np.mean(recording.gps_fix) < 1.0
@@ -116,6 +117,7 @@ def test_batches_from_the_log_are_those_from_the_arrays(tmp_path: Path) -> None:
         for name, tolerance in (
             ("vertical_acceleration_mps2", 3e-3),
             ("pitch_rate_radps", 1e-4),
+            ("roll_rate_radps", 1e-4),
             ("speed_mps", 2e-3),
         ):
             apart = np.abs(getattr(read, name)[known] - getattr(direct, name)[known])
@@ -124,11 +126,12 @@ def test_batches_from_the_log_are_those_from_the_arrays(tmp_path: Path) -> None:
 
 def motion_of_arrays(recording: Recording) -> Motion:
     """Rows as the decoder would make them, of the recording's own numbers, stamped in microseconds as a log is."""
-    signals = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
+    signals = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE, Signal.SPEED)
     fixed = recording.gps_fix
     parts = (
         (recording.imu_t_ns, recording.accel_mps2[:, 2]),
         (recording.imu_t_ns + 250_000, recording.gyro_radps[:, 1]),
+        (recording.imu_t_ns + 250_000, recording.gyro_radps[:, 0]),
         (recording.gps_t_ns[fixed], recording.gps_speed_mps[fixed]),
     )
     columns = np.full((sum(len(t_ns) for t_ns, _ in parts), len(signals)), np.nan)

@@ -15,6 +15,7 @@ from gateway.offline.look.roles import Found
 from gateway.records import I64, Signal
 
 MOSTLY: Final = 0.5
+COUNTED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)  # timed by the message counter
 COUNTER_BITS: Final = range(2, 33)
 FIX_3D: Final = 3
 _COUNTER_WORDS: Final = ("counter", "count", "alive", "sequence", "seq")
@@ -83,7 +84,7 @@ def _entry(found: Found) -> Iterator[str]:
     if condition is not None:
         yield f"valid_when = {{ {_toml_key(condition[0])} = {condition[1]} }}"
     counter = _counter(found.reading.described)
-    if counter is not None and found.role in (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE):
+    if counter is not None and found.role in COUNTED:
         yield f"counter = {_toml(counter)}"
 
 

@@ -1,8 +1,8 @@
 """Which signal is which of ours: the axis that carries gravity, the one that braking shows, the one they leave.
 
 Gravity shows the axis that is up, and the horizontal acceleration that goes with the change of speed the one that lies
-along the vehicle. Left is up x forward (ISO 8855), and the rate about left is the pitch rate, by the right-hand rule
-that gyroscopes follow. A name that says "pitch" is believed before that.
+along the vehicle. Left is up x forward (ISO 8855). The rate about left is the pitch rate and the one about forward the
+roll rate, by the right-hand rule that gyroscopes follow. A name that says "pitch" or "roll" is believed before that.
 """
 
 import math
@@ -26,6 +26,12 @@ _NO_SPEED: Final = re.compile(r"accura|error|std|dev|limit|vert|max|min|set|_[xy
 _SPEED: Final = re.compile(r"speed|vel|sog|spd", re.IGNORECASE)
 _WORDS: Final = {"vertical": "z", "longitudinal": "x", "forward": "x", "lateral": "y", "transverse": "y"}
 _AXES: Final = "xyz"
+_PITCH: Final = re.compile(r"pitch", re.IGNORECASE)
+_ROLL: Final = re.compile(r"(?<!nt)roll", re.IGNORECASE)  # no controller
+_CHECK: Final = {
+    Signal.PITCH_RATE: "it must go up as braking begins, else sign = -1",
+    Signal.ROLL_RATE: "it must go up as a bend to the left begins, else sign = -1",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +52,8 @@ def roles_of(readings: Sequence[Reading]) -> tuple[Found, ...]:
     found = [each for each in (up, speed) if each]
     if up is not None:
         forward = _forward(readings, up, speed)
-        found += [each for each in (forward, _pitch(readings, up, forward)) if each]
+        pitch, roll = _pitch(readings, up, forward), _roll(readings, up, forward)
+        found += [each for each in (forward, pitch, roll) if each]
     return tuple(sorted(found, key=lambda each: list(Signal).index(each.role)))
 
 
@@ -129,19 +136,34 @@ def _second_by_second(t_s: F64, x: F64, n: int) -> F64:
 
 def _pitch(readings: Sequence[Reading], up: Found, forward: Found | None) -> Found | None:
     """The rate about the axis that points left."""
-    rates = [r for r in readings if r.quantity == "angular_rate" and r.described.heard.channel == _channel(up)]
-    rates.sort(key=lambda r: (r.described is not up.reading.described, -round(r.rate_hz)))
-    axis, sign, is_sure = _left(up, forward)
-    named = next((r for r in rates if "pitch" in r.signal.name.lower() and "accel" not in r.signal.name.lower()), None)
-    if named is not None:
-        why = "its name says so; its sign is not: it must go up as braking begins, else sign = -1"
-        return Found(Signal.PITCH_RATE, named, 1, why, is_sure=False)
-    about = next((r for r in rates if axis and axis_of(r.signal.name) == axis), None)
-    if about is None:
-        return None
-    why = "the rate about left = up x forward"
+    named = _named(readings, up, Signal.PITCH_RATE, _PITCH)
+    return named or _about(readings, up, Signal.PITCH_RATE, _left(up, forward), "the rate about left = up x forward")
+
+
+def _roll(readings: Sequence[Reading], up: Found, forward: Found | None) -> Found | None:
+    """The rate about the axis that points forward."""
+    named = _named(readings, up, Signal.ROLL_RATE, _ROLL)
+    return named or _about(readings, up, Signal.ROLL_RATE, _ahead(up, forward), "the rate about forward")
+
+
+def _named(readings: Sequence[Reading], up: Found, role: Signal, word: re.Pattern[str]) -> Found | None:
+    """The rate whose name has the word in it; a name says no sign."""
+    fit = [r for r in _rates(readings, up) if word.search(r.signal.name) and "accel" not in r.signal.name.lower()]
+    return Found(role, fit[0], 1, f"its name says so; its sign is not: {_CHECK[role]}", is_sure=False) if fit else None
+
+
+def _about(readings: Sequence[Reading], up: Found, role: Signal, axis: tuple[str, int, bool], why: str) -> Found | None:
+    """The rate about an axis, by its name, its sign, and whether it was measured."""
+    name, sign, is_sure = axis
+    about = next((r for r in _rates(readings, up) if name and axis_of(r.signal.name) == name), None)
     unsure = "" if is_sure else "; that x points forward is a guess: no braking shows it"
-    return Found(Signal.PITCH_RATE, about, sign, why + unsure, is_sure)
+    return None if about is None else Found(role, about, sign, why + unsure, is_sure)
+
+
+def _rates(readings: Sequence[Reading], up: Found) -> list[Reading]:
+    """The angular rates of the same channel, those of the same message first, then the fastest."""
+    rates = [r for r in readings if r.quantity == "angular_rate" and r.described.heard.channel == _channel(up)]
+    return sorted(rates, key=lambda r: (r.described is not up.reading.described, -round(r.rate_hz)))
 
 
 def _channel(found: Found) -> str | None:
@@ -149,14 +171,21 @@ def _channel(found: Found) -> str | None:
 
 
 def _left(up: Found, forward: Found | None) -> tuple[str, int, bool]:
-    """The axis along left, its sign, and whether it was measured; with z up and nothing else known, x is forward."""
-    up_axis = axis_of(up.reading.signal.name)
-    ahead, ahead_sign = ("x", 1) if forward is None else (axis_of(forward.reading.signal.name), forward.sign)
-    if not up_axis or not ahead or up_axis == ahead:
+    """The axis along left, its sign, and whether it was measured."""
+    ahead, ahead_sign, is_sure = _ahead(up, forward)
+    if not ahead:
         return "", 1, False
+    up_axis = axis_of(up.reading.signal.name)
     turns = np.cross(up.sign * np.eye(3)[_AXES.index(up_axis)], ahead_sign * np.eye(3)[_AXES.index(ahead)])
     left = int(np.argmax(np.abs(turns)))
-    return _AXES[left], int(np.sign(turns[left])), forward is not None
+    return _AXES[left], int(np.sign(turns[left])), is_sure
+
+
+def _ahead(up: Found, forward: Found | None) -> tuple[str, int, bool]:
+    """The axis along forward, its sign, and whether it was measured; with z up and nothing else known, x is forward."""
+    ahead, sign = ("x", 1) if forward is None else (axis_of(forward.reading.signal.name), forward.sign)
+    up_axis = axis_of(up.reading.signal.name)
+    return (ahead, sign, forward is not None) if up_axis and ahead and up_axis != ahead else ("", 1, False)
 
 
 def _speed(readings: Iterable[Reading]) -> Found | None:
