@@ -9,6 +9,7 @@ from gateway.core.estimator import estimate
 from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, fused, summary
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
+from gateway.core.stated_share import told
 from gateway.core.tare import Tare, Weighed, remembered, tared
 from gateway.estimate import Epoch, Estimate
 from gateway.records import Batch, Motion
@@ -69,11 +70,15 @@ class Flow:
         found = replace(found, vehicle_id=self._identity.vehicle_id, vin=self._identity.vin)
         if batch.is_provisional:
             self._is_epoch_over |= batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
-            return tared(found, self.tare)
-        shown = tared(replace(found, epoch=self._fused(batch, found)), self.tare)
+            return self._shown(found)
+        shown = self._shown(replace(found, epoch=self._fused(batch, found)))
         self.weighed = remembered(self.weighed, self._epoch, shown, batch.drive_start_ns)
         self._is_epoch_over = self._epoch is None
         return shown
+
+    def _shown(self, found: Estimate) -> Estimate:
+        """As it leaves; epochs and tares are made of what was measured."""
+        return tared(told(found, self._calibrated.vehicle if self._calibrated else None), self.tare)
 
     def _fused(self, batch: Batch, found: Estimate) -> Epoch | None:
         """The load epoch that this batch belongs to; a new drive or a long stop opens a new one."""

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
+from gateway.core.stated_share import measured
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Z95, Quantity
 
@@ -78,7 +79,7 @@ def place_of(vehicle: Vehicle, payload: Quantity, front_share: Quantity, correla
         d = l (1 - F / L),    F = s (M + L) - s0 M,    the part of L that rests on the front axle,
 
     the inverse of equation (3) of Bottelli et al. The deviation is of first order in L and s, whose errors have this
-    ``correlation``.
+    ``correlation``; what the empty share adds to that of s (core.stated_share) is in s0 too, and drops out.
     """
     if not payload.number > Z95 * payload.std:
         return None
@@ -86,7 +87,8 @@ def place_of(vehicle: Vehicle, payload: Quantity, front_share: Quantity, correla
     total_kg = vehicle.empty_mass_kg + payload.number
     front_share_of_load = (share * total_kg - empty_share * vehicle.empty_mass_kg) / payload.number
     by_payload = (share - front_share_of_load) / payload.number * payload.std
-    by_share = total_kg / payload.number * front_share.std / 100.0
+    share_std_pct, correlation = measured(payload, front_share, correlation, vehicle)
+    by_share = total_kg / payload.number * share_std_pct / 100.0
     position = 1.0 - front_share_of_load  # in wheelbases
     return Place(vehicle.wheelbase_m * position, vehicle.wheelbase_m * _together(by_payload, by_share, correlation))
 
