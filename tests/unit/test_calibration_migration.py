@@ -27,7 +27,8 @@ def test_an_old_file_keeps_its_id_and_all_it_said(tmp_path: Path) -> None:
     assert today.seen.roughness_mps2 is None
     said = json.loads(today.to_json())
     assert said["expected_errors"] == {"ratio_index": {"payload_rms_kg": None, "front_share_rms_pct": None}}
-    for part in ("ratio_index", "cross_spectrum", "warnings"):
+    assert said["ratio_index"] == old["ratio_index"] | {"roll_lever_m": 0.0}
+    for part in ("cross_spectrum", "warnings"):
         assert said[part] == old[part]
     for part in ("seen", "vehicle"):
         assert said[part].items() >= old[part].items()

@@ -172,6 +172,8 @@ def _to_version_3(content: Content) -> None:
     _, offset_std_m = sensor_offset_left(vehicle["sensor_offset_left_m"] or None)
     vehicle |= {"sensor_offset_left_std_m": offset_std_m, "track_width_m": None, "empty_cg_left_m": 0.0}
     vehicle |= {"front_wheel_limit_kg": None, "rear_wheel_limit_kg": None}
+    if content["ratio_index"] is not None:
+        content["ratio_index"]["roll_lever_m"] = 0.0
     for run in content["provenance"]["runs"]:
         run["payload_left_m"] = None
 

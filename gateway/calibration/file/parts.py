@@ -94,6 +94,10 @@ class RatioIndexPart(Part):
     front_share: RegressionPart | None
     speed_range_mps: tuple[float, float]
     speed_std_max_mps: float = Field(gt=0.0)
+    roll_lever_m: float = Field(
+        description="the sensor's place left of the centre line, from where the roll rate moves the acceleration to "
+        "that line; 0: the acceleration is taken as measured"
+    )
 
     @classmethod
     def of(cls, calibration: RatioIndexCalibration) -> "RatioIndexPart":
@@ -107,6 +111,7 @@ class RatioIndexPart(Part):
             front_share=_regression_part(calibration.front_share),
             speed_range_mps=calibration.speed_range_mps,
             speed_std_max_mps=calibration.speed_std_max_mps,
+            roll_lever_m=calibration.roll_lever_m,
         )
 
     def for_core(self) -> RatioIndexCalibration:
@@ -120,6 +125,7 @@ class RatioIndexPart(Part):
             front_share=self.front_share.for_core() if self.front_share else None,
             speed_range_mps=self.speed_range_mps,
             speed_std_max_mps=self.speed_std_max_mps,
+            roll_lever_m=self.roll_lever_m,
         )
 
 

@@ -88,7 +88,7 @@ def fit_ratio_index(
 
     ``progress`` is called with (steps done, steps in all).
     """
-    table = spectrum_table(runs)
+    table = spectrum_table(runs, vehicle.sensor_offset_left_m)
     trials = _family_trials(table, vehicle, bands, FAMILIES if structure == "auto" else (structure,), progress)
     chosen = trials[0]
     batches = [batch for run in runs for batch in run.batches if not batch.rejected]
@@ -103,6 +103,7 @@ def fit_ratio_index(
         front_share=None,
         speed_range_mps=(min(speeds_mps), max(speeds_mps)),
         speed_std_max_mps=SPEED_STD_FACTOR * max(speed_stds_mps),
+        roll_lever_m=table.roll_lever_m,
     )
     models = chosen.choice.models
     widening = [_widening(model, chosen, target) for target, model in enumerate(models)]

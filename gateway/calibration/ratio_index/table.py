@@ -7,7 +7,13 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
-from gateway.core.ratio_index.index import SpectrumKind, mean_spectrum
+from gateway.core.ratio_index.index import (
+    SpectrumKind,
+    acceleration_segments,
+    acceleration_spectrum,
+    is_moved,
+    mean_spectrum,
+)
 from gateway.core.spectrum import segment_starts
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, I64, Batch, Bool
@@ -22,7 +28,7 @@ class SpectrumTable:
 
     run (n,) tells drives apart, 0 for the first in the table, number (n,) is the campaign's; targets (n,) in kg
     and percent; spectra (n, m) at freq_hz (m,), absent (None) where the sensor is not mapped; n_segments (n,)
-    averaged in each.
+    averaged in each. The acceleration's are moved to the centre line from roll_lever_m left of it; 0: as measured.
     """
 
     run: I64
@@ -31,6 +37,7 @@ class SpectrumTable:
     freq_hz: F64
     spectra: tuple[F64 | None, F64 | None]
     n_segments: F64
+    roll_lever_m: float = 0.0
 
     @property
     def n_runs(self) -> int:
@@ -60,14 +67,20 @@ class SpectrumTable:
         )
 
 
-def spectrum_table(runs: Sequence[KnownRun]) -> SpectrumTable:
+def spectrum_table(runs: Sequence[KnownRun], sensor_offset_left_m: float = 0.0) -> SpectrumTable:
     """Every counted batch of which both mapped sensors give a spectrum; runs sorted by name, then by time.
 
-    Raises CalibrationImpossibleError where there is none.
+    With a roll rate in every batch the acceleration is that of the centre line, sensor_offset_left_m to the right of
+    the sensor; else all are taken as measured. Raises CalibrationImpossibleError where there is no spectrum.
     """
     batches = [(run, batch) for run in runs for batch in run.batches if not batch.rejected]
     batches.sort(key=lambda one: (one[0].name, one[1].t_start_ns, one[0].payload_kg, one[0].number))
-    rows = [(run, batch, *_spectra(batch)) for run, batch in batches]
+    rows = [(run, batch, *_spectra(batch, 0.0)) for run, batch in batches]
+    heard = [batch for _, batch, a, _ in rows if a is not None]
+    roll_lever_m = 0.0
+    if heard and all(is_moved(batch, N_SEGMENT, sensor_offset_left_m) for batch in heard):
+        roll_lever_m = sensor_offset_left_m
+        rows = [(run, batch, *_spectra(batch, roll_lever_m)) for run, batch in batches]
     has_a = any(a is not None for _, _, a, _ in rows)
     has_g = any(g is not None for _, _, _, g in rows)
     whole = [row for row in rows if (row[2] is not None or not has_a) and (row[3] is not None or not has_g)]
@@ -87,22 +100,20 @@ def spectrum_table(runs: Sequence[KnownRun]) -> SpectrumTable:
             np.array([a[1] for _, _, a, _ in whole if a is not None]) if has_a else None,
             np.array([g[1] for _, _, _, g in whole if g is not None]) if has_g else None,
         ),
-        n_segments=np.array([_n_segments(batch) for _, batch, _, _ in whole]),
+        n_segments=np.array([_n_segments(batch, roll_lever_m) for _, batch, _, _ in whole]),
+        roll_lever_m=roll_lever_m,
     )
 
 
-def _spectra(batch: Batch) -> tuple[tuple[F64, F64] | None, tuple[F64, F64] | None]:
-    a, g = (
-        mean_spectrum(x, batch.usable, N_SEGMENT, batch.rate_hz, SPECTRUM)
-        for x in (batch.vertical_acceleration_mps2, batch.pitch_rate_radps)
+def _spectra(batch: Batch, roll_lever_m: float) -> tuple[tuple[F64, F64] | None, tuple[F64, F64] | None]:
+    return (
+        acceleration_spectrum(batch, N_SEGMENT, SPECTRUM, roll_lever_m),
+        mean_spectrum(batch.pitch_rate_radps, batch.usable, N_SEGMENT, batch.rate_hz, SPECTRUM),
     )
-    return a, g
 
 
-def _n_segments(batch: Batch) -> float:
+def _n_segments(batch: Batch, roll_lever_m: float) -> float:
     """The fewer of the two sensors' segments, a silent one left out."""
-    counts = [
-        len(segment_starts(batch.usable & np.isfinite(x), N_SEGMENT, N_SEGMENT // 2))
-        for x in (batch.vertical_acceleration_mps2, batch.pitch_rate_radps)
-    ]
-    return float(min(count for count in counts if count > 0))
+    of_a = acceleration_segments(batch, N_SEGMENT, roll_lever_m)
+    of_g = segment_starts(batch.usable & np.isfinite(batch.pitch_rate_radps), N_SEGMENT, N_SEGMENT // 2)
+    return float(min(len(starts) for starts in (of_a, of_g) if len(starts)))

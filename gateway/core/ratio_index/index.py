@@ -2,6 +2,8 @@
 
 Two narrow bands are cut from the spectrum of vertical acceleration (and two from that of pitch
 rate); the ratio of what passes through them moves with the load because the body's resonances do.
+
+A sensor beside the centre line takes roll for heave: with a roll rate its acceleration is moved to that line first.
 """
 
 from dataclasses import dataclass
@@ -11,7 +13,7 @@ import numpy as np
 
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
-from gateway.records import F64, Batch, Bool
+from gateway.records import C128, F64, I64, Batch, Bool
 
 UPPER_LIMIT_HZ = 10.0  # of the integrals (7) and (8)
 MIN_SEGMENTS = 6
@@ -38,7 +40,8 @@ class RatioIndexCalibration:
     """What the ratio index needs to know of a vehicle; bands belong to it and come from its calibration.
 
     Each pair of bands is (numerator, denominator). A model is absent where its sensor or the other
-    is; speeds are the batch means seen in calibration.
+    is; speeds are the batch means seen in calibration. The acceleration was moved to the centre line from
+    roll_lever_m left of it; 0: taken as measured.
     """
 
     spectrum: SpectrumKind
@@ -49,6 +52,7 @@ class RatioIndexCalibration:
     front_share: RegressionModel | None
     speed_range_mps: tuple[float, float]
     speed_std_max_mps: float
+    roll_lever_m: float = 0.0
 
 
 def band_pass_gain(freq_hz: F64, band: Band) -> F64:
@@ -71,11 +75,54 @@ def mean_spectrum(x: F64, usable: Bool, n_segment: int, rate_hz: float, kind: Sp
     starts = segment_starts(usable & np.isfinite(x), n_segment, n_segment // 2)
     if len(starts) < MIN_SEGMENTS:
         return None
+    return _mean(segment_transforms(x, starts, n_segment, rate_hz), n_segment, rate_hz, kind)
+
+
+def _mean(transforms: C128, n_segment: int, rate_hz: float, kind: SpectrumKind) -> tuple[F64, F64]:
     freq_hz = frequencies_hz(n_segment, rate_hz)
     wanted = (freq_hz > 0.0) & (freq_hz <= UPPER_LIMIT_HZ)
-    magnitude = np.abs(segment_transforms(x, starts, n_segment, rate_hz)[:, wanted])
+    magnitude = np.abs(transforms[:, wanted])
     spectrum = np.mean(magnitude if kind == "amplitude" else magnitude**2, axis=0)
     return freq_hz[wanted], spectrum
+
+
+def acceleration_spectrum(
+    batch: Batch, n_segment: int, kind: SpectrumKind, roll_lever_m: float
+) -> tuple[F64, F64] | None:
+    """The vertical acceleration's mean spectrum, on the centre line where the roll rate brings it there.
+
+    A point y metres left of the centre line of a rigid body moves up by heave + y roll (ISO 8855), so that there
+    a = a_y - y d(roll rate)/dt, and a derivative is a factor j 2 pi f. The taper's own slope is left out: of the roll
+    acceleration about 1 / (2 T f) for segments of T seconds, 0.015 at 1.7 Hz. As measured where there is no lever, and
+    where the roll rate is known in too few segments (:func:`is_moved`).
+    """
+    x, usable = batch.vertical_acceleration_mps2, batch.usable
+    if not is_moved(batch, n_segment, roll_lever_m) or batch.roll_rate_radps is None:
+        return mean_spectrum(x, usable, n_segment, batch.rate_hz, kind)
+    starts = acceleration_segments(batch, n_segment, roll_lever_m)
+    sideways = segment_transforms(batch.roll_rate_radps, starts, n_segment, batch.rate_hz)
+    sideways *= 2j * np.pi * roll_lever_m * frequencies_hz(n_segment, batch.rate_hz)
+    return _mean(segment_transforms(x, starts, n_segment, batch.rate_hz) - sideways, n_segment, batch.rate_hz, kind)
+
+
+def is_moved(batch: Batch, n_segment: int, roll_lever_m: float) -> bool:
+    """Whether there is a lever, and the roll rate is known in enough segments to do without the others."""
+    return roll_lever_m != 0.0 and len(_rolling(batch, n_segment)) >= MIN_SEGMENTS
+
+
+def acceleration_segments(batch: Batch, n_segment: int, roll_lever_m: float) -> I64:
+    """First samples (k,) of the segments that :func:`acceleration_spectrum` is a mean of."""
+    if is_moved(batch, n_segment, roll_lever_m):
+        return _rolling(batch, n_segment)
+    return segment_starts(batch.usable & np.isfinite(batch.vertical_acceleration_mps2), n_segment, n_segment // 2)
+
+
+def _rolling(batch: Batch, n_segment: int) -> I64:
+    """First samples (k,) of the segments in which acceleration and roll rate are known."""
+    if batch.roll_rate_radps is None:
+        return np.empty(0, np.int64)
+    known = np.isfinite(batch.vertical_acceleration_mps2) & np.isfinite(batch.roll_rate_radps)
+    return segment_starts(batch.usable & known, n_segment, n_segment // 2)
 
 
 def ratio_index(freq_hz: F64, spectrum: F64, bands: tuple[Band, Band], kind: SpectrumKind) -> float:
@@ -87,16 +134,14 @@ def ratio_index(freq_hz: F64, spectrum: F64, bands: tuple[Band, Band], kind: Spe
 
 def indexes_of(batch: Batch, calibration: RatioIndexCalibration) -> tuple[float, float]:
     """R_a and R_g of a batch; NaN where the sensor is not calibrated or too few segments fit."""
-    pairs = (
-        (batch.vertical_acceleration_mps2, calibration.acceleration_bands),
-        (batch.pitch_rate_radps, calibration.pitch_rate_bands),
-    )
-    found = [_index(x, bands, batch, calibration) for x, bands in pairs]
-    return found[0], found[1]
+    n_segment, kind = calibration.n_segment, calibration.spectrum
+    ra = rg = None
+    if calibration.acceleration_bands is not None:
+        ra = acceleration_spectrum(batch, n_segment, kind, calibration.roll_lever_m)
+    if calibration.pitch_rate_bands is not None:
+        rg = mean_spectrum(batch.pitch_rate_radps, batch.usable, n_segment, batch.rate_hz, kind)
+    return _index(ra, calibration.acceleration_bands, kind), _index(rg, calibration.pitch_rate_bands, kind)
 
 
-def _index(x: F64, bands: tuple[Band, Band] | None, batch: Batch, calibration: RatioIndexCalibration) -> float:
-    if bands is None:
-        return float("nan")
-    seen = mean_spectrum(x, batch.usable, calibration.n_segment, batch.rate_hz, calibration.spectrum)
-    return float("nan") if seen is None else ratio_index(*seen, bands, calibration.spectrum)
+def _index(seen: tuple[F64, F64] | None, bands: tuple[Band, Band] | None, kind: SpectrumKind) -> float:
+    return float("nan") if seen is None or bands is None else ratio_index(*seen, bands, kind)

@@ -1,0 +1,179 @@
+"""A sensor beside the centre line takes roll for heave; the roll rate takes it back out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gateway.bus.signals import Decoder, load_signal_map
+from gateway.calibration.file import RatioIndexPart
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.ratio_index.table import spectrum_table
+from gateway.core.ratio_index.index import (
+    PAPER_BANDS,
+    RatioIndexCalibration,
+    acceleration_spectrum,
+    indexes_of,
+    mean_spectrum,
+)
+from gateway.core.settings import BatchSettings
+from gateway.offline.batches import batches_of_motion
+from gateway.records import F64, Batch
+from gateway.sim.drive import constant
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import simulate_drive
+from gateway.sim.sensors import Gps, Imu, Mount, Sensors
+from gateway.sim.vans import PAPER_VAN
+from gateway.sim.vehicle import Load
+from gateway.workbench.wiring import Wiring
+
+N, RATE_HZ, N_SEGMENT = 9_000, 50.0, 1024
+FREQ_HZ = np.fft.rfftfreq(N, 1.0 / RATE_HZ)
+
+
+def moving(seed: int) -> tuple[F64, F64]:
+    """White motion from 0.5 to 10 Hz and its derivative, exactly."""
+    rng = np.random.default_rng(seed)
+    inside = np.abs(FREQ_HZ - 5.25) < 4.75
+    spectrum = (rng.standard_normal(len(FREQ_HZ)) + 1j * rng.standard_normal(len(FREQ_HZ))) * inside
+    return np.fft.irfft(spectrum, N), np.fft.irfft(2j * np.pi * FREQ_HZ * spectrum, N)
+
+
+def batch_of(acceleration: F64, roll_rate: F64 | None) -> Batch:
+    return Batch(
+        t_start_ns=0,
+        t_end_ns=N * 20_000_000,
+        drive_start_ns=0,
+        rate_hz=RATE_HZ,
+        vertical_acceleration_mps2=acceleration,
+        pitch_rate_radps=acceleration[::-1].copy(),
+        speed_mps=np.full(N, 15.0),
+        usable=np.ones(N, bool),
+        gravity_mps2=9.81,
+        gap_share=0.0,
+        shares={},
+        roll_rate_radps=roll_rate,
+    )
+
+
+def calibration(roll_lever_m: float) -> RatioIndexCalibration:
+    return RatioIndexCalibration(
+        "amplitude",
+        N_SEGMENT,
+        PAPER_BANDS["acceleration"],
+        PAPER_BANDS["pitch_rate"],
+        None,
+        None,
+        (14.0, 16.0),
+        1.0,
+        roll_lever_m,
+    )
+
+
+@pytest.mark.parametrize("lever_m", [0.4, -0.25])
+def test_pure_roll_is_no_motion_of_the_centre_line(lever_m: float) -> None:
+    """A sensor y metres left of it sees y times the roll acceleration, and nothing is left of that but the taper's."""
+    rate, acceleration = moving(1)
+    batch = batch_of(lever_m * acceleration, rate)
+    seen = acceleration_spectrum(batch, N_SEGMENT, "amplitude", 0.0)
+    moved = acceleration_spectrum(batch, N_SEGMENT, "amplitude", lever_m)
+    wrong = acceleration_spectrum(batch, N_SEGMENT, "amplitude", -lever_m)
+    assert seen is not None
+    assert moved is not None
+    assert wrong is not None
+    shaken = (seen[0] > 1.0) & (seen[0] < 9.5)
+    left_over = moved[1][shaken] / seen[1][shaken]
+    assert np.max(left_over * seen[0][shaken]) < 0.15  # falls as 1/f
+    assert np.mean(left_over) < 0.02
+    assert wrong[1][shaken] == pytest.approx(2.0 * seen[1][shaken], rel=0.1)  # turned over it counts twice
+
+
+def test_with_roll_taken_out_what_is_left_is_heave() -> None:
+    (_, heave), (rate, roll) = moving(2), moving(3)
+    on_line = acceleration_spectrum(batch_of(heave, None), N_SEGMENT, "power", 0.0)
+    moved = acceleration_spectrum(batch_of(heave + 0.3 * roll, rate), N_SEGMENT, "power", 0.3)
+    assert on_line is not None
+    assert moved is not None
+    shaken = (moved[0] > 1.0) & (moved[0] < 9.5)
+    assert moved[1][shaken] == pytest.approx(on_line[1][shaken], rel=0.05)
+
+
+@settings(max_examples=10, derandomize=True)
+@given(seed=st.integers(0, 2**31), lever_m=st.floats(-1.0, 1.0))
+def test_without_a_roll_rate_or_without_a_lever_nothing_changes(seed: int, lever_m: float) -> None:
+    rate, acceleration = moving(seed)
+    plain = batch_of(acceleration, None)
+    silent = batch_of(acceleration, np.full(N, np.nan))
+    told = batch_of(acceleration, rate)
+    as_it_was = mean_spectrum(acceleration, plain.usable, N_SEGMENT, RATE_HZ, "amplitude")
+    assert as_it_was is not None
+    for batch, lever in ((plain, lever_m), (silent, lever_m), (told, 0.0)):
+        found = acceleration_spectrum(batch, N_SEGMENT, "amplitude", lever)
+        assert found is not None
+        np.testing.assert_array_equal(found[1], as_it_was[1])
+        assert indexes_of(batch, calibration(lever)) == indexes_of(plain, calibration(0.0))
+
+
+def test_segments_without_a_roll_rate_are_left_out_while_enough_are_left() -> None:
+    rate, acceleration = moving(4)
+    half = np.where(np.arange(N) < N // 2, rate, np.nan)
+    moved = acceleration_spectrum(batch_of(0.4 * acceleration, half), N_SEGMENT, "amplitude", 0.4)
+    seen = acceleration_spectrum(batch_of(0.4 * acceleration, None), N_SEGMENT, "amplitude", 0.4)
+    few = acceleration_spectrum(
+        batch_of(0.4 * acceleration, np.where(np.arange(N) < 3000, rate, np.nan)), N_SEGMENT, "amplitude", 0.4
+    )
+    assert moved is not None
+    assert seen is not None
+    assert few is not None
+    assert np.sum(moved[1]) < 0.1 * np.sum(seen[1])
+    np.testing.assert_array_equal(few[1], seen[1])
+
+
+def runs(*roll_rates: F64 | None) -> list[KnownRun]:
+    batches = [batch_of(moving(10 + i)[0], roll_rate) for i, roll_rate in enumerate(roll_rates)]
+    return [KnownRun(i, f"run {i}", 90.0 * i, 50.0, (batch,)) for i, batch in enumerate(batches)]
+
+
+def test_a_campaign_is_moved_as_a_whole_or_not_at_all() -> None:
+    rate, _ = moving(5)
+    assert spectrum_table(runs(rate, rate), 0.3).roll_lever_m == 0.3
+    one_silent = spectrum_table(runs(rate, None), 0.3)
+    assert one_silent.roll_lever_m == 0.0
+    np.testing.assert_array_equal(one_silent.spectra[0], spectrum_table(runs(None, None), 0.3).spectra[0])
+
+
+def test_the_file_keeps_the_lever() -> None:
+    assert RatioIndexPart.of(calibration(-0.3)).for_core().roll_lever_m == -0.3
+
+
+def test_through_the_bus_a_sensor_far_left_tells_what_one_in_the_middle_does() -> None:
+    """Signs, units and times together, from a simulated van to the index: the load stands on the right."""
+    drive = constant(14.0, 130.0, np.random.default_rng(1))
+    signal_map = load_signal_map("springscale:reference")
+    found = []
+    for left_m in (0.0, 0.4):
+        sensors = Sensors(mount=Mount(left_m=left_m), imu=Imu(100.0), gps=Gps(5.0))
+        driven = simulate_drive(PAPER_VAN, (Load(300.0, 2.0, left_m=-0.3),), iso_road("B"), drive, sensors, 3)
+        motion = Decoder(signal_map).decode(Wiring("reference").frames_of(driven.recording))
+        found.append(batches_of_motion(motion, signal_map, BatchSettings(window_s=125.0))[0])
+    middle, left = found
+    wanted = acceleration_spectrum(middle, N_SEGMENT, "power", 0.0)
+    seen = acceleration_spectrum(left, N_SEGMENT, "power", 0.0)
+    moved = acceleration_spectrum(left, N_SEGMENT, "power", 0.4)
+    turned = acceleration_spectrum(
+        replace(left, roll_rate_radps=-left.roll_rate_radps) if left.roll_rate_radps is not None else left,
+        N_SEGMENT,
+        "power",
+        0.4,
+    )
+    assert wanted is not None
+    assert seen is not None
+    assert moved is not None
+    assert turned is not None
+    shaken = (wanted[0] > 1.0) & (wanted[0] < 9.5)
+    off = [np.mean(np.abs(one[1][shaken] / wanted[1][shaken] - 1.0)) for one in (moved, seen, turned)]
+    assert off[0] < 0.03
+    assert off[1] > 0.3
+    assert off[2] > off[1]
