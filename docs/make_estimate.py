@@ -5,7 +5,8 @@ from typing import Final
 
 from generated import keep_up_to_date
 
-from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, REASONS, SPECTRA, EstimateField
+from gateway.estimate import PLACES, Lack
+from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, REASONS, SPECTRA, WEIGHTS, EstimateField
 
 PAGE = Path(__file__).with_name("estimate.md")
 
@@ -40,6 +41,7 @@ NULL: Final = {
     "front_share_cg_left_correlation": "as above",
     "roll_share_front": "as above",
     "roll_share_front_std": "as above",
+    "weights": "what is unknown in it is null and says what it lacks; see below",
     "ratio_index_acceleration": "null where rejected before it was computed, and without a calibrated ratio index",
     "ratio_index_pitch_rate": "as above",
     "mean_speed_mps": "null where no speed is known",
@@ -77,14 +79,22 @@ DIAGNOSTICS: Final = {
 }
 """What cross_spectrum says of its own; the ratio index says nothing."""
 
+LACKS: Final = {
+    Lack.CALIBRATION: "nobody says what the vehicle weighs empty: no calibration is in use",
+    Lack.ESTIMATE: "the batch was rejected, or the estimator does not tell the front share",
+    Lack.UNSPRUNG_MASS: "`[vehicle]` of the campaign states neither the axle's unsprung mass nor its kerb weight",
+    Lack.TRACK_WIDTH: "`[vehicle]` of the campaign states no `track_width_m`",
+    Lack.ROLL_RATE: "nothing tells where the load lies sideways: no roll rate, or a calibration without one",
+}
+"""What a weight may lack, in words."""
+
 INTRODUCTION = """\
 # An estimate, field by field
 
 Generated from `gateway/estimate_json` by `python docs/make_estimate.py`; do not edit by hand.
 
 Each batch is one JSON object, the same from `springscale estimate --json`, in the store, over [HTTP](api.md) and by
-[MQTT](uplink.md). Unknown is null, never 0. Where `rejected` names [reasons](reasons.md), the numbers are null. Weights
-on the road (gross, axles) are another answer, `/api/v1/weights/latest`.
+[MQTT](uplink.md). Unknown is null, never 0. Where `rejected` names [reasons](reasons.md), the numbers are null.
 """
 
 GROUPS: Final = (
@@ -92,6 +102,25 @@ GROUPS: Final = (
     ("Epoch: all batches of this load together", ("epoch",)),
     ("Tare: the zero that was taken off", ("tare",)),
 )
+
+ON_THE_ROAD = """\
+## Weights on the road
+
+`weights` holds one object for each of {places}.
+It has `kg` and `std_kg`, `limit_kg` as the campaign's `[vehicle]` has it (null: not stated), `is_over_limit` (this
+number is above it; warnings with hysteresis are at `/api/v1/weights/latest`), and `lacks`: null where the weight is
+known, else the first thing that is missing:
+
+| `lacks` | meaning |
+|---|---|
+{rows}
+
+Weights are static, of the vehicle on level ground, unsprung masses included. An axle bears its share of the sprung
+mass. Its wheels bear half of that each, and the left ones more, the right ones less, by the axle's part of the moment
+of the whole about the centre line: `roll_share_front` of it at the front axle, the rest at the rear. Standard
+deviations are of first order in payload, front share, `cg_left_m` and `roll_share_front` with the correlations told
+above; the vehicle's empty figures count as exact.
+"""
 
 CSV = """\
 ## In a CSV file
@@ -104,7 +133,7 @@ blanks. Fields without a column are in the JSON alone.
 def estimate_page() -> str:
     """The whole page as Markdown."""
     tables = [f"## {title}\n\n{_table(prefixes[0])}" for title, prefixes in GROUPS]
-    return "\n".join([INTRODUCTION, *tables, _diagnostics(), CSV])
+    return "\n".join([INTRODUCTION, *tables, _weights(), _diagnostics(), CSV])
 
 
 def part_of(one: EstimateField) -> str:
@@ -116,7 +145,7 @@ def unit_of(one: EstimateField) -> str:
     """The unit in which the field's number is; empty for words and pure numbers."""
     if one.name in SHARES:
         return "0 to 1"
-    if one.kind in (INSTANT, REASONS, SPECTRA, BY_NAME):
+    if one.kind in (INSTANT, REASONS, SPECTRA, BY_NAME, WEIGHTS):
         return ""
     return next((unit for ending, unit in UNITS if one.name.endswith(ending)), "")
 
@@ -130,6 +159,11 @@ def _table(group: str) -> str:
 
 def _columns(one: EstimateField) -> str:
     return ", ".join(f"`{column}`" for column in one.columns)
+
+
+def _weights() -> str:
+    rows = "\n".join(f"| `{lack}` | {meaning} |" for lack, meaning in LACKS.items())
+    return ON_THE_ROAD.format(places=", ".join(f"`{place}`" for place in PLACES), rows=rows)
 
 
 def _diagnostics() -> str:

@@ -5,8 +5,9 @@ Inside, a share is in percent wherever it is a :class:`Quantity`, as everybody o
 
 import hashlib
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from enum import StrEnum
 from typing import Final
 
 from gateway.records import Spectra, Why
@@ -32,12 +33,6 @@ class Quantity:
         """With the interval of a normal distribution."""
         return cls(number, std, (number - Z95 * std, number + Z95 * std))
 
-    def widened(self, std: float) -> "Quantity":
-        """With one more error that is independent; an interval keeps its shape, each half grows in quadrature."""
-        below, above = self.number - self.interval95[0], self.interval95[1] - self.number
-        interval95 = (self.number - math.hypot(below, Z95 * std), self.number + math.hypot(above, Z95 * std))
-        return Quantity(self.number, math.hypot(self.std, std), interval95)
-
 
 UNKNOWN: Final = Quantity()
 
@@ -60,6 +55,55 @@ class Correction:
     front_share: Quantity
     raw_payload: Quantity
     raw_front_share: Quantity
+
+
+class Lack(StrEnum):
+    """What a weight would need to be known."""
+
+    CALIBRATION = "calibration"  # nobody says what the vehicle weighs empty
+    ESTIMATE = "estimate"  # the batch was rejected
+    UNSPRUNG_MASS = "unsprung_mass"
+    TRACK_WIDTH = "track_width"
+    ROLL_RATE = "roll_rate"  # nothing tells where the load lies sideways
+
+
+@dataclass(frozen=True, slots=True)
+class Weight:
+    """A weight on the road, its standard deviation and what it may be (None: nobody said); NaN where unknown."""
+
+    kg: float = math.nan
+    std_kg: float = math.nan
+    limit_kg: float | None = None
+    lacks: Lack | None = Lack.CALIBRATION
+
+    @property
+    def is_known(self) -> bool:
+        return math.isfinite(self.kg)
+
+    @property
+    def is_over_limit(self) -> bool:
+        """By this number alone; warnings have hysteresis (core.weights)."""
+        return self.limit_kg is not None and self.kg > self.limit_kg
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """Static weights of the vehicle on level ground, unsprung masses included (core.weights)."""
+
+    gross: Weight = Weight()
+    front_axle: Weight = Weight()
+    rear_axle: Weight = Weight()
+    front_left: Weight = Weight()
+    front_right: Weight = Weight()
+    rear_left: Weight = Weight()
+    rear_right: Weight = Weight()
+
+    def items(self) -> Iterator[tuple[str, Weight]]:
+        """Each place with its weight."""
+        return ((place, getattr(self, place)) for place in PLACES)
+
+
+PLACES: Final = tuple(place.name for place in fields(Weights))
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +143,7 @@ class Estimate:
     roll_share_front_std: float = math.nan
     payload_cg_left_correlation: float = math.nan
     front_share_cg_left_correlation: float = math.nan
+    weights: Weights = Weights()
 
     @property
     def counted(self) -> bool:
@@ -118,6 +163,7 @@ class Estimate:
             roll_share_front_std=math.nan,
             payload_cg_left_correlation=math.nan,
             front_share_cg_left_correlation=math.nan,
+            weights=Weights(),
             rejected=whys,
         )
 

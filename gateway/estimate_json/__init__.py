@@ -4,7 +4,16 @@
 """
 
 from gateway.estimate_json.fields import COLUMNS, FIELDS, EstimateField, Presence
-from gateway.estimate_json.kinds import BY_NAME, INSTANT, REASONS, SPECTRA, Kind, spectra_from_json, spectra_to_json
+from gateway.estimate_json.kinds import (
+    BY_NAME,
+    INSTANT,
+    REASONS,
+    SPECTRA,
+    WEIGHTS,
+    Kind,
+    spectra_from_json,
+    spectra_to_json,
+)
 from gateway.estimate_json.objects import csv_cells, estimate_from_json, estimate_to_json, table_row
 
 __all__ = [
@@ -14,6 +23,7 @@ __all__ = [
     "INSTANT",
     "REASONS",
     "SPECTRA",
+    "WEIGHTS",
     "EstimateField",
     "Kind",
     "Presence",

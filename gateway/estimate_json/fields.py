@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
+from gateway.estimate import Weight, Weights
 from gateway.estimate_json.kinds import (
     BY_NAME,
     COUNT,
@@ -15,8 +16,11 @@ from gateway.estimate_json.kinds import (
     ROUGH_NUMBER,
     SPECTRA,
     TEXT,
+    WEIGHT_COLUMNS,
+    WEIGHTS,
     WHOLE,
     Kind,
+    weights_to_json,
 )
 
 _INTERVAL95: Final = "95 % interval [low, high]"
@@ -63,6 +67,16 @@ _ROLL_SHARE: Final = "part of a sideways load's moment that the front axle takes
 _POINTS: Final = "its standard deviation, in percentage points"
 _STD: Final = "its standard deviation"
 _RAW: Final = "as the calibration alone has it"
+
+_WEIGHTS: Final = Weights(
+    Weight(1711.3, 6.1, 2000.0, None),
+    Weight(856.1, 5.4, 1000.0, None),
+    Weight(855.2, 5.6, 1100.0, None),
+    Weight(442.0, 4.0, 500.0, None),
+    Weight(414.1, 4.0, 500.0, None),
+    Weight(434.0, 3.8, None, None),
+    Weight(421.2, 3.8, None, None),
+)
 
 FIELDS: Final = (
     _field("id", "id", TEXT, "the same for the same batch, whenever it is computed", _ID),
@@ -133,6 +147,15 @@ FIELDS: Final = (
     ),
     EstimateField("roll_share_front", "roll_share_front", NUMBER, _ROLL_SHARE, 0.58, _LATER),
     EstimateField("roll_share_front_std", "roll_share_front_std", NUMBER, _STD, 0.07, _LATER),
+    _field(
+        "weights",
+        "weights",
+        WEIGHTS,
+        "on the road, standing on level ground, unsprung masses included",
+        weights_to_json(_WEIGHTS),
+        presence=_LATER,
+        columns=WEIGHT_COLUMNS,
+    ),
     _field("ratio_index_acceleration", "ratio_index_acceleration", NUMBER, "R_a of the paper", 0.97),
     _field("ratio_index_pitch_rate", "ratio_index_pitch_rate", NUMBER, "R_g of the paper", 1.21),
     _field("mean_speed_mps", "mean_speed_mps", NUMBER, "over what every gate let through", 13.9),

@@ -1,4 +1,4 @@
-"""How fields of one kind are written in JSON and read back: numbers, intervals, instants, reasons, spectra."""
+"""How fields of one kind are written in JSON and read back: numbers, intervals, instants, reasons, weights, spectra."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from gateway.estimate import PLACES, Lack, Weight, Weights
 from gateway.records import F64, Spectra, Why, iso_utc
 
 NS_PER_US: Final = 1000
@@ -16,11 +17,15 @@ _START: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """How fields of one kind are written, read back and typed. ``read`` never sees null: unknown stays unknown."""
+    """How fields of one kind are written, read back and typed. ``read`` never sees null: unknown stays unknown.
+
+    ``cells`` makes what was written the cells of a line of CSV.
+    """
 
     shape: Any  # for the schema
     write: Callable[[Any], Any]
     read: Callable[[Any], Any]
+    cells: Callable[[Any], Sequence[Any]] = lambda shown: [shown]
 
 
 def spectra_to_json(spectra: Spectra) -> dict[str, list[float | None]]:
@@ -61,6 +66,34 @@ def _as_is(x: Any) -> Any:
     return x
 
 
+def weights_to_json(weights: Weights) -> dict[str, dict[str, Any]]:
+    """The JSON object of weights: one for each place, unknown is None."""
+    return {place: _weight(weight) for place, weight in weights.items()}
+
+
+def _weight(weight: Weight) -> dict[str, Any]:
+    return {
+        "kg": _number(weight.kg, 7),
+        "std_kg": _number(weight.std_kg, 7),
+        "limit_kg": weight.limit_kg,
+        "is_over_limit": weight.is_over_limit,
+        "lacks": None if weight.lacks is None else str(weight.lacks),
+    }
+
+
+def _weights_of(told: Mapping[str, Mapping[str, Any]]) -> Weights:
+    return Weights(**{place: _weight_of(told[place]) for place in PLACES})
+
+
+def _weight_of(told: Mapping[str, Any]) -> Weight:
+    kg, std_kg = (math.nan if told[name] is None else told[name] for name in ("kg", "std_kg"))
+    return Weight(kg, std_kg, told["limit_kg"], None if told["lacks"] is None else Lack(told["lacks"]))
+
+
+def _weight_cells(shown: Mapping[str, Mapping[str, Any]]) -> list[Any]:
+    return [shown[place][name] for place in PLACES for name in ("kg", "std_kg")]
+
+
 TEXT: Final = Kind(str | None, _as_is, _as_is)
 FLAG: Final = Kind(bool | None, _as_is, _as_is)
 WHOLE: Final = Kind(int | None, _as_is, _as_is)
@@ -68,11 +101,18 @@ COUNT: Final = Kind(float | None, float, int)
 INSTANT: Final = Kind(str | None, iso_utc, _ns_of)
 NUMBER: Final = Kind(float | None, lambda x: _number(x, 9), float)
 ROUGH_NUMBER: Final = Kind(float | None, lambda x: _number(x, 6), float)
-INTERVAL: Final = Kind(list[float] | None, _interval, tuple)
+INTERVAL: Final = Kind(list[float] | None, _interval, tuple, cells=list)
 BY_NAME: Final = Kind(
     dict[str, float | None],
     lambda numbers: {name: _number(x, 6) for name, x in numbers.items()},
     lambda told: {name: math.nan if x is None else x for name, x in told.items()},
 )
-REASONS: Final = Kind(list[str], lambda whys: [str(why) for why in whys], lambda told: tuple(map(Why, told)))
+REASONS: Final = Kind(
+    list[str],
+    lambda whys: [str(why) for why in whys],
+    lambda told: tuple(map(Why, told)),
+    lambda shown: [" ".join(shown)],
+)
+WEIGHTS: Final = Kind(dict[str, dict[str, Any]], weights_to_json, _weights_of, _weight_cells)
+WEIGHT_COLUMNS: Final = tuple(f"{place}{unit}" for place in PLACES for unit in ("_kg", "_std_kg"))
 SPECTRA: Final = Kind(dict[str, list[float | None]] | None, spectra_to_json, spectra_from_json)

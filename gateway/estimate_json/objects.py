@@ -77,18 +77,13 @@ def csv_cells(told: Mapping[str, Any]) -> dict[str, Any]:
     cells: dict[str, Any] = {}
     for one in FIELDS:
         if one.columns and (shown := told.get(one.name)) is not None:
-            is_split = len(one.columns) > 1
-            cells.update(zip(one.columns, shown if is_split else [_joined(shown)], strict=True))
+            cells.update(zip(one.columns, one.kind.cells(shown), strict=True))
     return cells
 
 
 def table_row(estimate: Estimate) -> dict[str, Any]:
     """The columns of a CSV file, all of them, for a table of estimates such as pandas makes; None where unknown."""
     return {**dict.fromkeys(COLUMNS), **csv_cells(estimate_to_json(estimate))}
-
-
-def _joined(shown: Any) -> Any:
-    return " ".join(shown) if isinstance(shown, list) else shown
 
 
 def _at(estimate: Estimate, path: str) -> Any:

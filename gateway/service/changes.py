@@ -3,15 +3,12 @@
 import logging
 import math
 from collections.abc import Callable
-from typing import Final
 
-from gateway.estimate import Estimate
+from gateway.estimate import PLACES, Estimate
 from gateway.log import Event, log_event
 from gateway.records import Why
 from gateway.status import State, Status
 from gateway.web import Board, LatestWeights
-
-PLACES: Final = ("gross", "front_axle", "rear_axle")
 
 
 class BatchLog:

@@ -6,7 +6,8 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
-from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, SPECTRA, EstimateField, Presence
+from gateway.estimate import Lack
+from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, SPECTRA, WEIGHTS, EstimateField, Presence
 
 
 class Spectra(BaseModel):
@@ -21,6 +22,31 @@ class Spectra(BaseModel):
     )
 
 
+class WeightFigure(BaseModel):
+    """One weight; null is unknown."""
+
+    kg: float | None = Field(examples=[1894.2])
+    std_kg: float | None = Field(examples=[6.1])
+    limit_kg: float | None = Field(description="null: nobody said", examples=[2100.0])
+    is_over_limit: bool = Field(examples=[False])
+    lacks: Lack | None = Field(description="what it would need to be known; null: it is", examples=[None])
+
+
+class WeightFigures(BaseModel):
+    """Static weights by place, unsprung masses included."""
+
+    gross: WeightFigure
+    front_axle: WeightFigure
+    rear_axle: WeightFigure
+    front_left: WeightFigure
+    front_right: WeightFigure
+    rear_left: WeightFigure
+    rear_right: WeightFigure
+
+
+_SHAPES: Final[Any] = {SPECTRA: Spectra | None, WEIGHTS: WeightFigures | None}
+
+
 def _described(one: EstimateField) -> Any:
     """One row of the table of fields as a field of a pydantic model."""
     described: dict[str, Any] = {"description": one.description}
@@ -30,7 +56,7 @@ def _described(one: EstimateField) -> Any:
         described["json_schema_extra"] = {"format": "date-time"}
     if one.presence is not Presence.ALWAYS:
         described |= {"default_factory": dict} if one.kind is BY_NAME else {"default": None}
-    return Spectra | None if one.kind is SPECTRA else one.kind.shape, Field(**described)
+    return _SHAPES.get(one.kind, one.kind.shape), Field(**described)
 
 
 Estimate: Final = create_model(

@@ -6,7 +6,7 @@ from pathlib import Path
 from support.web import Client, Gateway
 
 from gateway.estimate_json import COLUMNS
-from gateway.web.schemas import Estimate
+from gateway.web.schemas import Estimate, WeightFigures
 
 API = (Path(__file__).parents[2] / "docs" / "api.md").read_text()
 
@@ -27,7 +27,11 @@ def test_every_parameter_of_the_history_is_named(tmp_path: Path) -> None:
 def test_the_columns_of_the_export_are_fields_of_an_estimate() -> None:
     fields = set(Estimate.model_fields)
     bounds = {name.replace("low95", "interval95").replace("high95", "interval95") for name in COLUMNS}
-    assert bounds <= fields
+    places = set(WeightFigures.model_fields)
+    weights = {f"{place}_{unit}" for place in places for unit in ("kg", "std_kg")}
+    assert weights <= set(COLUMNS)
+    assert bounds - weights <= fields
+    assert "weights" in fields
 
 
 def test_every_order_of_the_history_is_named_with_its_meaning(tmp_path: Path) -> None:

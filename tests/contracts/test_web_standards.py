@@ -12,6 +12,7 @@ from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
+from gateway.core.weights import weighed
 from gateway.estimate import Estimate, Quantity
 from gateway.records import Why
 from gateway.web import create_app
@@ -25,6 +26,8 @@ VAN = Vehicle(
     unsprung_rear_kg=110.0,
     gross_limit_kg=1545.0,
     front_axle_limit_kg=900.0,
+    track_width_m=1.5,
+    front_wheel_limit_kg=400.0,
 )
 STATUSES = "/rfms/vehiclestatuses"
 Ask = Callable[..., Any]
@@ -46,13 +49,68 @@ def loaded(n: int, payload_kg: float = 100.0) -> Estimate:
     return replace(make_estimate(n), payload=Quantity(payload_kg, 6.0), front_share=Quantity(50.0, 0.5))
 
 
+def to_the_left(n: int) -> Estimate:
+    """50 mm."""
+    return replace(
+        loaded(n),
+        cg_left=Quantity(0.05, 0.004),
+        left_share=Quantity(53.3, 0.27),
+        roll_share_front=0.6,
+        roll_share_front_std=0.05,
+    )
+
+
 def test_weights_are_told_with_deviation_limit_and_warning(gateway: Gateway) -> None:
     gateway.publish(loaded(0))
     told = client(gateway).get("/api/v1/weights/latest").json()
-    assert told["gross"] == {"kg": 1540.0, "std_kg": 6.0, "limit_kg": 1545.0, "is_over_limit": False}
-    assert told["front_axle"] == {"kg": 760.0, "std_kg": 7.341, "limit_kg": 900.0, "is_over_limit": False}
+    known = {"is_over_limit": False, "lacks": None}
+    assert told["gross"] == {"kg": 1540.0, "std_kg": 6.0, "limit_kg": 1545.0, **known}
+    assert told["front_axle"] == {"kg": 760.0, "std_kg": 7.341, "limit_kg": 900.0, **known}
     assert told["rear_axle"]["limit_kg"] is None
     assert (told["id"], told["age_s"]) == (loaded(0).id, 0.0)
+
+
+def test_wheels_are_weighed_where_the_load_is_known_to_lie_sideways(gateway: Gateway) -> None:
+    gateway.publish(loaded(0))
+    told = client(gateway).get("/api/v1/weights/latest").json()
+    unknown = {"kg": None, "std_kg": None, "limit_kg": 400.0, "is_over_limit": False, "lacks": "roll_rate"}
+    assert told["front_left"] == unknown
+    assert (told["load"]["left_m"], told["load"]["left_std_m"]) == (None, None)
+    gateway.publish(to_the_left(1))
+    told = client(gateway).get("/api/v1/weights/latest").json()
+    wheels = [told[wheel]["kg"] for wheel in ("front_left", "front_right", "rear_left", "rear_right")]
+    assert wheels == [406.8, 353.2, 407.867, 372.133]  # of 1340 kg sprung, 50 mm to the left on 1.5 m: 44.667 kg
+    assert (told["front_left"]["is_over_limit"], told["front_right"]["is_over_limit"]) == (True, False)
+    assert (told["load"]["left_m"], told["load"]["left_std_m"]) == (0.67, 0.065)
+
+
+def test_metrics_tell_each_wheel_that_is_known(gateway: Gateway) -> None:
+    ask = client(gateway)
+    gateway.publish(loaded(0))
+    before = ask.get("/metrics").text
+    assert 'springscale_weight_kilograms{where="front_left"}' not in before
+    assert "springscale_cg_left_meters" not in before
+    gateway.publish(to_the_left(1))
+    told = ask.get("/metrics").text.splitlines()
+    assert 'springscale_weight_kilograms{where="front_left"} 406.8' in told
+    assert 'springscale_overload{where="front_left"} 1.0' in told
+    assert 'springscale_overload{where="front_right"} 0.0' in told
+    assert "springscale_cg_left_meters 0.05" in told
+    assert "springscale_left_share_ratio 0.533" in told
+
+
+def test_every_record_brings_its_weights_to_the_history(gateway: Gateway) -> None:
+    gateway.publish(weighed(to_the_left(0), VAN), make_estimate(1, Why.GAP))
+    answer, refusal = client(gateway).get("/api/v1/estimates").json()["items"]
+    assert answer["weights"]["front_left"] == {
+        "kg": 406.8,
+        "std_kg": 4.840601,  # of 1.62, 3.35, 2.144 and 2.233 kg by payload, share, place and the axles' part
+        "limit_kg": 400.0,
+        "is_over_limit": True,
+        "lacks": None,
+    }
+    assert refusal["weights"]["gross"]["lacks"] == "calibration"
+    assert (answer["cg_left_m"], answer["left_share_pct"]) == (0.05, 53.3)
 
 
 def test_an_overload_is_warned_of_until_it_is_clearly_over(gateway: Gateway) -> None:
@@ -78,7 +136,7 @@ def test_before_any_estimate_there_are_no_weights(gateway: Gateway) -> None:
 
 
 def test_vss_speaks_core_paths_and_exactly_those_of_the_overlay(gateway: Gateway) -> None:
-    gateway.publish(loaded(0))
+    gateway.publish(to_the_left(0))
     points = {point["path"]: point for point in client(gateway).get("/api/v1/vss").json()}
     overlay = yaml.safe_load((Path(__file__).parents[2] / "docs" / "vss" / "springscale.vspec").read_text())
     described = {path: node for path, node in overlay.items() if node["type"] != "branch"}

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.estimate import Correction, Epoch, Estimate, Quantity
+from gateway.estimate import PLACES, Correction, Epoch, Estimate, Lack, Quantity, Weight, Weights
 from gateway.estimate_json import COLUMNS, FIELDS, csv_cells, estimate_from_json, estimate_to_json
 from gateway.records import Spectra, Why, json_line
 
@@ -18,6 +18,7 @@ names = st.text(min_size=1, max_size=8)
 quantities = st.builds(Quantity, numbers, numbers, st.tuples(numbers, numbers))
 by_name = st.dictionaries(names, numbers, max_size=3)
 spectra = st.integers(0, 4).map(lambda n: Spectra(*(np.linspace(0.1 * k, np.pi, n) for k in range(5))))
+weights = st.builds(Weight, numbers, numbers, st.none() | st.floats(1.0, 1e6), st.none() | st.sampled_from(Lack))
 estimates = st.builds(
     Estimate,
     whole_ns,
@@ -40,6 +41,7 @@ estimates = st.builds(
     quantities,
     quantities,
     *[numbers] * 4,
+    st.builds(Weights, *[st.just(Weight()) | weights] * len(PLACES)),
 )
 OF_THE_LOAD = (
     "payload",
@@ -92,6 +94,10 @@ def test_a_line_of_csv_has_the_columns_and_no_other(estimate: Estimate) -> None:
     assert cells["rejected"] == " ".join(estimate.rejected)
     if (interval := told["payload_interval95_kg"]) is not None:
         assert [cells["payload_low95_kg"], cells["payload_high95_kg"]] == interval
+    assert [cells["rear_left_kg"], cells["rear_left_std_kg"]] == [
+        told["weights"]["rear_left"]["kg"],
+        told["weights"]["rear_left"]["std_kg"],
+    ]
     if (interval := told["cg_left_interval95_m"]) is not None:
         assert [cells["cg_left_low95_m"], cells["cg_left_high95_m"]] == interval
 
@@ -99,7 +105,8 @@ def test_a_line_of_csv_has_the_columns_and_no_other(estimate: Estimate) -> None:
 @given(estimates)
 def test_what_was_stored_before_there_was_a_roll_rate_is_read_too(estimate: Estimate) -> None:
     told = estimate_to_json(estimate)
-    early = {name: x for name, x in told.items() if not any(part in name for part in ("left", "roll"))}
+    told["weights"] = estimate_to_json(Estimate(0, 0, ""))["weights"]
+    early = {name: x for name, x in told.items() if not any(part in name for part in ("left", "roll", "weights"))}
     assert estimate_to_json(read_back(early)) == {
         name: None if any(part in name for part in ("left", "roll")) else x for name, x in told.items()
     }

@@ -1,4 +1,4 @@
-"""Weights obey statics: axles add up to the whole, loads move where the payload is, errors add as they must."""
+"""Weights obey statics: wheels and axles add up to the whole, loads move where the payload is, errors add up."""
 
 import math
 from dataclasses import replace
@@ -8,9 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.core.vehicle import Vehicle, front_share_pct
-from gateway.core.weights import RELEASE_SHARE, Place, Weights, is_over_limit, place_of, unsprung_kg, weights_of
-from gateway.estimate import Z95, Quantity
+from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct
+from gateway.core.weights import (
+    RELEASE_SHARE,
+    Place,
+    Sideways,
+    is_over_limit,
+    left_share_of,
+    place_of,
+    unsprung_kg,
+    weighed,
+    weights_of,
+)
+from gateway.estimate import PLACES, Z95, Estimate, Lack, Quantity, Weights
 from gateway.records import F64
 
 VAN = Vehicle("van", 1240.0, 2.8, empty_front_share_pct=52.0, unsprung_front_kg=90.0, unsprung_rear_kg=110.0)
@@ -21,7 +31,7 @@ shares = st.floats(20.0, 80.0)
 deviations = st.floats(0.0, 50.0)
 
 
-def weighed(
+def axle_loads(
     vehicle: Vehicle, kg: float, std_kg: float, share_pct: float, share_std_pct: float, correlation: float = 0.0
 ) -> Weights:
     return weights_of(vehicle, Quantity(kg, std_kg), Quantity(share_pct, share_std_pct), correlation)
@@ -35,7 +45,7 @@ def placed(
 
 @given(payloads, deviations, shares, st.floats(0.0, 3.0))
 def test_the_axles_carry_the_whole(payload_kg: float, std_kg: float, share_pct: float, share_std_pct: float) -> None:
-    weights = weighed(VAN, payload_kg, std_kg, share_pct, share_std_pct)
+    weights = axle_loads(VAN, payload_kg, std_kg, share_pct, share_std_pct)
     assert weights.gross.kg == pytest.approx(1240.0 + 200.0 + payload_kg)
     assert weights.front_axle.kg + weights.rear_axle.kg == pytest.approx(weights.gross.kg)
     assert weights.gross.std_kg == std_kg
@@ -44,14 +54,14 @@ def test_the_axles_carry_the_whole(payload_kg: float, std_kg: float, share_pct: 
 @given(payloads, positions)
 def test_moments_about_the_rear_axle_balance(payload_kg: float, position_m: float) -> None:
     share_pct = front_share_pct(VAN, payload_kg, position_m)
-    front_kg = weighed(VAN, payload_kg, 0.0, share_pct, 0.0).front_axle.kg
+    front_kg = axle_loads(VAN, payload_kg, 0.0, share_pct, 0.0).front_axle.kg
     levers = 0.52 * 1240.0 * 2.8 + payload_kg * (2.8 - position_m)
     assert front_kg == pytest.approx(levers / 2.8 + 90.0)
 
 
 @given(payloads, shares)
 def test_the_front_share_is_of_the_sprung_mass(payload_kg: float, share_pct: float) -> None:
-    weights = weighed(VAN, payload_kg, 0.0, share_pct, 0.0)
+    weights = axle_loads(VAN, payload_kg, 0.0, share_pct, 0.0)
     sprung_kg = 1240.0 + payload_kg
     assert weights.front_axle.kg - 90.0 == pytest.approx(share_pct / 100.0 * sprung_kg)
     assert weights.rear_axle.kg - 110.0 == pytest.approx((1.0 - share_pct / 100.0) * sprung_kg)
@@ -68,8 +78,8 @@ def draws(payload_std_kg: float, share_pct: float, share_std_pct: float, correla
 @pytest.mark.parametrize("correlation", [0.0, -0.97, 0.93])
 def test_deviations_are_those_of_many_draws(correlation: float) -> None:
     payload_kg, share_pct = draws(8.0, 48.0, 0.4, correlation)
-    drawn = [weighed(VAN, p, 0.0, s, 0.0) for p, s in zip(payload_kg, share_pct, strict=True)]
-    told = weighed(VAN, 270.0, 8.0, 48.0, 0.4, correlation)
+    drawn = [axle_loads(VAN, p, 0.0, s, 0.0) for p, s in zip(payload_kg, share_pct, strict=True)]
+    told = axle_loads(VAN, 270.0, 8.0, 48.0, 0.4, correlation)
     for name in ("gross", "front_axle", "rear_axle"):
         spread = float(np.std([getattr(weights, name).kg for weights in drawn]))
         assert getattr(told, name).std_kg == pytest.approx(spread, rel=0.03)
@@ -82,7 +92,7 @@ def test_an_unsprung_mass_follows_from_the_kerb_weight() -> None:
 
 def test_what_is_not_stated_is_unknown_and_never_zero() -> None:
     half = Vehicle("van", 1240.0, 2.8, unsprung_front_kg=90.0)
-    weights = weighed(half, 100.0, 5.0, 50.0, 0.5)
+    weights = axle_loads(half, 100.0, 5.0, 50.0, 0.5)
     assert weights.front_axle.is_known
     assert not weights.rear_axle.is_known
     assert not weights.gross.is_known
@@ -123,8 +133,7 @@ def test_the_deviation_of_the_place_is_that_of_many_draws(correlation: float) ->
     share_pct = front_share_pct(VAN, 270.0, 1.3)
     pairs = zip(*draws(8.0, share_pct, 0.3, correlation), strict=True)
     drawn = [place.position_m for p, s in pairs if (place := placed(VAN, p, 0.0, s, 0.0)) is not None]
-    exact = replace(VAN, empty_front_share_std_pct=0.0)
-    told = placed(exact, 270.0, 8.0, share_pct, 0.3, correlation)
+    told = placed(VAN, 270.0, 8.0, share_pct, 0.3, correlation)
     assert told is not None
     assert told.std_m == pytest.approx(float(np.std(drawn)), rel=0.03)
 
@@ -133,3 +142,161 @@ def test_the_deviation_of_the_place_is_that_of_many_draws(correlation: float) ->
 def test_what_may_not_be_there_has_no_place(payload_kg: float, std_kg: float, share_pct: float) -> None:
     place = placed(VAN, payload_kg, std_kg, share_pct, 0.3)
     assert (place is None) == (payload_kg - Z95 * std_kg <= 0.0)
+
+
+TRACKED = replace(VAN, track_width_m=1.5, empty_cg_left_m=0.02, front_wheel_limit_kg=500.0, rear_wheel_limit_kg=480.0)
+WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
+offsets = st.floats(-0.5, 0.5)
+roll_shares = st.floats(0.0, 1.0)
+
+
+def on_wheels(payload_kg: float, share_pct: float, left_m: float, roll_share: float) -> Weights:
+    sideways = Sideways(Quantity(left_m, 0.004), roll_share, 0.05)
+    return weights_of(TRACKED, Quantity(payload_kg, 6.0), Quantity(share_pct, 0.3), 0.1, sideways)
+
+
+@given(payloads, shares, offsets, roll_shares)
+def test_wheels_carry_their_axles(payload_kg: float, share_pct: float, left_m: float, roll_share: float) -> None:
+    weights = on_wheels(payload_kg, share_pct, left_m, roll_share)
+    assert weights.front_left.kg + weights.front_right.kg == pytest.approx(weights.front_axle.kg)
+    assert weights.rear_left.kg + weights.rear_right.kg == pytest.approx(weights.rear_axle.kg)
+    assert sum(getattr(weights, wheel).kg for wheel in WHEELS) == pytest.approx(weights.gross.kg)
+
+
+@given(payloads, shares, offsets, roll_shares)
+def test_left_less_right_is_the_moment_and_the_axles_divide_it(
+    payload_kg: float, share_pct: float, left_m: float, roll_share: float
+) -> None:
+    weights = on_wheels(payload_kg, share_pct, left_m, roll_share)
+    front_kgm = 0.75 * (weights.front_left.kg - weights.front_right.kg)
+    rear_kgm = 0.75 * (weights.rear_left.kg - weights.rear_right.kg)
+    moment_kgm = (1240.0 + payload_kg) * left_m
+    assert front_kgm + rear_kgm == pytest.approx(moment_kgm, abs=1e-6)
+    assert front_kgm == pytest.approx(roll_share * moment_kgm, abs=1e-6)
+
+
+@given(payloads, shares, offsets, roll_shares)
+def test_a_load_to_the_other_side_swaps_the_wheels(
+    payload_kg: float, share_pct: float, left_m: float, roll_share: float
+) -> None:
+    one, other = (on_wheels(payload_kg, share_pct, side * left_m, roll_share) for side in (1.0, -1.0))
+    for axle in ("front", "rear"):
+        left, right = getattr(one, f"{axle}_left"), getattr(other, f"{axle}_right")
+        assert (left.kg, left.std_kg) == pytest.approx((right.kg, right.std_kg))
+
+
+@given(payloads, offsets)
+def test_the_left_share_is_that_of_the_wheels_without_axles(payload_kg: float, left_m: float) -> None:
+    bare = replace(TRACKED, unsprung_front_kg=0.0, unsprung_rear_kg=0.0)
+    sideways = Sideways(Quantity(left_m, 0.0), 0.6, 0.0)
+    weights = weights_of(bare, Quantity(payload_kg, 0.0), Quantity(51.0, 0.0), 0.0, sideways)
+    share_pct = 100.0 * (weights.front_left.kg + weights.rear_left.kg) / weights.gross.kg
+    assert left_share_of(Quantity(left_m), 1.5).number == pytest.approx(share_pct)
+
+
+def sideways_draws() -> tuple[F64, F64]:
+    """Covariance of payload (kg), share (0..1), lateral place (m) and roll share, and draws with it."""
+    stds = np.array([8.0, 0.004, 0.006, 0.05])
+    together = np.eye(4)
+    together[0, 1] = together[1, 0] = -0.6
+    together[0, 2] = together[2, 0] = 0.3
+    together[1, 2] = together[2, 1] = -0.4
+    covariance = np.outer(stds, stds) * together
+    return stds, np.random.default_rng(11).multivariate_normal([270.0, 0.48, 0.08, 0.58], covariance, 20_000)
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_deviations_of_wheels_are_those_of_many_draws(name: str) -> None:
+    stds, draws = sideways_draws()
+    drawn_kg = [
+        getattr(weights_of(TRACKED, Quantity(p), Quantity(100.0 * s), 0.0, Sideways(Quantity(y), phi)), name).kg
+        for p, s, y, phi in draws[:8000]
+    ]
+    told = weights_of(
+        TRACKED,
+        Quantity(270.0, stds[0]),
+        Quantity(48.0, 100.0 * stds[1]),
+        -0.6,
+        Sideways(Quantity(0.08, stds[2]), 0.58, stds[3], 0.3, -0.4),
+    )
+    assert getattr(told, name).std_kg == pytest.approx(float(np.std(drawn_kg)), rel=0.04)
+
+
+def test_the_place_across_and_its_covariance_are_those_of_many_draws() -> None:
+    stds, draws = sideways_draws()
+    places = [
+        place_of(TRACKED, Quantity(p, 0.0), Quantity(100.0 * s), 0.0, Sideways(Quantity(y)))
+        for p, s, y, _ in draws[:8000]
+    ]
+    drawn = np.array([(place.position_m, place.left_m) for place in places if place is not None])
+    told = place_of(
+        TRACKED,
+        Quantity(270.0, stds[0]),
+        Quantity(48.0, 100.0 * stds[1]),
+        -0.6,
+        Sideways(Quantity(0.08, stds[2]), 0.58, stds[3], 0.3, -0.4),
+    )
+    assert told is not None
+    assert (told.std_m, told.left_std_m) == pytest.approx(tuple(drawn.std(axis=0)), rel=0.04)
+    assert told.correlation == pytest.approx(float(np.corrcoef(drawn.T)[0, 1]), abs=0.04)
+
+
+@given(st.floats(20.0, 800.0), positions, offsets)
+def test_the_place_across_is_the_place_loaded(payload_kg: float, position_m: float, left_m: float) -> None:
+    sideways = Sideways(Quantity(cg_left_m(TRACKED, payload_kg, left_m), 0.0))
+    share = Quantity(front_share_pct(TRACKED, payload_kg, position_m), 0.0)
+    place = place_of(TRACKED, Quantity(payload_kg, 1.0), share, 0.0, sideways)
+    assert place is not None
+    assert place.left_m == pytest.approx(left_m, abs=1e-6)
+
+
+def test_without_a_word_from_the_side_the_place_is_known_along_alone() -> None:
+    place = placed(TRACKED, 270.0, 8.0, 48.0, 0.4)
+    assert place is not None
+    assert math.isfinite(place.std_m)
+    assert [math.isnan(x) for x in (place.left_m, place.left_std_m, place.correlation)] == [True] * 3
+
+
+ANSWER = Estimate(
+    0,
+    0,
+    "",
+    payload=Quantity(270.0, 6.0),
+    front_share=Quantity(48.0, 0.3),
+    cg_left=Quantity(0.08, 0.004),
+    roll_share_front=0.58,
+    roll_share_front_std=0.05,
+)
+
+
+@pytest.mark.parametrize(
+    ("estimate", "vehicle", "lacks"),
+    [
+        (ANSWER, TRACKED, None),
+        (ANSWER, None, Lack.CALIBRATION),
+        (Estimate(0, 0, ""), TRACKED, Lack.ESTIMATE),
+        (ANSWER, replace(TRACKED, unsprung_front_kg=None), Lack.UNSPRUNG_MASS),
+        (ANSWER, replace(TRACKED, track_width_m=None), Lack.TRACK_WIDTH),
+        (replace(ANSWER, cg_left=Quantity()), TRACKED, Lack.ROLL_RATE),
+        (replace(ANSWER, roll_share_front=math.nan), TRACKED, Lack.ROLL_RATE),
+    ],
+)
+def test_an_unknown_wheel_says_what_it_lacks(estimate: Estimate, vehicle: Vehicle | None, lacks: Lack | None) -> None:
+    wheel = weighed(estimate, vehicle).weights.front_left
+    assert wheel.lacks is lacks
+    assert wheel.is_known is (lacks is None)
+    assert math.isnan(wheel.std_kg) is (lacks is not None)
+    assert wheel.limit_kg == (None if vehicle is None else 500.0)
+
+
+def test_an_unsure_roll_share_alone_makes_the_wheels_deviations_unknown() -> None:
+    weights = weighed(replace(ANSWER, roll_share_front_std=math.nan), TRACKED).weights
+    assert weights.front_left.is_known
+    assert math.isnan(weights.front_left.std_kg)
+    assert math.isfinite(weights.front_axle.std_kg)
+
+
+def test_a_wheel_may_be_over_its_limit_where_its_axle_is_not() -> None:
+    weights = weighed(ANSWER, replace(TRACKED, front_axle_limit_kg=900.0, front_wheel_limit_kg=450.0)).weights
+    assert weights.front_left.is_over_limit
+    assert [place for place, weight in weights.items() if weight.is_over_limit] == ["front_left", "rear_left"]

@@ -12,7 +12,7 @@ from support.drives import drive, joined, later
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.tare import Tare, Zero
-from gateway.estimate import Estimate
+from gateway.estimate import Estimate, Lack
 from gateway.estimate_json import estimate_to_json
 from gateway.records import F64, Motion
 
@@ -51,6 +51,23 @@ def test_early_looks_are_tared_too() -> None:
     early = [found for found in fed(flow(TARE, LONG), drive(105.0)) if found.is_provisional]
     assert early
     assert {found.payload.number for found in early} == {2.0}
+
+
+def test_weights_are_those_of_the_tared_load_early_and_late() -> None:
+    vehicle = replace(CALIBRATED.vehicle, unsprung_front_kg=90.0, unsprung_rear_kg=110.0)
+    weighing = Flow(LONG, {}, replace(CALIBRATED, vehicle=vehicle), "ratio_index", Identity("van-17"), TARE)
+    found = [one for one in fed(weighing, drive(105.0)) if one.counted]
+    assert {one.is_provisional for one in found} == {True, False}
+    assert {one.weights.gross.kg for one in found} == {vehicle.empty_mass_kg + 200.0 + 2.0}
+    assert {one.weights.front_left.lacks for one in found} == {Lack.TRACK_WIDTH}
+
+
+def test_a_rejected_batch_weighs_nothing_and_says_so() -> None:
+    (found,) = [one for one in fed(flow(), drive(45.0, lambda t_s: np.full_like(t_s, 0.5))) if not one.is_provisional][
+        :1
+    ]
+    assert found.rejected
+    assert {weight.lacks for _, weight in found.weights.items()} == {Lack.ESTIMATE}
 
 
 def test_a_tare_set_between_two_batches_counts_from_the_next() -> None:

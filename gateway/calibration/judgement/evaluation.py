@@ -10,6 +10,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle
+from gateway.core.weights import weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.records import F64, Why
@@ -213,7 +214,13 @@ def _batch_record(one: Judged) -> dict[str, Any]:
 def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:
     """Every batch of every known run with its estimate."""
     return [
-        Judged(run.number, run.name, run.payload_kg, run.front_share_pct, estimate(batch, calibrated, estimator))
+        Judged(
+            run.number,
+            run.name,
+            run.payload_kg,
+            run.front_share_pct,
+            weighed(estimate(batch, calibrated, estimator), calibrated.vehicle),
+        )
         for run in runs
         for batch in run.batches
     ]

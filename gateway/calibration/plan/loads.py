@@ -88,12 +88,7 @@ def _within_limits(vehicle: Vehicle, loads: Iterable[tuple[float, float]]) -> tu
 def _is_allowed(vehicle: Vehicle, load: PlacedLoad) -> bool:
     """Limits are of the whole vehicle; one whose weight is not known is not checked."""
     weights = weights_of(vehicle, Quantity(load.payload_kg, 0.0), Quantity(load.front_share_pct, 0.0))
-    checked = (
-        (weights.gross, vehicle.gross_limit_kg),
-        (weights.front_axle, vehicle.front_axle_limit_kg),
-        (weights.rear_axle, vehicle.rear_axle_limit_kg),
-    )
-    return not any(weight.is_known and limit is not None and weight.kg > limit for weight, limit in checked)
+    return not any(weight.is_over_limit for _, weight in weights.items())
 
 
 def _rounded(x: float, step: float) -> float:

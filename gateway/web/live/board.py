@@ -1,7 +1,6 @@
 """What the service knows right now, ready to be sent: filled by the pipeline, read by the web."""
 
 import json
-import math
 import threading
 import time
 from collections import deque
@@ -22,8 +21,8 @@ PROVISIONAL: Final = "provisional"
 
 def _nothing_yet() -> dict[str, Any]:
     """The JSON of the estimate before the first: its names, all null, and the reason."""
-    names = estimate_to_json(Estimate(0, 0, ""))
-    return {**dict.fromkeys(names), "shares": {}, "diagnostics": {}, "rejected": [str(Why.NO_ESTIMATE_YET)]}
+    blank = estimate_to_json(Estimate(0, 0, "", rejected=(Why.NO_ESTIMATE_YET,)))
+    return {**dict.fromkeys(blank), **{name: blank[name] for name in ("shares", "diagnostics", "weights", "rejected")}}
 
 
 def boot_clock_s() -> float:
@@ -51,12 +50,16 @@ class Shown:
         return UNKNOWN if self.estimate is None else self.estimate.payload
 
     @property
-    def correlation(self) -> float:
-        return math.nan if self.estimate is None else self.estimate.correlation
-
-    @property
     def front_share(self) -> Quantity:
         return UNKNOWN if self.estimate is None else self.estimate.front_share
+
+    @property
+    def cg_left(self) -> Quantity:
+        return UNKNOWN if self.estimate is None else self.estimate.cg_left
+
+    @property
+    def left_share(self) -> Quantity:
+        return UNKNOWN if self.estimate is None else self.estimate.left_share
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import Final
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from gateway.core.weights import Weights
+from gateway.estimate import Weights
 from gateway.records import iso_utc
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import Scales
@@ -66,30 +66,25 @@ def j1939_router(board: Board, scales: Scales) -> APIRouter:
             t_end=None if shown.estimate is None else iso_utc(shown.estimate.t_end_ns),
             age_s=shown.age_s,
             is_stale=shown.is_stale,
-            parameters=parameters_of(
-                scales.weigh(shown.payload, shown.front_share, shown.correlation), shown.payload.number
-            ),
+            parameters=parameters_of(scales.weigh(shown.estimate), shown.payload.number),
         )
 
     return router
 
 
-def parameters_of(weights: Weights | None, payload_kg: float) -> list[J1939Weight]:
+def parameters_of(weights: Weights, payload_kg: float) -> list[J1939Weight]:
     """Every parameter; what is not known is sent as not available."""
-    front_kg, rear_kg, gross_kg = (
-        (None, None, None) if weights is None else (weights.front_axle.kg, weights.rear_axle.kg, weights.gross.kg)
-    )
     return [
-        _counted(AXLE_WEIGHT, front_kg, axle=1),
-        _counted(AXLE_WEIGHT, rear_kg, axle=2),
+        _counted(AXLE_WEIGHT, weights.front_axle.kg, axle=1),
+        _counted(AXLE_WEIGHT, weights.rear_axle.kg, axle=2),
         _counted(CARGO_WEIGHT, payload_kg),
-        _counted(GROSS_WEIGHT, gross_kg),
+        _counted(GROSS_WEIGHT, weights.gross.kg),
     ]
 
 
-def _counted(parameter: Parameter, kg: float | None, axle: int | None = None) -> J1939Weight:
+def _counted(parameter: Parameter, kg: float, axle: int | None = None) -> J1939Weight:
     """Counts cannot be negative: an empty vehicle weighed a little below zero carries nothing."""
-    if kg is None or not math.isfinite(kg) or kg > LARGEST * parameter.kg_per_bit:
+    if not math.isfinite(kg) or kg > LARGEST * parameter.kg_per_bit:
         return J1939Weight(**asdict(parameter), axle=axle, kg=None, raw=NOT_AVAILABLE)
     raw = max(0, round(kg / parameter.kg_per_bit))
     return J1939Weight(**asdict(parameter), axle=axle, kg=raw * parameter.kg_per_bit, raw=raw)

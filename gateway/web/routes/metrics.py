@@ -8,6 +8,7 @@ from typing import Final
 from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
+from gateway.estimate import PLACES
 from gateway.status import State, Status, UplinkStatus
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
@@ -170,11 +171,16 @@ def _web(board: Board, responses: Counter[int]) -> Iterator[Metric]:
 def _estimate(board: Board) -> Iterator[Metric]:
     shown = board.shown()
     payload, share, age_s = shown.payload, shown.front_share, math.nan if shown.age_s is None else shown.age_s
+    cg_left, left_share = shown.cg_left, shown.left_share
     gauges = (
         ("springscale_payload_kilograms", "Payload of the latest estimate.", payload.number),
         ("springscale_payload_std_kilograms", "Its standard deviation.", payload.std),
         ("springscale_front_share_ratio", "Share of the sprung mass on the front axle.", share.number * 0.01),
         ("springscale_front_share_std_ratio", "Its standard deviation.", share.std * 0.01),
+        ("springscale_cg_left_meters", "Sprung mass's centre of gravity, left of the centre line.", cg_left.number),
+        ("springscale_cg_left_std_meters", "Its standard deviation.", cg_left.std),
+        ("springscale_left_share_ratio", "Share of the sprung mass on the left wheels.", left_share.number * 0.01),
+        ("springscale_left_share_std_ratio", "Its standard deviation.", left_share.std * 0.01),
         ("springscale_estimate_age_seconds", "Since the latest estimate was received.", age_s),
     )
     yield from (_gauge(metric, text, reading) for metric, text, reading in gauges if math.isfinite(reading))
@@ -190,7 +196,7 @@ def _weights(weights: LatestWeights) -> Iterator[Metric]:
         ("is_over_limit", GaugeMetricFamily("springscale_overload", "1 while it is too much.", labels=["where"])),
     )
     for name, family in families:
-        for where in ("gross", "front_axle", "rear_axle"):
+        for where in PLACES:
             reading = getattr(getattr(weights, where), name)
             if reading is not None:
                 family.add_metric([where], float(reading))

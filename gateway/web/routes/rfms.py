@@ -20,8 +20,7 @@ from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
-from gateway.core.weights import Weight
-from gateway.estimate import Quantity
+from gateway.estimate import Estimate, Quantity, Weight
 from gateway.records import iso_utc
 from gateway.status import Status
 from gateway.web.instant import Instant
@@ -122,15 +121,15 @@ class _Weighed:
     """What a status needs of a batch that counted."""
 
     t_end: str
-    payload: Quantity
-    front_share: Quantity
+    estimate: Estimate
 
     @classmethod
     def stored(cls, record: Mapping[str, Any]) -> "_Weighed":
         """From the store's JSON."""
         numbers = {name: math.nan if record[name] is None else float(record[name]) for name in _NUMBERS}
         payload = Quantity(numbers["payload_kg"], numbers["payload_std_kg"])
-        return cls(record["t_end"], payload, Quantity(numbers["front_share_pct"], numbers["front_share_std_pct"]))
+        front_share = Quantity(numbers["front_share_pct"], numbers["front_share_std_pct"])
+        return cls(record["t_end"], Estimate(0, 0, "", payload=payload, front_share=front_share))
 
 
 async def _batches(
@@ -143,7 +142,7 @@ async def _batches(
         shown = board.shown().estimate
         if shown is None:
             return [], None
-        return [_Weighed(iso_utc(shown.t_end_ns), shown.payload, shown.front_share)], None
+        return [_Weighed(iso_utc(shown.t_end_ns), shown)], None
     page = await asyncio.to_thread(
         reader.estimates,
         since_ns=query.starttime,
@@ -173,10 +172,10 @@ def _status(batch: _Weighed, vin: str | None, scales: Scales) -> dict[str, Any]:
         "receivedDateTime": batch.t_end,
         "snapshotData": {},
     }
-    weights = scales.weigh(batch.payload, batch.front_share)
-    if weights is not None:
-        if weights.gross.is_known:
-            told["grossCombinationVehicleWeight"] = round(weights.gross.kg)
+    weights = scales.weigh(batch.estimate)
+    if weights.gross.is_known:
+        told["grossCombinationVehicleWeight"] = round(weights.gross.kg)
+    if scales.vehicle is not None:
         axles = [_axle(1, weights.front_axle), _axle(2, weights.rear_axle)]
         told["snapshotData"]["vehicleAxles"] = [axle for axle in axles if axle is not None]
     return told

@@ -18,6 +18,8 @@ class VehicleFigures(BaseModel):
     empty_front_share_pct: float
     sensor_position_m: float = Field(description="behind the front axle", examples=[3.2])
     sensor_offset_left_m: float
+    track_width_m: float | None = Field(description="wheel loads need it", examples=[1.5])
+    empty_cg_left_m: float
     payload_range_kg: tuple[float, float] = Field(description="only normalises errors; gates nothing")
     front_share_range_pct: tuple[float, float]
     unsprung_front_kg: float | None
@@ -27,6 +29,8 @@ class VehicleFigures(BaseModel):
     front_axle_limit_kg: float | None
     rear_axle_limit_kg: float | None
     gross_limit_kg: float | None
+    front_wheel_limit_kg: float | None
+    rear_wheel_limit_kg: float | None
 
 
 class CalibrationFigures(BaseModel):

@@ -18,8 +18,19 @@ OVERLAY: Final[dict[str, tuple[Callable[[Shown], float], str]]] = {  # described
     "Vehicle.Load.PayloadStd": (lambda shown: shown.payload.std, "kg"),
     "Vehicle.Load.FrontShare": (lambda shown: shown.front_share.number, "percent"),
     "Vehicle.Load.FrontShareStd": (lambda shown: shown.front_share.std, "percent"),
+    "Vehicle.Load.LeftShare": (lambda shown: shown.left_share.number, "percent"),
+    "Vehicle.Load.LeftShareStd": (lambda shown: shown.left_share.std, "percent"),
+    "Vehicle.Load.CenterOfGravityLeft": (lambda shown: shown.cg_left.number, "m"),
+    "Vehicle.Load.CenterOfGravityLeftStd": (lambda shown: shown.cg_left.std, "m"),
 }
-AXLES: Final = {"Vehicle.Chassis.Axle.Row1": "front_axle", "Vehicle.Chassis.Axle.Row2": "rear_axle"}
+LOADS: Final = {  # likewise: the core has these branches and no load in them
+    "Vehicle.Chassis.Axle.Row1": "front_axle",
+    "Vehicle.Chassis.Axle.Row1.Wheel.Left": "front_left",
+    "Vehicle.Chassis.Axle.Row1.Wheel.Right": "front_right",
+    "Vehicle.Chassis.Axle.Row2": "rear_axle",
+    "Vehicle.Chassis.Axle.Row2.Wheel.Left": "rear_left",
+    "Vehicle.Chassis.Axle.Row2.Wheel.Right": "rear_right",
+}
 
 
 class VssPoint(BaseModel):
@@ -56,13 +67,13 @@ def vss_points(board: Board, scales: Scales) -> list[VssPoint]:
         VssPoint(path=path, value=_or_none(number_of(shown)), unit=unit, timestamp=t_end)
         for path, (number_of, unit) in OVERLAY.items()
     ]
-    for path, name in AXLES.items():
-        points += _axle(path, name, weights)
+    for path, place in LOADS.items():
+        points += _load(path, place, weights)
     return points
 
 
-def _axle(path: str, name: str, weights: LatestWeights) -> list[VssPoint]:
-    figure = getattr(weights, name)
+def _load(path: str, place: str, weights: LatestWeights) -> list[VssPoint]:
+    figure = getattr(weights, place)
     return [
         VssPoint(path=f"{path}.Load", value=figure.kg, unit="kg", timestamp=weights.t_end),
         VssPoint(path=f"{path}.LoadStd", value=figure.std_kg, unit="kg", timestamp=weights.t_end),

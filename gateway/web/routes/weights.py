@@ -1,45 +1,44 @@
-"""/api/v1/weights/latest: gross weight and axle loads of the latest estimate, and whether they are too much."""
+"""/api/v1/weights/latest: gross weight, axle and wheel loads of the latest estimate, and whether they are too much."""
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Final
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import Place, Weights, is_over_limit, place_of, weights_of
-from gateway.estimate import Quantity
+from gateway.core.weights import Place, Sideways, is_over_limit, place_of, weighed
+from gateway.estimate import Estimate, Weight, Weights
 from gateway.records import iso_utc
 from gateway.web.live.board import Board
+from gateway.web.schemas import WeightFigure, WeightFigures
 
-
-class WeightFigure(BaseModel):
-    """One weight; null is unknown. ``is_over_limit`` begins above the limit and ends 3 % below it."""
-
-    kg: float | None = Field(examples=[1894.2])
-    std_kg: float | None = Field(examples=[6.1])
-    limit_kg: float | None = Field(examples=[2100.0])
-    is_over_limit: bool = Field(examples=[False])
+_NONE: Final = Estimate(0, 0, "")
 
 
 class LoadPlace(BaseModel):
-    """The payload's centre of gravity, behind the front axle."""
+    """The payload's centre of gravity, behind the front axle and left of the centre line."""
 
     position_m: float = Field(examples=[1.3])
     std_m: float = Field(examples=[0.08])
+    left_m: float | None = Field(description="null: nothing tells", examples=[0.12])
+    left_std_m: float | None = Field(examples=[0.03])
+    correlation: float | None = Field(description="of both errors, -1 to 1", examples=[0.1])
 
 
-class LatestWeights(BaseModel):
-    """Static weights, unsprung masses included, of the estimate that ``/estimates/latest`` shows."""
+class LatestWeights(WeightFigures):
+    """Static weights, unsprung masses included, of the estimate that ``/estimates/latest`` shows.
+
+    ``is_over_limit`` begins above the limit and ends 3 % below it, looking back over the last estimates.
+    """
 
     id: str | None = Field(description="of the estimate")
     t_end: str | None
     age_s: float | None
     is_stale: bool
-    gross: WeightFigure
-    front_axle: WeightFigure
-    rear_axle: WeightFigure
     load: LoadPlace | None = Field(description="null: unknown, or no payload that is surely there")
 
 
@@ -49,27 +48,17 @@ class Scales:
     def __init__(self, calibrated: CalibratedVehicle | None) -> None:
         self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
 
-    def weigh(self, payload: Quantity, front_share: Quantity, correlation: float = math.nan) -> Weights | None:
-        """Weights with such a payload; None without an answer or without figures of the vehicle."""
-        if self.vehicle is None or math.isnan(payload.number) or math.isnan(front_share.number):
-            return None
-        return weights_of(self.vehicle, payload, front_share, correlation)
+    def weigh(self, estimate: Estimate | None) -> Weights:
+        """By this vehicle's figures now, whatever an estimate brought along; None: before the first."""
+        return weighed(estimate or _NONE, self.vehicle).weights
 
-    def place(self, payload: Quantity, front_share: Quantity, correlation: float = math.nan) -> Place | None:
-        """Where such a payload lies; None where that cannot be told."""
-        numbers = (payload.number, payload.std, front_share.number, front_share.std)
+    def place(self, estimate: Estimate | None) -> Place | None:
+        """Where its payload lies; None where that cannot be told."""
+        e = estimate or _NONE
+        numbers = (e.payload.number, e.payload.std, e.front_share.number, e.front_share.std)
         if self.vehicle is None or any(map(math.isnan, numbers)):
             return None
-        return place_of(self.vehicle, payload, front_share, correlation)
-
-    def limits_kg(self) -> dict[str, float | None]:
-        """The limits that were stated for this vehicle."""
-        v = self.vehicle
-        return {
-            "gross": None if v is None else v.gross_limit_kg,
-            "front_axle": None if v is None else v.front_axle_limit_kg,
-            "rear_axle": None if v is None else v.rear_axle_limit_kg,
-        }
+        return place_of(self.vehicle, e.payload, e.front_share, e.correlation, Sideways.of(e))
 
 
 def weights_router(board: Board, scales: Scales) -> APIRouter:
@@ -78,7 +67,7 @@ def weights_router(board: Board, scales: Scales) -> APIRouter:
 
     @router.get("/weights/latest")
     async def latest_weights() -> LatestWeights:
-        """Gross weight and axle loads in kg, with standard deviation, limit and warning."""
+        """Gross weight, axle and wheel loads in kg, with standard deviation, limit and warning."""
         return weigh_latest(board, scales)
 
     return router
@@ -87,30 +76,33 @@ def weights_router(board: Board, scales: Scales) -> APIRouter:
 def weigh_latest(board: Board, scales: Scales) -> LatestWeights:
     """Weights of the estimate shown now; the warnings look back over the last estimates."""
     shown = board.shown()
-    weighed = (scales.weigh(past.payload, past.front_share, past.correlation) for past in board.recent_estimates())
-    history = [weights for weights in weighed if weights is not None]
-    told = (shown.payload, shown.front_share, shown.correlation)
-    now, place = scales.weigh(*told), scales.place(*told)
-    limits = scales.limits_kg()
+    history = [scales.weigh(past) for past in board.recent_estimates()]
+    figures = {
+        place: _figure(weight, [getattr(weights, place).kg for weights in history])
+        for place, weight in scales.weigh(shown.estimate).items()
+    }
     return LatestWeights(
         id=None if shown.estimate is None else shown.estimate.id,
         t_end=None if shown.estimate is None else iso_utc(shown.estimate.t_end_ns),
         age_s=shown.age_s,
         is_stale=shown.is_stale,
-        gross=_figure(now, history, "gross", limits["gross"]),
-        front_axle=_figure(now, history, "front_axle", limits["front_axle"]),
-        rear_axle=_figure(now, history, "rear_axle", limits["rear_axle"]),
-        load=None if place is None else LoadPlace(position_m=round(place.position_m, 3), std_m=round(place.std_m, 3)),
+        load=_place(scales.place(shown.estimate)),
+        **figures,
     )
 
 
-def _figure(now: Weights | None, history: Sequence[Weights], name: str, limit_kg: float | None) -> WeightFigure:
+def _figure(now: Weight, history_kg: Sequence[float]) -> WeightFigure:
     return WeightFigure(
-        kg=None if now is None else _or_none(getattr(now, name).kg),
-        std_kg=None if now is None else _or_none(getattr(now, name).std_kg),
-        limit_kg=limit_kg,
-        is_over_limit=is_over_limit((getattr(weights, name).kg for weights in history), limit_kg),
+        kg=_or_none(now.kg),
+        std_kg=_or_none(now.std_kg),
+        limit_kg=now.limit_kg,
+        is_over_limit=is_over_limit(history_kg, now.limit_kg),
+        lacks=now.lacks,
     )
+
+
+def _place(place: Place | None) -> LoadPlace | None:
+    return None if place is None else LoadPlace(**{name: _or_none(x) for name, x in asdict(place).items()})
 
 
 def _or_none(x: float) -> float | None:
