@@ -10,7 +10,14 @@ from gateway.bus.logs import LogReport
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
-from gateway.calibration.inspection import Inspection, LogFacts, SplitRun, inspect_campaign, row_facts
+from gateway.calibration.inspection import (
+    Inspection,
+    LogFacts,
+    SplitRun,
+    inspect_campaign,
+    row_facts,
+    unmapped_roll_findings,
+)
 from gateway.calibration.judgement import Judged, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
@@ -18,7 +25,7 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
 from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
-from gateway.offline.look import why_silent
+from gateway.offline.look import unmapped_roll_rate, why_silent
 from gateway.records import Batch, Motion, Signal
 from gateway.units import NS_PER_S
 
@@ -86,7 +93,7 @@ def _known_run(campaign: Campaign, number: int, run: RunTable, batches: tuple[Ba
 
 def _silent(log: Path, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:
     """Why mapped inertial signals have no sample to speak of."""
-    wanted = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
+    wanted = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)
     silent = [signal for signal in wanted if signal in motion.signals and len(motion.of(signal)[1]) < 2]
     return {signal: why_silent(log, signal_map, signal) for signal in silent}
 
@@ -123,7 +130,8 @@ def inspect(
     """Reads the logs of the chosen runs and tells of each what is wrong with it, if anything."""
     split = split_runs(campaign, settings, numbers=numbers, on_run=on_run, keeps_unreadable=True)
     verdicts, findings = inspect_campaign(split, campaign.vehicle, settings)
-    return Inspection(tuple(split), verdicts, findings)
+    unmapped = unmapped_roll_rate(load_signal_map(campaign.signals))
+    return Inspection(tuple(split), verdicts, (*findings, *unmapped_roll_findings(unmapped)))
 
 
 def calibrate(

@@ -21,7 +21,7 @@ from gateway.sim.vehicle import Load
 from gateway.sim.vehicle import Vehicle as SimulatedVehicle
 from gateway.workbench.wiring import Wiring
 
-ACCELERATION, PITCH_RATE = Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE
+ACCELERATION, PITCH_RATE, ROLL_RATE = Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE
 
 
 def reference_map() -> SignalMap:
@@ -29,14 +29,24 @@ def reference_map() -> SignalMap:
 
 
 def driven(
-    van: SimulatedVehicle, drive: Drive, position_m: float, load: Load | None = None, gyro_axis: int = 1
+    van: SimulatedVehicle,
+    drive: Drive,
+    position_m: float,
+    load: Load | None = None,
+    gyro_axis: int = 1,
+    rolls_about: int = 0,
+    left_m: float = REFERENCE.mount.left_m,
+    seed: int = 3,
 ) -> Motion:
-    """The van over an ordinary road, its sensors this far behind the front axle; gyro_axis 0 is roll, 2 yaw."""
-    sensors = replace(REFERENCE, mount=replace(REFERENCE.mount, position_m=position_m))
+    """The van over an ordinary road, its sensors this far behind the front axle and left of the centre line.
+
+    gyro_axis and rolls_about say which axes pass for pitch and roll rate: 0 is roll, 1 pitch, 2 yaw.
+    """
+    sensors = replace(REFERENCE, mount=replace(REFERENCE.mount, position_m=position_m, left_m=left_m))
     loads = (load,) if load else ()
-    recording = simulate_drive(van, loads, iso_road("B"), drive, sensors, 3).recording
+    recording = simulate_drive(van, loads, iso_road("B"), drive, sensors, seed).recording
     gyro = recording.gyro_radps.copy()
-    gyro[:, 1] = gyro[:, gyro_axis]
+    gyro[:, [0, 1]] = gyro[:, [rolls_about, gyro_axis]]
     return Decoder(reference_map()).decode(Wiring("reference").frames_of(replace(recording, gyro_radps=gyro)))
 
 

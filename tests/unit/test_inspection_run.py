@@ -8,6 +8,7 @@ import pytest
 from support.inspected import (
     ACCELERATION,
     PITCH_RATE,
+    ROLL_RATE,
     driven,
     exchanged,
     kinds,
@@ -68,6 +69,12 @@ WRONG_MAPS: dict[str, tuple[Callable[[Motion], Motion], list[str]]] = {
         lambda m: exchanged(m, ACCELERATION, PITCH_RATE, 1.0 / DEGREES),
         ["fault:channels_swapped"],
     ),
+    "rates swapped": (lambda m: exchanged(m, PITCH_RATE, ROLL_RATE), ["fault:rates_swapped"]),
+    "rates swapped, one turned": (lambda m: exchanged(m, PITCH_RATE, ROLL_RATE, -1.0), ["fault:rates_swapped"]),
+    "roll as deg/s for rad/s": (lambda m: scaled(m, roll_rate=DEGREES), ["fault:roll_rate_unit"]),
+    "roll as rad/s for deg/s": (lambda m: scaled(m, roll_rate=1.0 / DEGREES), ["fault:roll_rate_unit"]),
+    "pitch and roll turned": (lambda m: scaled(m, pitch_rate=-1.0, roll_rate=-1.0), ["fault:pitch_rate_sign"]),
+    "no roll rate": (lambda m: without(m, ROLL_RATE), ["warning:sensor_silent"]),
     "no pitch rate": (lambda m: without(m, PITCH_RATE), ["fault:sensor_silent"]),
     "no speed": (lambda m: without(m, Signal.SPEED), ["fault:speed_missing"]),
     "km/h for m/s": (lambda m: scaled(m, speed=3.6), ["fault:speed_outside_gate"]),
@@ -83,7 +90,7 @@ def test_a_mistake_gets_its_diagnosis_and_no_other(mistake: str, sound: Motion) 
     spoil, expected = WRONG_MAPS[mistake]
     verdict = verdict_on(spoil(sound), EMPTY, traits_of_reference())
     assert kinds(verdict) == expected
-    assert verdict.is_usable is (expected == [])
+    assert verdict.is_usable is not any(kind.startswith("fault") for kind in expected)
     assert all(finding.text and finding.advice for finding in verdict.findings)
 
 
@@ -91,6 +98,32 @@ def test_a_mistake_gets_its_diagnosis_and_no_other(mistake: str, sound: Motion) 
 def test_roll_or_yaw_mapped_as_pitch_is_named(axis: int) -> None:
     motion = driven(PAPER_VAN, steady(), REAR_M, gyro_axis=axis)
     assert kinds(verdict_on(motion, EMPTY, traits_of_reference())) == ["fault:pitch_rate_axis"]
+
+
+@pytest.mark.parametrize(
+    ("axis", "expected"), [(1, "roll_rate_axis"), (2, "roll_rate_unit")]
+)  # yaw: as small as a misread unit makes roll
+def test_pitch_or_yaw_mapped_as_roll_is_named(axis: int, expected: str) -> None:
+    motion = driven(PAPER_VAN, steady(), REAR_M, rolls_about=axis)
+    assert kinds(verdict_on(motion, EMPTY, traits_of_reference())) == [f"fault:{expected}"]
+
+
+def test_a_roll_rate_that_fails_for_a_while_is_a_warning(sound: Motion) -> None:
+    columns = sound.columns.copy()
+    begin, end = (int(np.searchsorted(sound.t_ns, sound.t_ns[0] + s * 10**9)) for s in (40, 50))
+    column = columns[begin:end, sound.signals.index(ROLL_RATE)]
+    column[np.isfinite(column)] = 0.05
+    verdict = verdict_on(replace(sound, columns=columns), EMPTY, traits_of_reference())
+    assert kinds(verdict) == ["warning:roll_rate_lost"]
+    assert verdict.is_usable
+
+
+def test_a_slow_roll_rate_is_a_warning(sound: Motion) -> None:
+    columns = sound.columns.copy()
+    column = columns[:, sound.signals.index(ROLL_RATE)]
+    known = np.flatnonzero(np.isfinite(column))
+    column[np.delete(known, np.s_[::10])] = np.nan
+    assert kinds(verdict_on(replace(sound, columns=columns), EMPTY, traits_of_reference())) == ["warning:rate_low"]
 
 
 @pytest.mark.parametrize("place", [-0.1, 0.5, 1.15])
@@ -141,9 +174,8 @@ def test_a_drive_shorter_than_a_batch_is_too_short(duration_s: float, sound: Mot
 def test_a_smooth_road_is_a_warning() -> None:
     still = driven(PAPER_VAN, steady(), REAR_M)
     mean = np.nanmean(still.columns, axis=0)
-    smooth = replace(
-        still, columns=np.where(np.arange(len(mean)) < 2, mean + 0.05 * (still.columns - mean), still.columns)
-    )
+    shaken = [signal in (ACCELERATION, PITCH_RATE, ROLL_RATE) for signal in still.signals]
+    smooth = replace(still, columns=np.where(shaken, mean + 0.05 * (still.columns - mean), still.columns))
     verdict = verdict_on(smooth, EMPTY, traits_of_reference())
     assert kinds(verdict) == ["warning:smooth_road"]
 

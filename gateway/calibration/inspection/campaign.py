@@ -11,6 +11,7 @@ from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
 from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.inspection.loads import compare_loads
 from gateway.calibration.inspection.log import same_drive_findings
+from gateway.calibration.inspection.roll_sign import RollSign, roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.inspection.split_run import SplitRun
 from gateway.calibration.known_run import KnownRun
@@ -42,7 +43,20 @@ def inspect_campaign(
     for number, finding in compare_loads(sound, vehicle):
         verdicts[number] = _with(verdicts[number], finding)
     usable = [run for run in sound if verdicts[run.number].is_usable]
-    return tuple(verdicts.values()), tuple(load_findings(usable, vehicle))
+    roll_sign = roll_sign_of(usable, vehicle)
+    if roll_sign is not None and roll_sign.sign < 0:
+        for run in usable:
+            verdicts[run.number] = _with(verdicts[run.number], _turned_over(roll_sign))
+    untold = [_untold(roll_sign)] if roll_sign is not None and roll_sign.sign == 0 else []
+    return tuple(verdicts.values()), (*load_findings(usable, vehicle), *untold)
+
+
+def _turned_over(roll_sign: RollSign) -> Finding:
+    return finding_of(Kind.ROLL_RATE_SIGN, Severity.FAULT, roll_sign.why)
+
+
+def _untold(roll_sign: RollSign) -> Finding:
+    return finding_of(Kind.ROLL_RATE_SIGN_UNTOLD, Severity.NOTE, roll_sign.why)
 
 
 def _with(verdict: RunVerdict, finding: Finding) -> RunVerdict:

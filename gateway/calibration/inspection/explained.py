@@ -1,36 +1,12 @@
 """Every kind of finding in words for the fitter who drove the campaign: what it means, and what to do about it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
 
-from gateway.calibration.inspection.finding import Finding, Severity
+from gateway.calibration.inspection.finding import Explained, Finding, Severity, Topic
 from gateway.calibration.inspection.kinds import Kind
-
-
-class Topic(StrEnum):
-    """Where a finding belongs."""
-
-    DRIVE = "The drive"
-    SENSORS = "The sensors"
-    SPEED = "The speed"
-    LOADS = "The loads"
-
-
-@dataclass(frozen=True, slots=True)
-class Explained:
-    """A kind in words; ``means`` and ``advice`` are parts of sentences, as a table holds them.
-
-    severities are those it may have, the gravest first.
-    """
-
-    topic: Topic
-    severities: tuple[Severity, ...]
-    means: str
-    advice: str
-
+from gateway.calibration.inspection.sensors_explained import SENSORS_EXPLAINED
 
 EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
     {
@@ -87,105 +63,6 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             (Severity.WARNING,),
             "the vehicle hardly shakes, or far less than in the other runs",
             "drive on an ordinary road, the same for all loads",
-        ),
-        Kind.SIGNAL_UNMAPPED: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT, Severity.WARNING),
-            "the signal map does not name this signal",
-            "add it to the signal map: every estimator wants the speed, cross_spectrum wants both sensors",
-        ),
-        Kind.SENSOR_SILENT: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT,),
-            "the signal map names this signal, and the log holds no valid sample of it",
-            "check message, signal and valid_when in the signal map, and that the log is of this bus",
-        ),
-        Kind.RATE_LOW: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT,),
-            "a sensor sends too seldom",
-            "raise its rate in the device: 100 Hz is good",
-        ),
-        Kind.JITTER: Explained(
-            Topic.SENSORS,
-            (Severity.WARNING,),
-            "the stamps of a sensor's frames are uneven: they were buffered on their way",
-            "let the interface stamp frames as they arrive, not the program that stores them",
-        ),
-        Kind.GAPS: Explained(
-            Topic.SENSORS, (Severity.WARNING,), "frames are missing", "check wiring, bus load and what the logger drops"
-        ),
-        Kind.SENSOR_STUCK: Explained(
-            Topic.SENSORS,
-            (Severity.WARNING,),
-            "a sensor repeated one number for seconds",
-            "power-cycle or replace the device",
-        ),
-        Kind.SENSOR_SATURATED: Explained(
-            Topic.SENSORS,
-            (Severity.WARNING,),
-            "a sensor sat at the end of its range",
-            "choose a larger range in the device",
-        ),
-        Kind.CHANNELS_SWAPPED: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT,),
-            "what is mapped as pitch rate carries gravity, and what is mapped as acceleration does not",
-            "exchange message and signal of vertical_acceleration and pitch_rate in the signal map",
-        ),
-        Kind.ACCELERATION_SIGN: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT,),
-            "vertical acceleration reads about -9.81 m/s2 in the mean: its axis points down",
-            "turn sign of vertical_acceleration in the signal map (z up reads +9.81 at rest)",
-        ),
-        Kind.ACCELERATION_UNIT: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT,),
-            "gravity is there, in another unit than the signal map says",
-            "set unit of vertical_acceleration in the signal map",
-        ),
-        Kind.ACCELERATION_AXIS: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT,),
-            "vertical acceleration does not carry gravity: the axis lies level, or the device has removed gravity",
-            "map the axis that reads 9.81 m/s2 at rest, or let the device send gravity",
-        ),
-        Kind.PITCH_RATE_BIAS: Explained(
-            Topic.SENSORS,
-            (Severity.WARNING,),
-            "the pitch rate has a large mean, which no vehicle has",
-            "let the device calibrate its gyroscope at rest; check the offset in the DBC",
-        ),
-        Kind.PITCH_RATE_UNIT: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT,),
-            "the pitch rate is far too large or too small beside the vertical acceleration",
-            "check the unit of pitch_rate in the signal map (deg/s or rad/s) and the scale in the DBC",
-        ),
-        Kind.PITCH_RATE_AXIS: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT,),
-            "pitch rate and vertical acceleration do not move together as one body does",
-            "map the rate about the axis that points sideways (not roll or yaw); both sensors on the same rigid place",
-        ),
-        Kind.PITCH_RATE_SIGN: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT,),
-            "the pitch rate fits the vehicle only when turned over",
-            "turn sign of pitch_rate in the signal map (positive nose down)",
-        ),
-        Kind.SENSOR_POSITION: Explained(
-            Topic.SENSORS,
-            (Severity.FAULT, Severity.WARNING),
-            "the spectra put the sensor elsewhere than sensor_position_m says",
-            "measure again from the front axle, check wheelbase_m and the speed's unit, or widen sensor_position_std_m",
-        ),
-        Kind.COARSE_RESOLUTION: Explained(
-            Topic.SENSORS,
-            (Severity.WARNING,),
-            "a good part of the signal is the sensor's own steps",
-            "choose a smaller range or more bits in the device",
         ),
         Kind.SPEED_MISSING: Explained(
             Topic.SPEED,
@@ -259,6 +136,7 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             "the other runs weigh this one at another load than the file says",
             "check payload and position in the campaign file, and what else was on board",
         ),
+        **SENSORS_EXPLAINED,
     }
 )
 

@@ -38,3 +38,25 @@ class RunVerdict:
     def is_usable(self) -> bool:
         """False where a fault keeps the run out of the calibration."""
         return all(finding.severity is not Severity.FAULT for finding in self.findings)
+
+
+class Topic(StrEnum):
+    """Where a finding belongs."""
+
+    DRIVE = "The drive"
+    SENSORS = "The sensors"
+    SPEED = "The speed"
+    LOADS = "The loads"
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """A kind in words; ``means`` and ``advice`` are parts of sentences, as a table holds them.
+
+    severities are those it may have, the gravest first.
+    """
+
+    topic: Topic
+    severities: tuple[Severity, ...]
+    means: str
+    advice: str

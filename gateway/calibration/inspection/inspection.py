@@ -42,8 +42,7 @@ class Inspection:
         return tuple(self._warnings())
 
     def _warnings(self) -> Iterator[str]:
-        for finding in self.findings:
-            yield f"{finding.kind}: {finding.text}"
+        yield from (f"{one.kind}: {one.text}" for one in self.findings if one.severity is not Severity.NOTE)
         for verdict in self.verdicts:
             kept = Severity.WARNING if verdict.is_usable else Severity.FAULT
             what = f"run {verdict.number}" if verdict.is_usable else f"run {verdict.number} left out"

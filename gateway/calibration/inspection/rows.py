@@ -103,20 +103,21 @@ def unmapped_findings(facts: RowFacts) -> Iterator[Finding]:
 def rate_findings(
     facts: RowFacts, settings: BatchSettings, why_silent: Mapping[Signal, str] = MappingProxyType({})
 ) -> Iterator[Finding]:
-    """Sensors that are silent, slow or unevenly stamped."""
-    for signal in INERTIAL:
+    """Sensors that are silent, slow or unevenly stamped; without a roll rate a vehicle is weighed all the same."""
+    for signal in (*INERTIAL, Signal.ROLL_RATE):
         stream = facts.streams.get(signal)
         if stream is None:
             continue
+        severity = Severity.FAULT if signal in INERTIAL else Severity.WARNING
         if stream.n < 2:
             text = f"{signal} has {stream.n} samples in the whole run"
             why = f": {why_silent[signal]}" if signal in why_silent else ""
-            yield finding_of(Kind.SENSOR_SILENT, Severity.FAULT, text + why)
+            yield finding_of(Kind.SENSOR_SILENT, severity, text + why)
         elif stream.rate_hz < RATE_MIN_SHARE * settings.rate_hz:
             text = (
                 f"{signal} comes at {stream.rate_hz:.3g} Hz, at least {RATE_MIN_SHARE * settings.rate_hz:g} are needed"
             )
-            yield finding_of(Kind.RATE_LOW, Severity.FAULT, text)
+            yield finding_of(Kind.RATE_LOW, severity, text)
         elif not stream.jitter_share <= JITTER_SHARE_MAX:
             share = f"{100.0 * stream.jitter_share:.0f} %" if isfinite(stream.jitter_share) else "more than a whole one"
             yield finding_of(Kind.JITTER, Severity.WARNING, f"intervals of {signal} are off by {share} of their length")

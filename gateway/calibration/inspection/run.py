@@ -1,7 +1,8 @@
 """One known-load drive inspected: what its rows, its batches and its cross-spectra say, as a verdict."""
 
-from collections.abc import Iterator, Sequence
-from math import sqrt
+from collections.abc import Iterable, Iterator, Sequence
+from enum import StrEnum
+from math import nan, sqrt
 from typing import Final
 
 import numpy as np
@@ -22,6 +23,14 @@ from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
 from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.inspection.log import log_findings
+from gateway.calibration.inspection.roll import (
+    ROLL,
+    RollSpectra,
+    exchanged,
+    lost_findings,
+    roll_findings,
+    roll_spectra_of,
+)
 from gateway.calibration.inspection.rows import (
     INERTIAL,
     Mended,
@@ -54,13 +63,16 @@ def inspect_run(drive: SplitRun, vehicle: Vehicle, settings: BatchSettings) -> R
     findings.extend((*of_log, *unmapped_findings(facts), *rate_findings(facts, settings, drive.log.silent)))
     findings.extend(_speed_findings(drive, settings))
     findings.extend(_masked_findings(drive))
+    if not _kinds(findings) & {Kind.SENSOR_SILENT, Kind.RATE_LOW}:
+        findings.extend(lost_findings(drive.batches))
     spectra = cross_spectra_of(drive.batches, reading_of(vehicle))
     if spectra is None and all(signal in facts.streams for signal in INERTIAL):
         findings.extend(_unsteady_findings(drive))
     elif spectra is not None and acceleration.is_axis_sound:
-        findings.extend(_motion_findings(spectra, drive, vehicle, acceleration))
-        findings.extend(_excitation_findings(spectra, facts, acceleration))
-    if not {Kind.CHANNELS_SWAPPED, Kind.PITCH_RATE_UNIT} & {finding.kind for finding in findings}:
+        roll = roll_spectra_of(drive.batches)
+        findings.extend(_motion_findings(spectra, roll, drive, vehicle, acceleration))
+        findings.extend(_excitation_findings(spectra, roll, facts, acceleration))
+    if not {Kind.CHANNELS_SWAPPED, Kind.PITCH_RATE_UNIT} & _kinds(findings):
         findings.extend(bias_findings(facts))
     findings.extend(_batch_findings(drive, settings, has_fault=_has_fault(findings)))
     order = list(Severity)
@@ -71,34 +83,73 @@ def _has_fault(findings: Sequence[Finding]) -> bool:
     return any(finding.severity is Severity.FAULT for finding in findings)
 
 
+def _kinds(findings: Iterable[Finding]) -> set[StrEnum]:
+    return {finding.kind for finding in findings}
+
+
 def _motion_findings(
-    spectra: CrossSpectra, drive: SplitRun, vehicle: Vehicle, acceleration: Mended
+    spectra: CrossSpectra, roll: RollSpectra | None, drive: SplitRun, vehicle: Vehicle, acceleration: Mended
 ) -> Iterator[Finding]:
-    """Axes, signs and units by the cross-spectra; then, if these are right, the sensor's place."""
+    """Axes, signs and units by the cross-spectra; then, if these are right, the roll rate and the sensor's place."""
     spectra = mended(spectra, 1.0 / acceleration.factor)
-    as_read, misread = phases(spectra, drive.run, vehicle), {}
-    apart = list(apart_findings(spectra, as_read))
-    if apart:
-        yield from apart
+    axes, agreement = _axes_findings(drive.batches, spectra, drive, vehicle, acceleration)
+    kinds = _kinds(axes)
+    if kinds & _PITCH_IS_NONE and (swapped := _swapped_finding(drive, vehicle, acceleration, agreement)):
+        yield swapped
         return
+    yield from axes
+    if roll is not None and not kinds & _PITCH_IS_NONE:
+        yield from roll_findings(roll)
+    if not axes:
+        yield from position_findings(spectra, drive.run, vehicle)
+
+
+_PITCH_IS_NONE: Final = frozenset({Kind.PITCH_RATE_AXIS, Kind.PITCH_RATE_UNIT})
+
+
+def _axes_findings(
+    batches: Sequence[Batch], spectra: CrossSpectra, drive: SplitRun, vehicle: Vehicle, acceleration: Mended
+) -> tuple[list[Finding], float]:
+    """What is wrong with the pitch rate and the speed's unit, and how well the phases agree with a vehicle's."""
+    as_read = phases(spectra, drive.run, vehicle)
+    if apart := list(apart_findings(spectra, as_read)):
+        return apart, as_read.best
+    misread = {}
     if as_read.best < BELIEVED_AGREEMENT:
-        misread = _if_speed_misread(drive, vehicle, acceleration)
+        misread = _if_speed_misread(batches, drive, vehicle, acceleration)
     speed_misread, seen = likeliest_speed(as_read, misread)
-    axes = list(phase_findings(seen, speed_misread))
-    yield from axes or position_findings(spectra, drive.run, vehicle)
+    return list(phase_findings(seen, speed_misread)), seen.best
 
 
-def _if_speed_misread(drive: SplitRun, vehicle: Vehicle, acceleration: Mended) -> dict[str, Phases]:
+def _swapped_finding(drive: SplitRun, vehicle: Vehicle, acceleration: Mended, agreement: float) -> Finding | None:
+    """Said where the roll rate is a sound pitch rate, and the pitch rate then a sound roll rate."""
+    batches = exchanged(drive.batches)
+    spectra, roll = cross_spectra_of(batches, reading_of(vehicle)), roll_spectra_of(batches)
+    if spectra is None or roll is None or any(roll_findings(roll)):
+        return None
+    seen = mended(spectra, 1.0 / acceleration.factor)
+    axes, exchanged_agreement = _axes_findings(batches, seen, drive, vehicle, acceleration)
+    if _PITCH_IS_NONE & _kinds(axes):
+        return None
+    text = f"phases agree with the vehicle's by {exchanged_agreement:.2f} exchanged, by {agreement:.2f} as they are"
+    return finding_of(Kind.RATES_SWAPPED, Severity.FAULT, text)
+
+
+def _if_speed_misread(
+    batches: Sequence[Batch], drive: SplitRun, vehicle: Vehicle, acceleration: Mended
+) -> dict[str, Phases]:
     """The phases for each mistake of the speed's unit."""
     found_for = {}
     for what, factor in SPEED_MISREAD.items():
-        spectra = cross_spectra_of(drive.batches, reading_of(vehicle, factor))
+        spectra = cross_spectra_of(batches, reading_of(vehicle, factor))
         if spectra is not None:
             found_for[what] = phases(mended(spectra, 1.0 / acceleration.factor), drive.run, vehicle)
     return found_for
 
 
-def _excitation_findings(spectra: CrossSpectra, facts: RowFacts, acceleration: Mended) -> Iterator[Finding]:
+def _excitation_findings(
+    spectra: CrossSpectra, roll: RollSpectra | None, facts: RowFacts, acceleration: Mended
+) -> Iterator[Finding]:
     rms_mps2 = spectra.acceleration_rms_mps2 * abs(acceleration.factor)
     if rms_mps2 < SMOOTH_MPS2:
         text = f"vertical acceleration is {rms_mps2:.2g} m/s2 (root mean square)"
@@ -107,6 +158,7 @@ def _excitation_findings(spectra: CrossSpectra, facts: RowFacts, acceleration: M
     for signal, rms in (
         (Signal.VERTICAL_ACCELERATION, spectra.acceleration_rms_mps2),
         (Signal.PITCH_RATE, spectra.pitch_rate_rms_radps),
+        (Signal.ROLL_RATE, nan if roll is None else roll.rms(ROLL)),
     ):
         stream = facts.streams.get(signal)
         if stream is None or not np.isfinite(stream.resolution) or not stream.rate_hz > 0.0:

@@ -11,5 +11,16 @@ from gateway.offline.look.look import Look, look
 from gateway.offline.look.readings import Described
 from gateway.offline.look.roles import Found
 from gateway.offline.look.silence import why_silent
+from gateway.offline.look.unmapped import unmapped_roll_rate
 
-__all__ = ["Described", "Fit", "Found", "Heard", "Look", "look", "why_silent", "write_draft"]
+__all__ = [
+    "Described",
+    "Fit",
+    "Found",
+    "Heard",
+    "Look",
+    "look",
+    "unmapped_roll_rate",
+    "why_silent",
+    "write_draft",
+]

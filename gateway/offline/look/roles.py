@@ -27,7 +27,7 @@ _SPEED: Final = re.compile(r"speed|vel|sog|spd", re.IGNORECASE)
 _WORDS: Final = {"vertical": "z", "longitudinal": "x", "forward": "x", "lateral": "y", "transverse": "y"}
 _AXES: Final = "xyz"
 _PITCH: Final = re.compile(r"pitch", re.IGNORECASE)
-_ROLL: Final = re.compile(r"(?<!nt)roll", re.IGNORECASE)  # no controller
+ROLL: Final = re.compile(r"(?<!nt)roll", re.IGNORECASE)  # no controller
 _CHECK: Final = {
     Signal.PITCH_RATE: "it must go up as braking begins, else sign = -1",
     Signal.ROLL_RATE: "it must go up as a bend to the left begins, else sign = -1",
@@ -142,7 +142,7 @@ def _pitch(readings: Sequence[Reading], up: Found, forward: Found | None) -> Fou
 
 def _roll(readings: Sequence[Reading], up: Found, forward: Found | None) -> Found | None:
     """The rate about the axis that points forward."""
-    named = _named(readings, up, Signal.ROLL_RATE, _ROLL)
+    named = _named(readings, up, Signal.ROLL_RATE, ROLL)
     return named or _about(readings, up, Signal.ROLL_RATE, _ahead(up, forward), "the rate about forward")
 
 

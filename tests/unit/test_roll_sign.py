@@ -1,0 +1,110 @@
+"""The roll rate's sign is told by a sensor or loads well off the centre line, and by nothing else."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from support.inspected import driven, kinds, scaled, stated, traits_of_reference
+
+from gateway.calibration.inspection import SplitRun, inspect_campaign, row_facts
+from gateway.calibration.inspection.roll_sign import roll_sign_of
+from gateway.calibration.known_run import KnownRun
+from gateway.core.scheduler import Scheduler
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Vehicle, front_share_pct
+from gateway.records import Motion
+from gateway.sim.drive import constant
+from gateway.sim.vans import PAPER_VAN, VANS
+from gateway.sim.vehicle import Load
+
+REAR_M = 3.2
+SETTINGS = BatchSettings(window_s=120.0)
+LOADS = ((0.0, None), (400.0, 0.4), (400.0, -0.4))  # payload, metres left of the centre line
+PLACED = replace(stated(PAPER_VAN, REAR_M), sensor_offset_left_m=0.35, sensor_offset_left_std_m=0.02)
+SOMEWHERE = replace(PLACED, sensor_offset_left_m=0.0, sensor_offset_left_std_m=UNKNOWN_OFFSET_STD_M)
+
+
+@cache
+def drive(van: str, payload_kg: float, left_m: float | None, sensor_left_m: float) -> Motion:
+    load = Load(payload_kg, 0.5 * VANS[van].wheelbase_m, left_m or 0.0) if payload_kg else None
+    steady = constant(14.0, 130.0, np.random.default_rng(1))
+    return driven(VANS[van], steady, REAR_M, load, left_m=sensor_left_m)
+
+
+def runs(
+    vehicle: Vehicle,
+    *loads: tuple[float, float | None],
+    sensor_left_m: float = 0.35,
+    roll_times: float = 1.0,
+    are_places_noted: bool = True,
+) -> list[SplitRun]:
+    split = []
+    for number, (payload_kg, left_m) in enumerate(loads, 1):
+        motion = scaled(drive(vehicle.name, payload_kg, left_m, sensor_left_m), roll_rate=roll_times)
+        scheduler = Scheduler(SETTINGS, traits_of_reference())
+        batches = (*scheduler.feed(motion), *scheduler.flush())
+        share_pct = front_share_pct(vehicle, payload_kg, 0.5 * vehicle.wheelbase_m)
+        noted_m = left_m if are_places_noted else None
+        run = KnownRun(number, f"{number}.log", payload_kg, share_pct, batches, noted_m)
+        split.append(SplitRun(run, replace(run, batches=()), row_facts(motion, traits_of_reference())))
+    return split
+
+
+def told(vehicle: Vehicle, split: list[SplitRun]) -> int:
+    found = roll_sign_of([one.identification for one in split], vehicle)
+    assert found is not None
+    assert found.why
+    return found.sign
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("name", VANS)
+@pytest.mark.parametrize("sensor_left_m", [0.35, -0.35])
+def test_a_sensor_well_off_the_centre_line_tells_it(name: str, sensor_left_m: float, sign: int) -> None:
+    vehicle = stated(VANS[name], REAR_M)
+    placed = replace(vehicle, sensor_offset_left_m=sensor_left_m, sensor_offset_left_std_m=0.02)
+    split = runs(placed, (0.0, None), sensor_left_m=sensor_left_m, roll_times=float(sign))
+    assert told(placed, split) == sign
+    assert told(vehicle, split) == 0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_loads_noted_well_to_one_side_tell_it_wherever_the_sensor_sits(sign: int) -> None:
+    amidships = runs(SOMEWHERE, *LOADS, sensor_left_m=0.0, roll_times=float(sign))
+    assert told(SOMEWHERE, amidships) == sign
+    assert told(SOMEWHERE, runs(SOMEWHERE, *LOADS, roll_times=float(sign))) == sign
+
+
+def test_it_is_not_guessed() -> None:
+    amidships = replace(PLACED, sensor_offset_left_m=0.0)
+    assert told(amidships, runs(amidships, (0.0, None), sensor_left_m=0.0)) == 0
+    not_noted = runs(SOMEWHERE, *LOADS, sensor_left_m=0.0, are_places_noted=False)
+    assert told(SOMEWHERE, not_noted) == 0
+
+
+def test_a_place_stated_on_the_wrong_side_contradicts_the_loads() -> None:
+    other_side = replace(PLACED, sensor_offset_left_m=-0.35)
+    found = roll_sign_of([one.identification for one in runs(PLACED, *LOADS)], other_side)
+    assert found is not None
+    assert found.sign == 0
+    assert "one of them is stated wrong" in found.why
+
+
+def test_every_run_of_a_campaign_is_told_that_the_sign_is_turned() -> None:
+    verdicts, findings = inspect_campaign(runs(PLACED, *LOADS[:2], roll_times=-1.0), PLACED, SETTINGS)
+    assert [kinds(verdict) for verdict in verdicts] == [["fault:roll_rate_sign"]] * 2
+    assert "roll_rate_sign_untold" not in [finding.kind for finding in findings]
+
+
+def test_what_cannot_be_told_is_a_note_for_all_runs_together() -> None:
+    verdicts, findings = inspect_campaign(runs(SOMEWHERE, LOADS[0]), SOMEWHERE, SETTINGS)
+    assert [kinds(verdict) for verdict in verdicts] == [[]]
+    assert [f"{one.severity}:{one.kind}" for one in findings if "roll" in one.kind] == ["note:roll_rate_sign_untold"]
+    assert "0 ± 0.59 m left of the centre line" in findings[-1].text
+
+
+def test_without_a_roll_rate_nothing_is_said() -> None:
+    (one,) = runs(SOMEWHERE, LOADS[0])
+    batches = tuple(replace(batch, roll_rate_radps=None) for batch in one.identification.batches)
+    assert roll_sign_of([replace(one.identification, batches=batches)], PLACED) is None
