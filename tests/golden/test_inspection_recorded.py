@@ -3,6 +3,7 @@
 That the ten known loads raise none is asked in test_recorded_drives.py, which calibrates with them.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,13 +13,15 @@ from gateway.bus.logs import LogReport
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection import Inspection, SplitRun, row_facts
+from gateway.calibration.inspection.roll_sign import roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M
 from gateway.offline import campaigns as offline_campaigns
 from gateway.offline import inspect
 from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
-from gateway.records import Motion, Signal
+from gateway.records import Batch, Motion, Signal
 
 SETTINGS = BatchSettings()
 
@@ -68,7 +71,57 @@ def test_a_spoiled_signal_map_is_named(
     source = recordings() / folder
     text = (source / "signals.toml").read_text(encoding="utf-8")
     assert old in text
-    spoiled = text.replace(old, new, 1).replace('dbc = ["', f'dbc = ["{source}/')
+    assert faults_with(text.replace(old, new, 1), source, campaign, log, tmp_path) == [expected]
+
+
+@pytest.mark.parametrize(
+    ("folder", "campaign", "log", "pitch", "roll", "expected"),
+    [
+        ("known_loads", "campaign_roll", 7, "PitchRate", "RollRate", []),
+        ("known_loads", "campaign_roll", 7, "RollRate", "PitchRate", ["rates_swapped"]),
+        ("known_loads", "campaign_roll", 7, "PitchRate", "PitchRate", ["roll_rate_axis"]),
+        ("known_loads", "campaign_roll", 7, "PitchRate", "YawRate", ["roll_rate_unit"]),
+        ("real_drive", "campaign_trip_a", 1, "AngularRateZ", "AngularRateY", []),
+        ("real_drive", "campaign_trip_a", 1, "AngularRateY", "AngularRateZ", ["rates_swapped"]),
+        ("real_drive", "campaign_trip_a", 1, "AngularRateZ", "AngularRateX", ["roll_rate_axis"]),
+    ],
+)
+def test_a_roll_rate_at_the_wrong_place_is_named(
+    folder: str, campaign: str, log: int, pitch: str, roll: str, expected: list[str], tmp_path: Path
+) -> None:
+    source = recordings() / folder
+    text = (source / "signals_roll.toml").read_text(encoding="utf-8")
+    of_pitch, of_roll = ("PitchRate", "RollRate") if folder == "known_loads" else ("AngularRateZ", "AngularRateY")
+    assert f'"{of_pitch}"' in text
+    assert f'"{of_roll}"' in text
+    head, tail = text.split("[signals.roll_rate]")
+    spoiled = head.replace(of_pitch, pitch) + "[signals.roll_rate]" + tail.replace(of_roll, roll)
+    assert faults_with(spoiled, source, campaign, log, tmp_path) == expected
+
+
+def test_the_sign_of_the_roll_rate_is_told_by_the_sensors_place() -> None:
+    campaign = load_campaign(recordings() / "known_loads/campaign_roll.toml")
+    split = offline_campaigns.split_runs(campaign, SETTINGS, numbers=[1, 10])
+    runs = [one.identification for one in split]
+    turned = [replace(run, batches=tuple(_roll_turned(batch) for batch in run.batches)) for run in runs]
+    unknown = replace(campaign.vehicle, sensor_offset_left_m=0.0, sensor_offset_left_std_m=UNKNOWN_OFFSET_STD_M)
+    for seen, vehicle, sign in (
+        (runs, campaign.vehicle, 1),
+        (turned, campaign.vehicle, -1),
+        (runs, unknown, 0),
+    ):
+        assert (told := roll_sign_of(seen, vehicle)) is not None
+        assert told.sign == sign
+
+
+def _roll_turned(batch: Batch) -> Batch:
+    assert batch.roll_rate_radps is not None
+    return replace(batch, roll_rate_radps=-batch.roll_rate_radps)
+
+
+def faults_with(signals: str, source: Path, campaign: str, log: int, tmp_path: Path) -> list[str]:
+    """Kinds of the faults of one run, read with this signal map beside the databases of ``source``."""
+    spoiled = signals.replace('dbc = ["', f'dbc = ["{source}/')
     (tmp_path / "signals.toml").write_text(spoiled, encoding="utf-8")
     loaded = load_campaign(source / f"{campaign}.toml")
     run = loaded.runs[log - 1]
@@ -77,7 +130,5 @@ def test_a_spoiled_signal_map_is_named(
     batches = batches_of_motion(motion, signal_map, SETTINGS)
     known = KnownRun(log, str(run.log), run.payload_kg, loaded.front_share_pct(run), batches)
     one = SplitRun(known, KnownRun(log, "", 0.0, 0.0, ()), row_facts(motion, signal_map.traits))
-    faults = [
-        finding.kind for finding in inspect_run(one, loaded.vehicle, SETTINGS).findings if finding.severity == "fault"
-    ]
-    assert faults == [expected]
+    verdict = inspect_run(one, loaded.vehicle, SETTINGS)
+    return [str(finding.kind) for finding in verdict.findings if finding.severity == "fault"]
