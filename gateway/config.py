@@ -3,11 +3,12 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
+from gateway.files.signed import PublicKey, Trust, load_public_keys
 from gateway.toml_file import describe_faults, read_toml
 
 Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years, in nanoseconds within 64 bits
@@ -152,6 +153,28 @@ class UplinkSection(Section):
         return self
 
 
+def _of_a_key(line: str) -> str:
+    PublicKey.of(line)
+    return line
+
+
+KeyLine = Annotated[str, AfterValidator(_of_a_key)]
+
+
+class TrustSection(Section):
+    """Who must have signed what decides a weight: calibration file, signal map, databases."""
+
+    public_keys: tuple[KeyLine, ...] = Field(
+        (),
+        description="ed25519 keys, each the line of a KEY.pub; where any is given, files that none of them signed are "
+        "refused",
+    )
+
+    def for_reading(self) -> Trust:
+        """The same trust for who reads such a file."""
+        return Trust(tuple(dict.fromkeys(map(PublicKey.of, self.public_keys))))
+
+
 class LogSection(Section):
     """What the service writes to its log."""
 
@@ -178,6 +201,7 @@ class Settings(BaseSettings):
     web: WebSection = WebSection()
     store: StoreSection = StoreSection()
     uplink: UplinkSection = UplinkSection()
+    trust: TrustSection = TrustSection()
     log: LogSection = LogSection()
 
     @classmethod
@@ -193,14 +217,19 @@ class Settings(BaseSettings):
         return env_settings, init_settings
 
 
-def load_settings(path: Path) -> Settings:
-    """Settings of ``path`` and the environment, paths made absolute. Raises ConfigurationError naming every fault."""
-    tables = read_toml(path)
+def load_settings(path: Path, trusted_keys: Path | None = None) -> Settings:
+    """Settings of ``path`` and the environment, paths made absolute. Raises ConfigurationError naming every fault.
+
+    ``trusted_keys`` is a file of public keys: one of them must have signed ``path``, and may have signed the rest.
+    """
+    pinned = TrustSection(public_keys=load_public_keys(trusted_keys) if trusted_keys else ())
+    tables = read_toml(path, read=pinned.for_reading().read)
     try:
         settings = Settings(**tables)
     except ValidationError as fault:
         raise ConfigurationError(describe_faults(path, fault)) from None
-    return _with_absolute_paths(settings, path.resolve().parent)
+    trust = TrustSection(public_keys=(*pinned.public_keys, *settings.trust.public_keys))
+    return _with_absolute_paths(settings.model_copy(update={"trust": trust}), path.resolve().parent)
 
 
 def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:

@@ -13,6 +13,10 @@ class ConfigurationError(SpringscaleError):
     exit_code = 2
 
 
+class UntrustedFileError(ConfigurationError):
+    """A file that must be signed is not, or by nobody who is trusted, or was changed afterwards."""
+
+
 class SignalMapError(ConfigurationError):
     """A signal map and its DBC files do not fit together."""
 

@@ -12,6 +12,7 @@ from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.tare import Tare
 from gateway.errors import ConfigurationError
+from gateway.files.signed import Read
 
 NOBODY = Identity()  # a log without a configuration belongs to no named vehicle
 
@@ -49,25 +50,32 @@ def load_setup(
     calibration: Path | str | None = None,
     estimator: str | None = None,
     identity: Identity = NOBODY,
+    read: Read = Path.read_bytes,
 ) -> Setup:
     """Loads the signal map and the calibration file; the best estimator of the file where none is named.
 
+    ``read`` sees to their signatures where they are required (files.signed).
+
     Raises SignalMapError, CalibrationFileError, or ConfigurationError where the file lacks the estimator.
     """
-    held = load_calibration(calibration) if calibration else None
+    held = load_calibration(calibration, read) if calibration else None
     chosen = estimator or (held.estimators[0] if held else "cross_spectrum")
     if held and chosen not in held.estimators:
         raise ConfigurationError(
             f"{calibration}: holds no calibration for the estimator {chosen!r}, only for "
             f"{', '.join(held.estimators)}: choose one of these or calibrate again"
         )
-    return Setup(load_signal_map(signals), held, chosen, identity)
+    return Setup(load_signal_map(signals, read), held, chosen, identity)
 
 
-def setup_of(settings: Settings, estimator: str | None = None) -> Setup:
-    """The setup that a springscale.toml describes. Raises as :func:`load_setup`, and for another vehicle's file."""
+def setup_of(settings: Settings, estimator: str | None = None, read: Read | None = None) -> Setup:
+    """The setup that a springscale.toml describes. Raises as :func:`load_setup`, and for another vehicle's file.
+
+    ``read`` stands in for reading with the trust that the settings describe.
+    """
     identity = Identity(settings.vehicle.id, settings.vehicle.vin)
-    setup = load_setup(settings.signals, settings.calibration, estimator or settings.estimator, identity)
+    read = read or settings.trust.for_reading().read
+    setup = load_setup(settings.signals, settings.calibration, estimator or settings.estimator, identity, read)
     wanted = settings.vehicle.calibrated_as
     if wanted and setup.calibration and setup.calibration.vehicle.name != wanted:
         raise ConfigurationError(

@@ -6,7 +6,8 @@ from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from gateway.errors import ConfigurationError
+from gateway.errors import ConfigurationError, UntrustedFileError
+from gateway.files.signed import Read
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -27,10 +28,14 @@ _TAKEN_FOR: Final = (  # (end of the key, factor to its unit, what the number wa
 )
 
 
-def read_toml(path: Path, error: type[ConfigurationError] = ConfigurationError) -> dict[str, Any]:
+def read_toml(
+    path: Path, error: type[ConfigurationError] = ConfigurationError, read: Read = Path.read_bytes
+) -> dict[str, Any]:
     """The tables of ``path``. Raises ``error`` naming the file, and the line where its syntax breaks."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(read(path).decode("utf-8"))
+    except UntrustedFileError as fault:
+        raise error(str(fault)) from None
     except FileNotFoundError:
         raise error(f"{path}: no such file") from None
     except IsADirectoryError:
@@ -43,9 +48,14 @@ def read_toml(path: Path, error: type[ConfigurationError] = ConfigurationError) 
         raise error(f"{path}: not valid TOML: {fault}") from None
 
 
-def load_toml(path: Path, model: type[Model], error: type[ConfigurationError] = ConfigurationError) -> Model:
+def load_toml(
+    path: Path,
+    model: type[Model],
+    error: type[ConfigurationError] = ConfigurationError,
+    read: Read = Path.read_bytes,
+) -> Model:
     """``path`` as a ``model``. Raises ``error`` with one line for every fault."""
-    return checked(read_toml(path, error), path, model, error)
+    return checked(read_toml(path, error, read), path, model, error)
 
 
 def checked(

@@ -60,7 +60,7 @@ class VehicleTable(_Table):
         0.5,
         gt=0.0,
         le=50.0,
-        description="how sure the front share is, in percentage points; kept, not used",
+        description="how sure the front share is, in percentage points; front shares and axle loads are no surer",
     )
     sensor_offset_left_m: MetresLeft | None = Field(
         None, description="of the sensor, left of the centre line, negative: right of it; absent: not known"

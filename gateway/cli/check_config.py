@@ -6,9 +6,9 @@ from pathlib import Path
 import click
 
 from gateway.calibration.tare_file import FILE_NAME
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, as_json, trusted_keys
 from gateway.config import load_settings
-from gateway.errors import ConfigurationError
+from gateway.errors import ConfigurationError, UntrustedFileError
 from gateway.records import json_line
 from gateway.service.startable import startable_faults
 from gateway.setup import setup_of
@@ -17,11 +17,24 @@ from gateway.uplink import uplink_settings
 
 @click.command("check-config")
 @click.argument("config", type=FILE)
+@trusted_keys
 @as_json
-def check_config(config: Path, as_json: bool) -> None:
+def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None:
     """Check CONFIG, its signal map, its DBC files, its calibration and its tare; name every fault."""
-    settings = load_settings(config)
-    setup = setup_of(settings)
+    settings = load_settings(config, trusted_keys)
+    trust, untrusted = settings.trust.for_reading(), dict[Path, str]()
+
+    def read(path: Path) -> bytes:
+        """Every file that is not signed as it should be is told, not only the first."""
+        try:
+            return trust.read(path)
+        except UntrustedFileError as fault:
+            untrusted[path] = str(fault)
+            return path.read_bytes()
+
+    setup = setup_of(settings, read=read)
+    if untrusted:
+        raise ConfigurationError("\n".join(untrusted.values()))
     tares = settings.store.directory / FILE_NAME
     if os.access(tares, os.R_OK):  # the service's own; others may not be allowed to see it
         setup = setup.with_tare_of(tares)
@@ -37,11 +50,14 @@ def check_config(config: Path, as_json: bool) -> None:
         "estimator": setup.estimator,
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,
+        "trusted_keys": [key.fingerprint for key in trust.keys],
         "uplink": forwarding.broker if forwarding else None,
     }
     if as_json:
         click.echo(json_line(summary))
         return
     click.echo(f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {settings.bus.channel}.")
+    if trust.keys:
+        click.echo(f"Its files are signed as required, by {' or '.join(key.fingerprint for key in trust.keys)}.")
     if setup.calibration is None:
         click.echo("No calibration is configured: batches will carry spectra and rejected = no_calibration.")

@@ -14,6 +14,12 @@ from gateway.core.settings import BatchSettings
 FILE = click.Path(path_type=Path)
 
 as_json = click.option("--json", "as_json", is_flag=True, help="machine-readable output")
+trusted_keys = click.option(
+    "--trusted-keys",
+    type=FILE,
+    default=None,
+    help="file of public keys, one of which must have signed the configuration [default: nobody need]",
+)
 window = click.option(
     "--window-s", type=click.FloatRange(20.0, 3600.0), default=None, help="length of a batch [default: 300]"
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from gateway.cli.options import FILE
+from gateway.cli.options import FILE, trusted_keys
 from gateway.config import load_settings
 from gateway.log import set_up_log
 from gateway.service.gateway import Gateway
@@ -16,9 +16,10 @@ from gateway.service.last_good import setup_or_last_good
 
 @click.command("run")
 @click.option("--config", "config_path", type=FILE, required=True, help="springscale.toml")
-def run(config_path: Path) -> None:
+@trusted_keys
+def run(config_path: Path, trusted_keys: Path | None) -> None:
     """Read the bus, estimate, store and serve until SIGTERM."""
-    load = partial(load_settings, config_path)
+    load = partial(load_settings, config_path, trusted_keys)
     settings = load()
     faulthandler.enable()  # systemd's watchdog ends a hung process with SIGABRT: every stack goes to the journal
     set_up_log(settings.log.level, under_journald="JOURNAL_STREAM" in os.environ)

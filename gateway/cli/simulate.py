@@ -37,6 +37,17 @@ _BENCH = (
         help="drive no load longer than this [default: as the plan has it]",
     ),
     click.option(
+        "--sensor-left-m",
+        type=click.FloatRange(-1.0, 1.0),
+        help="the inertial unit's place left of the centre line [default: as the map's sensors sit]",
+    ),
+    click.option(
+        "--loads-off-m",
+        type=click.FloatRange(0.0, 1.0),
+        default=0.0,
+        help="let every load stand somewhere within this of the centre line [default: as the plan has it]",
+    ),
+    click.option(
         "--unrelated",
         "n_unrelated",
         type=click.IntRange(0, 400),

@@ -9,6 +9,7 @@ from gateway.core.estimator import estimate
 from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, fused, summary
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
+from gateway.core.stated_share import told
 from gateway.core.tare import Tare, Weighed, remembered, tared
 from gateway.core.weights import weighed
 from gateway.estimate import Epoch, Estimate
@@ -77,8 +78,9 @@ class Flow:
         return shown
 
     def _shown(self, found: Estimate) -> Estimate:
-        """As it leaves: less the zero, with the weights that follow."""
-        return weighed(tared(found, self.tare), None if self._calibrated is None else self._calibrated.vehicle)
+        """As it leaves: less the zero, with the weights that follow; epochs and tares are made of what was measured."""
+        vehicle = self._calibrated.vehicle if self._calibrated else None
+        return weighed(tared(told(found, vehicle), self.tare), vehicle)
 
     def _fused(self, batch: Batch, found: Estimate) -> Epoch | None:
         """The load epoch that this batch belongs to; a new drive or a long stop opens a new one."""

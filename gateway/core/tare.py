@@ -15,7 +15,7 @@ from typing import Final
 from gateway.core.fusion import LoadEpoch
 from gateway.core.vehicle import Vehicle
 from gateway.errors import TareRefusedError
-from gateway.estimate import Z95, Correction, Epoch, Estimate, Quantity
+from gateway.estimate import Correction, Epoch, Estimate, Quantity
 
 MOST_PAYLOAD_SHARE: Final = 0.05  # of the empty sprung mass: a larger offset is a load, or asks for a calibration
 MOST_FRONT_SHARE_PCT: Final = 3.0  # percentage points
@@ -152,7 +152,6 @@ def _kept(raw: Quantity, zero: Quantity) -> float:
 
 def _less(raw: Quantity, zero: Quantity) -> Quantity:
     """``raw`` less ``zero``; NaN stays NaN."""
-    below, above = raw.number - raw.interval95[0], raw.interval95[1] - raw.number
-    number = raw.number - zero.number
-    interval95 = (number - math.hypot(below, Z95 * zero.std), number + math.hypot(above, Z95 * zero.std))
-    return Quantity(number, math.hypot(raw.std, zero.std), interval95)
+    low, high = raw.interval95
+    moved = Quantity(raw.number - zero.number, raw.std, (low - zero.number, high - zero.number))
+    return moved.widened(zero.std)

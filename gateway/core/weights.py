@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway.core.stated_share import measured
 from gateway.core.vehicle import Vehicle, left_share_pct
 from gateway.estimate import UNKNOWN, Z95, Estimate, Lack, Quantity, Weight, Weights
 from gateway.records import F64
@@ -227,7 +228,8 @@ def place_of(
 
     the inverse of equation (3) of Bottelli et al. With y and y0 the centres of gravity left of the centre line of
     the whole and of the empty vehicle, moments about that line give y_L = ((M + L) y - M y0) / L. Errors are of
-    first order in L, s and y, as correlated as :func:`weights_of` has it.
+    first order in L, s and y, as correlated as :func:`weights_of` has it. What the
+    empty share adds to the error of s (core.stated_share) is in s0 too, and drops out.
     """
     if not payload.number > Z95 * payload.std:
         return None
@@ -236,7 +238,10 @@ def place_of(
     front_share_of_load = (share * total_kg - empty_share * vehicle.empty_mass_kg) / load_kg
     cg_left_m = sideways.cg_left.number
     left_m = (total_kg * cg_left_m - vehicle.empty_mass_kg * vehicle.empty_cg_left_m) / load_kg
-    errors = _Errors(payload, front_share, correlation, sideways)
+    share_std_pct, correlation = measured(payload, front_share, correlation, vehicle)
+    _, with_cg = measured(payload, front_share, sideways.front_share_correlation, vehicle)
+    beside_empty = replace(sideways, front_share_correlation=with_cg)
+    errors = _Errors(payload, replace(front_share, std=share_std_pct), correlation, beside_empty)
     along = [vehicle.wheelbase_m * slope for slope in ((front_share_of_load - share) / load_kg, -total_kg / load_kg)]
     across = [(cg_left_m - left_m) / load_kg, 0.0, total_kg / load_kg]
     std_m, left_std_m = errors.std(along), errors.std(across)

@@ -1,1 +1,1 @@
-"""The small files a service keeps beside its database: read warily, replaced in one step, set aside, never deleted."""
+"""Files by their bytes: those a service keeps beside its database, those somebody must have signed."""

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from gateway.calibration.file import CalibrationFile
 from gateway.config import Settings
-from gateway.errors import CalibrationFileError
+from gateway.errors import CalibrationFileError, UntrustedFileError
 from gateway.files.kept import KeptFiles
+from gateway.files.signed import SUFFIX, signature_path
 from gateway.log import Event, log_event
 from gateway.setup import Setup, setup_of
 
@@ -37,11 +38,16 @@ def keep_copy(settings: Settings, calibration: CalibrationFile) -> None:
     """Keep it for later starts; a disk that refuses is told and keeps nobody from weighing."""
     if settings.calibration is None:
         return
-    files, name, text = KeptFiles(settings.store.directory), _name_of(settings.calibration), calibration.to_json()
+    files, name, path = KeptFiles(settings.store.directory), _name_of(settings.calibration), settings.calibration
     try:
-        if files.stamp(name) is None or files.read(name) != text.encode():
-            files.write(name, text.encode())
-    except OSError as fault:
+        if settings.trust.public_keys:  # the copy must be believed like the file itself: its very bytes, and who signed
+            kept = {name: settings.trust.for_reading().read(path), name + SUFFIX: signature_path(path).read_bytes()}
+        else:
+            kept = {name: calibration.to_json().encode()}
+        for one, content in kept.items():
+            if files.stamp(one) is None or files.read(one) != content:
+                files.write(one, content)
+    except (OSError, UntrustedFileError) as fault:
         log_event(Event.CALIBRATION_NOT_KEPT, level=logging.WARNING, fault=str(fault))
 
 

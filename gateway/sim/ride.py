@@ -11,6 +11,7 @@ from gateway.sim.drive import Drive
 from gateway.sim.integrator import FIRST_LOAD, GROUND, N_BODY, Course, accelerations, integrate, look_up_ground
 from gateway.sim.road import Road
 from gateway.sim.vehicle import Load, Vehicle
+from gateway.units import STANDARD_GRAVITY_MPS2
 
 STEP_S: Final = 0.001
 RECORD_EVERY: Final = 2
@@ -98,6 +99,14 @@ def equilibrium(chassis: Chassis, course: Course) -> tuple[F64, F64]:
             break
     _residual(chassis, position, still, tyre_n)
     return position, tyre_n
+
+
+def wheel_loads_kg(vehicle: Vehicle, loads: tuple[Load, ...]) -> F64:
+    """What scales under the four wheels (front left and right, rear left and right) show at rest on level ground."""
+    level = np.zeros(2)
+    course = Course(1.0, level, level, vehicle.wheelbase_m, 1.0, level, level, level, level)
+    _, tyre_n = equilibrium(chassis_of(vehicle, loads), course)
+    return tyre_n / STANDARD_GRAVITY_MPS2
 
 
 def _residual(chassis: Chassis, position: F64, ground: Records, tyre_n: F64) -> F64:

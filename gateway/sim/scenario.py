@@ -9,11 +9,11 @@ import numpy as np
 
 from gateway.records import F64, I64
 from gateway.sim.drive import Drive
-from gateway.sim.ride import ride
+from gateway.sim.ride import ride, wheel_loads_kg
 from gateway.sim.road import Road, RoadRecipe
 from gateway.sim.sensing import Felt, felt_at, joined, record
 from gateway.sim.sensors import Recording, Sensors
-from gateway.sim.vehicle import Load, Vehicle, axle_loads_kg, front_share_pct, payload_kg
+from gateway.sim.vehicle import Load, Vehicle, axle_loads_kg, cg_left_m, front_share_pct, payload_kg
 
 START_NS: Final = 1_767_225_600_000_000_000  # 2026-01-01 00:00:00 UTC
 _SETTLE_S: Final = 5.0
@@ -30,12 +30,18 @@ class LoadStep:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What was carried, from t_ns (k,) on: payload_kg, front_share_pct (k,), axle_loads_kg (k, 2) front and rear."""
+    """What was carried, from t_ns (k,) on: payload_kg, front_share_pct, cg_left_m (k,), and what scales showed.
+
+    cg_left_m is the sprung mass's centre of gravity left of the centre line; axle_loads_kg (k, 2) front and rear;
+    wheel_loads_kg (k, 4) front left and right, rear left and right.
+    """
 
     t_ns: I64
     payload_kg: F64
     front_share_pct: F64
     axle_loads_kg: F64
+    cg_left_m: F64
+    wheel_loads_kg: F64
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,4 +124,6 @@ def _truth(vehicle: Vehicle, steps: list[LoadStep], start_ns: int) -> Truth:
         payload_kg=np.array([payload_kg(step.loads) for step in steps]),
         front_share_pct=np.array([front_share_pct(vehicle, step.loads) for step in steps]),
         axle_loads_kg=np.array([axle_loads_kg(vehicle, step.loads) for step in steps]),
+        cg_left_m=np.array([cg_left_m(vehicle, step.loads) for step in steps]),
+        wheel_loads_kg=np.array([wheel_loads_kg(vehicle, step.loads) for step in steps]),
     )

@@ -127,6 +127,17 @@ def front_share_pct(vehicle: Vehicle, loads: tuple[Load, ...]) -> float:
     return 100.0 * (1.0 - moment / ((vehicle.sprung_kg + payload_kg(loads)) * vehicle.wheelbase_m))
 
 
+def payload_left_m(loads: tuple[Load, ...]) -> float:
+    """The payload's centre of gravity left of the centre line; 0 without payload."""
+    mass_kg = payload_kg(loads)
+    return sum(load.mass_kg * load.left_m for load in loads) / mass_kg if mass_kg > 0.0 else 0.0
+
+
+def cg_left_m(vehicle: Vehicle, loads: tuple[Load, ...]) -> float:
+    """The sprung mass's centre of gravity left of the centre line; the empty body's lies on it."""
+    return payload_kg(loads) * payload_left_m(loads) / (vehicle.sprung_kg + payload_kg(loads))
+
+
 def axle_loads_kg(vehicle: Vehicle, loads: tuple[Load, ...]) -> tuple[float, float]:
     """What scales under the front and the rear axle show at rest: moments about the axles, unsprung included."""
     sprung = vehicle.sprung_kg + payload_kg(loads)

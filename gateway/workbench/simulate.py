@@ -5,7 +5,7 @@ import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from shutil import copyfile
@@ -18,20 +18,25 @@ from gateway.bus.logs import write_candump
 from gateway.bus.signals import SignalMapFile, shipped_map
 from gateway.bus.sink import BusSink, OnProgress, Speed, replay_frames
 from gateway.errors import ConfigurationError, SignalMapError
-from gateway.records import Frames
+from gateway.records import F64, Frames
 from gateway.sim.scenario import START_NS, SimulatedDrive, simulate_drive
 from gateway.sim.sensors import CANMOD, REFERENCE, Sensors
 from gateway.sim.vans import VANS
-from gateway.sim.vehicle import Vehicle, front_share_pct, payload_kg
+from gateway.sim.vehicle import Vehicle, front_share_pct, payload_kg, payload_left_m
 from gateway.toml_file import load_toml
 from gateway.units import NS_PER_S
 from gateway.workbench.campaigns import PLANS, Carried, Plan, PlannedDrive, plan_of, share_range_pct
+from gateway.workbench.sideways import sideways
 from gateway.workbench.wiring import Wiring, unrelated_traffic
 
 OnDrive = Callable[[int, int], None]  # (drives done, drives in all)
 
 CHANNEL: Final = "can0"
 BETWEEN_DRIVES_S: Final = 120.0  # the bus sleeps while the vehicle is parked
+TRUTH_COLUMNS: Final = (
+    "log", "t_ns", "payload_kg", "front_share_pct", "front_axle_kg", "rear_axle_kg", "cg_left_m",
+    "front_left_kg", "front_right_kg", "rear_left_kg", "rear_right_kg",
+)  # fmt: skip
 SENSORS_OF_MAP: Final = {"reference": REFERENCE, "canmod_gps": CANMOD, "j1939": REFERENCE}
 
 
@@ -39,7 +44,9 @@ SENSORS_OF_MAP: Final = {"reference": REFERENCE, "canmod_gps": CANMOD, "j1939": 
 class Bench:
     """What is simulated: a plan of this kind with this vehicle, its sensors sending as a shipped signal map tells.
 
-    n_unrelated other identifiers share the bus. No load is driven longer than longest_s.
+    n_unrelated other identifiers share the bus. No load is driven longer than longest_s. The inertial unit sits
+    sensor_left_m left of the centre line (None: where its mount has it); every load stands somewhere within loads_off_m
+    of that line (0: where the plan has it).
     """
 
     kind: str
@@ -48,13 +55,22 @@ class Bench:
     seed: int = 1
     n_unrelated: int = 0
     longest_s: float = math.inf
+    sensor_left_m: float | None = None
+    loads_off_m: float = 0.0
 
     @property
     def sensors(self) -> Sensors:
-        return SENSORS_OF_MAP[self.map_name]
+        sensors = SENSORS_OF_MAP[self.map_name]
+        if self.sensor_left_m is None:
+            return sensors
+        return replace(sensors, mount=replace(sensors.mount, left_m=self.sensor_left_m))
 
     def plan(self) -> Plan:
-        return plan_of(self.kind, self.vehicle, self.seed, self.longest_s)
+        plan = plan_of(self.kind, self.vehicle, self.seed, self.longest_s)
+        if self.loads_off_m == 0.0:
+            return plan
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(1,)))
+        return sideways(plan, self.loads_off_m, rng)
 
     def simulate(self, planned: PlannedDrive, number: int, start_ns: int) -> SimulatedDrive:
         """Drive ``number`` of the plan, begun at start_ns."""
@@ -78,6 +94,8 @@ def bench_of(
     seed: int = 1,
     n_unrelated: int = 0,
     longest_s: float = math.inf,
+    sensor_left_m: float | None = None,
+    loads_off_m: float = 0.0,
 ) -> Bench:
     """A bench from names. Raises ConfigurationError for a name that is not there, naming those that are."""
     for what, name, known in (
@@ -89,7 +107,7 @@ def bench_of(
             raise ConfigurationError(f"there is no {what} {name!r}: choose {', '.join(known)}")
     if not longest_s > 0.0:
         raise ConfigurationError(f"a drive needs a positive duration, not {longest_s:g} s")
-    return Bench(kind, VANS[vehicle], map_name, seed, n_unrelated, longest_s)
+    return Bench(kind, VANS[vehicle], map_name, seed, n_unrelated, longest_s, sensor_left_m, loads_off_m)
 
 
 def write_campaign(
@@ -157,15 +175,25 @@ def _write_drive(bench: Bench, plan: Plan, directory: Path, logs: Sequence[str],
     log.parent.mkdir(exist_ok=True)
     write_candump(bench.frames_of(planned, number, driven), CHANNEL, log)
     truth = driven.truth
-    columns = zip(truth.t_ns, truth.payload_kg, truth.front_share_pct, truth.axle_loads_kg, strict=True)
-    return [[logs[number], str(t), f"{kg:.3f}", f"{d:.4f}", f"{f:.3f}", f"{r:.3f}"] for t, kg, d, (f, r) in columns]
+    columns = zip(
+        truth.t_ns, truth.payload_kg, truth.front_share_pct, truth.axle_loads_kg, truth.cg_left_m, truth.wheel_loads_kg,
+        strict=True,
+    )  # fmt: skip
+    return [
+        [logs[number], str(t), f"{kg:.3f}", f"{d:.4f}", *_kg(axles), f"{left_m:.5f}", *_kg(wheels)]
+        for t, kg, d, axles, left_m, wheels in columns
+    ]
+
+
+def _kg(weights: F64) -> list[str]:
+    return [f"{kg:.3f}" for kg in weights]
 
 
 def _write_truth(path: Path, drives: Sequence[Sequence[Sequence[str]]]) -> None:
     """One row a load: it was on board from t_ns on."""
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(("log", "t_ns", "payload_kg", "front_share_pct", "front_axle_kg", "rear_axle_kg"))
+        table.writerow(TRUTH_COLUMNS)
         table.writerows(row for drive in drives for row in drive)
 
 
@@ -190,6 +218,7 @@ def _campaign_text(bench: Bench, plan: Plan, logs: Sequence[str]) -> str:
         f"wheelbase_m = {vehicle.wheelbase_m}",
         f"empty_front_share_pct = {vehicle.empty_front_share_pct:.6g}",
         f"sensor_position_m = {mount.position_m}",
+        f"track_width_m = {(vehicle.front.track_m + vehicle.rear.track_m) / 2.0:.6g}",
         f"sensor_offset_left_m = {mount.left_m}",
         f"payload_range_kg = [0.0, {vehicle.rated_payload_kg}]",
         f"front_share_range_pct = [{low}, {high}]",
@@ -210,6 +239,8 @@ def _run_lines(vehicle: Vehicle, planned: PlannedDrive, carried: Carried) -> lis
         lines.append(f"payload_position_m = {carried.loads[0].position_m:.6g}")
     elif carried.loads:
         lines.append(f"front_share_pct = {front_share_pct(vehicle, carried.loads):.6g}")
+    if carried.loads:
+        lines.append(f"payload_left_m = {payload_left_m(carried.loads):.6g}")
     if carried.start_s > 0.0:
         lines.append(f"start_s = {carried.start_s:.3f}")
     if carried.end_s < planned.drive.duration_s:

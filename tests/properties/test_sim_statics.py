@@ -1,5 +1,7 @@
 """Statics hold for every vehicle and load."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,10 +10,10 @@ from support.statics import static_axle_loads_kg
 from support.textbook import linearised
 
 from gateway.sim.drive import constant
-from gateway.sim.ride import ride
+from gateway.sim.ride import ride, wheel_loads_kg
 from gateway.sim.road import PaperRoad
 from gateway.sim.vans import PAPER_VAN, VANS
-from gateway.sim.vehicle import Load, axle_loads_kg, front_share_pct, load_for_share, payload_kg
+from gateway.sim.vehicle import Load, axle_loads_kg, cg_left_m, front_share_pct, load_for_share, payload_kg
 
 vehicles = st.sampled_from(list(VANS.values()))
 loads = st.lists(
@@ -64,3 +66,14 @@ def test_the_textbook_car_is_linear(seed, gain):
     higher = type(road)(road.step_m, gain * road.left_m, gain * road.right_m)
     one, other = (ride(linearised(PAPER_VAN), (), r, drive).acceleration for r in (road, higher))
     assert np.allclose(other, gain * one, atol=1e-7 * np.max(np.abs(one)) + 1e-9)
+
+
+@given(vehicle=vehicles, load=loads)
+def test_left_wheels_bear_what_moments_about_the_right_ones_demand(vehicle, load):
+    """Neither springs nor anti-roll bars move weight across the vehicle, only to and fro between its axles."""
+    even = replace(vehicle, rear=replace(vehicle.rear, track_m=vehicle.front.track_m))
+    front_left, front_right, rear_left, rear_right = wheel_loads_kg(even, load)
+    sprung_kg = vehicle.sprung_kg + payload_kg(load)
+    assert (front_left + rear_left) - (front_right + rear_right) == pytest.approx(
+        2.0 * sprung_kg * cg_left_m(vehicle, load) / even.front.track_m, abs=1e-6
+    )

@@ -11,10 +11,10 @@ TESTS = Path(__file__).parents[1]
 
 
 @contextmanager
-def running_service(config: Path, **environment: str) -> Iterator["subprocess.Popen[str]"]:
+def running_service(config: Path, *options: str, **environment: str) -> Iterator["subprocess.Popen[str]"]:
     """springscale run, unhurried (see support.unhurried); its output is to be read with ``communicate``."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "support.unhurried", "run", "--config", str(config)],
+        [sys.executable, "-m", "support.unhurried", "run", "--config", str(config), *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -12,6 +12,7 @@ from support.patience import wait_until
 from gateway.bus.live import LiveSource
 from gateway.calibration.campaign import load_campaign
 from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import cg_left_m, left_share_pct
 from gateway.errors import ConfigurationError
 from gateway.offline import split_runs
 from gateway.records import Why
@@ -106,6 +107,38 @@ def test_the_truth_lies_beside_the_logs(tmp_path: Path) -> None:
         assert float(row["front_axle_kg"]) == pytest.approx(
             sprung * float(row["front_share_pct"]) / 100.0 + unsprung, abs=0.1
         )
+
+
+def test_loads_and_sensor_stand_beside_the_centre_line_where_asked(tmp_path: Path) -> None:
+    bench = bench_of("experiment", longest_s=2.0, sensor_left_m=-0.4, loads_off_m=0.3)
+    campaign = load_campaign(write_campaign(bench, tmp_path))
+    vehicle = campaign.vehicle
+    assert vehicle.sensor_offset_left_m == -0.4
+    assert vehicle.track_width_m == 1.5
+    with (tmp_path / "truth.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    lefts_m = [run.payload_left_m for run in campaign.runs if run.payload_kg]
+    assert all(left_m is not None and abs(left_m) <= 0.3 for left_m in lefts_m)
+    assert len(set(lefts_m)) == len(lefts_m) == 9
+    for row, run in zip(rows, campaign.runs, strict=True):
+        cg_m = cg_left_m(vehicle, run.payload_kg, run.payload_left_m or 0.0)
+        assert float(row["cg_left_m"]) == pytest.approx(cg_m, abs=1e-5)
+        front, rear = float(row["front_axle_kg"]), float(row["rear_axle_kg"])
+        left = float(row["front_left_kg"]) + float(row["rear_left_kg"])
+        assert float(row["front_left_kg"]) + float(row["front_right_kg"]) == pytest.approx(front, abs=0.01)
+        # moments about the right wheels' line of contact; the body hardly leans
+        sprung = vehicle.empty_mass_kg + run.payload_kg
+        assert 100.0 * (left - (front + rear - sprung) / 2.0) / sprung == pytest.approx(
+            left_share_pct(cg_m, vehicle.track_width_m), abs=0.01
+        )
+
+
+def test_a_plan_on_the_centre_line_is_the_plan() -> None:
+    one, other = (bench_of("mixed", longest_s=3.0, loads_off_m=off_m).plan() for off_m in (0.0, 0.2))
+    assert {load.left_m for drive in one.drives for step in drive.steps for load in step.loads} == {0.1}
+    for before, after in zip(one.drives, other.drives, strict=True):
+        assert [step.t_s for step in before.steps] == [step.t_s for step in after.steps]
+        assert [payload_kg(c.loads) for c in before.carried] == [payload_kg(c.loads) for c in after.carried]
 
 
 def test_a_campaign_is_not_written_over(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.batches import batches_of_motion, read_whole_log
 from gateway.records import EXTENDED_ID, Motion, Signal
-from gateway.sim.drive import constant
+from gateway.sim.drive import Drive, constant
 from gateway.sim.road import PaperRoad
 from gateway.sim.scenario import simulate_drive
 from gateway.sim.sensors import REFERENCE, Clock, Gps, Imu, Recording, Sensors
@@ -142,3 +142,18 @@ def motion_of_arrays(recording: Recording) -> Motion:
     stamps = np.concatenate([t_ns for t_ns, _ in parts]) // 1000 * 1000
     order = np.argsort(stamps, kind="stable")
     return Motion(signals, stamps[order], columns[order])
+
+
+@pytest.mark.parametrize("name", WIRED_MAPS)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_bend_to_the_left_rolls_the_left_side_up(name: str, side: float) -> None:
+    """The body leans outwards: its left side rises as a left bend begins, and that is a positive roll rate."""
+    lateral_mps2 = side * np.interp(np.arange(401) * 0.01, [1.0, 1.8], [0.0, 2.0])
+    bend = Drive(np.full(401, 14.0), lateral_mps2, 0.01)
+    sensors = Sensors(imu=Imu(100.0), gps=Gps(5.0))
+    recording = simulate_drive(PAPER_VAN, (), PaperRoad(sigma_m=1e-6), bend, sensors, 3).recording
+    motion = Decoder(load_signal_map(f"springscale:{name}")).decode(Wiring(name).frames_of(recording))
+    t_ns, roll_rate = motion.of(Signal.ROLL_RATE)
+    begins = (t_ns - t_ns[0] > 1_000_000_000) & (t_ns - t_ns[0] < 1_800_000_000)
+    assert side * np.mean(roll_rate[begins]) > 0.01
+    assert np.abs(np.mean(motion.of(Signal.PITCH_RATE)[1][begins])) < 1e-3

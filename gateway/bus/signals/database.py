@@ -1,10 +1,12 @@
 """CAN databases through cantools, reduced to what decoding needs. The only room's corner that knows cantools."""
 
 import difflib
+import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import cantools
 from cantools.database.can import Message as CantoolsMessage
@@ -12,11 +14,14 @@ from cantools.database.can import Signal as CantoolsSignal
 from cantools.database.errors import UnsupportedDatabaseFormatError
 
 from gateway.bus.signals.bit_field import BitField, Coding
-from gateway.errors import SignalMapError
+from gateway.errors import SignalMapError, UntrustedFileError
+from gateway.files.signed import Read
 from gateway.records import EXTENDED_ID
 
 _LONG_SIGNAL = re.compile(rb"^\s*SG_\s+(\w+)[^:\n]*:\s*\d+\s*\|\s*0*[1-9]\d{3,}\s*@", re.MULTILINE)
 _FRAME_ID = re.compile(rb"^\s*BO_\s+0*(\d+)\s", re.MULTILINE)
+
+ENCODINGS: Final = {"dbc": "cp1252", "sym": "cp1252", "kcd": "utf-8", "arxml": "utf-8", "cdd": "utf-8"}  # as cantools'
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +49,11 @@ class DatabaseMessage:
     source: Path
 
 
-def load_messages(map_path: Path, paths: Sequence[Path]) -> dict[str, DatabaseMessage]:
+def load_messages(map_path: Path, paths: Sequence[Path], read: Read = Path.read_bytes) -> dict[str, DatabaseMessage]:
     """Every message of the databases by name. Raises SignalMapError naming ``map_path`` and the file at fault."""
     messages: dict[str, DatabaseMessage] = {}
     for path in paths:
-        for message in _load(map_path, path):
+        for message in _load(map_path, path, read):
             name = str(message.name)
             if name in messages:
                 raise SignalMapError(
@@ -67,13 +72,21 @@ def closest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"there are {listed or 'none'}"
 
 
-def _load(map_path: Path, path: Path) -> list[CantoolsMessage]:
+def _load(map_path: Path, path: Path, read: Read) -> list[CantoolsMessage]:
     if not path.is_file():
         raise SignalMapError(f"{map_path}: dbc: no such file: {path}; paths are relative to the map")
-    _refuse_absurd(map_path, path)
+    kind = path.suffix.removeprefix(".").lower()
+    if kind not in ENCODINGS:
+        raise SignalMapError(f"{map_path}: dbc: {path}: its name must end in .{', .'.join(ENCODINGS)}")
+    try:
+        content = read(path)
+    except (OSError, UntrustedFileError) as fault:
+        raise SignalMapError(f"{map_path}: dbc: {fault}") from None
+    _refuse_absurd(map_path, path, content)
     try:
         # not strict: vendors' databases with overlapping signals are common, and a field is checked when it is mapped
-        database = cantools.database.load_file(path, strict=False)
+        text = io.TextIOWrapper(io.BytesIO(content), ENCODINGS[kind], errors="replace").read()
+        database = cantools.database.load_string(text, kind, strict=False)
     except (UnsupportedDatabaseFormatError, cantools.Error, UnicodeDecodeError) as fault:
         raise SignalMapError(f"{map_path}: dbc: {path} cannot be read as a CAN database: {fault}") from None
     if not isinstance(database, cantools.database.can.Database):
@@ -81,9 +94,8 @@ def _load(map_path: Path, path: Path) -> list[CantoolsMessage]:
     return list(database.messages)
 
 
-def _refuse_absurd(map_path: Path, path: Path) -> None:
+def _refuse_absurd(map_path: Path, path: Path, text: bytes) -> None:
     """cantools takes a minute for a signal of a billion bits, and cuts an identifier of 33 bits down to another."""
-    text = path.read_bytes()
     long = _LONG_SIGNAL.search(text)
     if long is not None:
         raise SignalMapError(f"{map_path}: dbc: {path}: signal {long[1].decode()!r} is longer than any message")

@@ -10,6 +10,7 @@ from gateway.bus.signals.database import DatabaseMessage, closest, load_messages
 from gateway.bus.signals.mapping import MappedMessage, MappedSignal, SignalMap, exact_filter, j1939_filter
 from gateway.bus.signals.resolve import resolve_signal
 from gateway.errors import SignalMapError
+from gateway.files.signed import Read
 from gateway.records import EXTENDED_ID, Signal
 from gateway.toml_file import load_toml
 
@@ -52,15 +53,19 @@ class SignalMapFile(BaseModel):
     signals: dict[Signal, SignalEntry] = Field(min_length=1, description="our signals")
 
 
-def load_signal_map(path: Path | str) -> SignalMap:
+def load_signal_map(path: Path | str, read: Read = Path.read_bytes) -> SignalMap:
     """Read and resolve a signal map; ``springscale:NAME`` is one of those that come with the package.
+
+    ``read`` sees to the signatures where they are required (files.signed); what comes with the package needs none.
 
     Raises SignalMapError naming the file, the key, what is wrong with it and how to mend it.
     """
     name = str(path)
-    file_path = shipped_map(name.removeprefix(SHIPPED_PREFIX)) if name.startswith(SHIPPED_PREFIX) else Path(path)
-    wanted = load_toml(file_path, SignalMapFile, SignalMapError)
-    databases = load_messages(file_path, [file_path.parent / dbc for dbc in wanted.dbc])
+    is_shipped = name.startswith(SHIPPED_PREFIX)
+    file_path = shipped_map(name.removeprefix(SHIPPED_PREFIX)) if is_shipped else Path(path)
+    reading = Path.read_bytes if is_shipped else read
+    wanted = load_toml(file_path, SignalMapFile, SignalMapError, reading)
+    databases = load_messages(file_path, [file_path.parent / dbc for dbc in wanted.dbc], reading)
     mapped: dict[str, list[MappedSignal]] = {}
     for signal, entry in wanted.signals.items():
         where = f"{file_path}: signals.{signal}"

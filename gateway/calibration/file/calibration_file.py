@@ -21,7 +21,8 @@ from gateway.calibration.file.parts import (
 )
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle, sensor_offset_left
-from gateway.errors import CalibrationFileError
+from gateway.errors import CalibrationFileError, UntrustedFileError
+from gateway.files.signed import Read
 from gateway.toml_file import describe_faults
 
 Content = dict[str, Any]
@@ -89,13 +90,15 @@ def content_id(content: dict[str, Any]) -> str:
     return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_calibration(path: Path | str) -> CalibrationFile:
+def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> CalibrationFile:
     """Reads, checks version, hash and shape; an older version is migrated, what it did not say is null.
+
+    ``read`` sees to the signature where one is required (files.signed).
 
     Raises CalibrationFileError saying what to do.
     """
     path = Path(path)
-    content = _read(path)
+    content = _read(path, read)
     if content.get("format") != FORMAT:
         raise CalibrationFileError(f"{path}: not a springscale calibration file (format is {content.get('format')!r})")
     _refuse_unknown_version(path, content.get("version"))
@@ -139,11 +142,13 @@ def _matches_its_id(content: dict[str, Any]) -> bool:
         return False
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path, read: Read) -> dict[str, Any]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read(path).decode("utf-8"))
     except FileNotFoundError:
         raise CalibrationFileError(f"{path}: no such calibration file") from None
+    except UntrustedFileError as fault:
+        raise CalibrationFileError(str(fault)) from None
     except (OSError, UnicodeDecodeError) as fault:
         raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
     except (ValueError, RecursionError) as fault:  # a number of 5000 digits and brackets 5000 deep are no JSON for us

@@ -1,0 +1,169 @@
+"""Files that somebody must have signed: FILE.sig beside FILE, as `ssh-keygen -Y sign` writes it for an ed25519 key.
+
+Nothing here can sign. A signature is not parsed but written anew around its own key and its last 64 bytes, and must
+then agree byte for byte: there is one way to write it.
+
+Format: PROTOCOL.sshsig of OpenSSH; public keys: RFC 8709, section 4; ed25519: RFC 8032.
+"""
+
+import base64
+import binascii
+import hashlib
+import textwrap
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from nacl.exceptions import BadSignatureError
+from nacl.signing import VerifyKey
+
+from gateway.errors import ConfigurationError, UntrustedFileError
+
+Read = Callable[[Path], bytes]  # what a file holds; raises OSError, and UntrustedFileError where that is not believed
+
+SUFFIX: Final = ".sig"
+COMMAND: Final = "ssh-keygen -Y sign -n springscale -f KEY"
+NAMESPACE: Final = b"springscale"  # a signature of a commit or a letter by the same key is none of a calibration
+KEY_TYPE: Final = b"ssh-ed25519"
+MAGIC: Final = b"SSHSIG"
+VERSION: Final = (1).to_bytes(4)
+NO_SIGNATURE: Final = (
+    f"its {SUFFIX} is no signature of an ed25519 key for the namespace springscale; sign it where the key is"
+)
+HASHES: Final = ("sha512", "sha256")  # ssh-keygen takes the first unless told otherwise
+BEGIN: Final = "-----BEGIN SSH SIGNATURE-----\n"
+END: Final = "\n-----END SSH SIGNATURE-----\n"
+COLUMNS: Final = 70
+KEY_BYTES: Final = 32
+SIGNATURE_BYTES: Final = 64
+MOST_BYTES: Final = 4096  # of a signature's file; it has some 300
+
+
+def _string(content: bytes) -> bytes:
+    """As SSH writes one: its length before it (RFC 4251, section 5)."""
+    return len(content).to_bytes(4) + content
+
+
+@dataclass(frozen=True, slots=True)
+class PublicKey:
+    """An ed25519 key whose signatures are believed."""
+
+    blob: bytes  # type and key, as SSH writes them
+
+    def __post_init__(self) -> None:
+        if self.blob != _string(KEY_TYPE) + _string(self.point) or len(self.point) != KEY_BYTES:
+            raise ValueError("not an ed25519 key")
+
+    @classmethod
+    def of(cls, line: str) -> "PublicKey":
+        """Of a line as ssh-keygen writes it into KEY.pub: ssh-ed25519 AAAA... and maybe whose it is.
+
+        Raises ValueError where the line is another.
+        """
+        kind, encoded, *_ = (*line.split(), "", "")
+        try:
+            if kind.encode() != KEY_TYPE:
+                raise ValueError
+            return cls(base64.b64decode(encoded, validate=True))
+        except ValueError:
+            wanted = "the one line of KEY.pub that `ssh-keygen -t ed25519` made: ssh-ed25519 AAAA..."
+            raise ValueError(f"not a public key; wanted is {wanted}") from None
+
+    @property
+    def point(self) -> bytes:
+        """The key itself."""
+        return self.blob[-KEY_BYTES:]
+
+    @property
+    def fingerprint(self) -> str:
+        """As `ssh-keygen -l` shows it."""
+        return "SHA256:" + base64.b64encode(hashlib.sha256(self.blob).digest()).decode().rstrip("=")
+
+
+@dataclass(frozen=True, slots=True)
+class Trust:
+    """Whose files are believed: those that one of the keys has signed; without any key, all."""
+
+    keys: tuple[PublicKey, ...] = ()
+
+    def read(self, path: Path) -> bytes:
+        """What the file holds. Raises OSError; UntrustedFileError saying what is wrong and how to mend it."""
+        content = path.read_bytes()
+        if self.keys:
+            try:
+                self._believe(content, _signature_of(path))
+            except ValueError as fault:
+                raise UntrustedFileError(f"{path}: {fault}: {COMMAND} {path.name}") from None
+        return content
+
+    def _believe(self, content: bytes, signature: str) -> None:
+        key, hash_name, signed = _taken_apart(signature)
+        if key not in self.keys:
+            trusted = " or ".join(known.fingerprint for known in self.keys)
+            raise ValueError(f"signed by {key.fingerprint}, trusted is {trusted} alone; sign it with that key")
+        try:
+            VerifyKey(key.point).verify(to_be_signed(content, hash_name), signed)
+        except BadSignatureError:
+            raise ValueError("changed after it was signed; restore it, or sign it anew where the key is") from None
+
+
+def load_public_keys(path: Path) -> tuple[str, ...]:
+    """Lines of a file of public keys, at least one; what begins with # is for people. Raises ConfigurationError."""
+    try:
+        lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
+    except (OSError, UnicodeDecodeError) as fault:
+        raise ConfigurationError(f"{path}: cannot be read: {fault}") from None
+    keys = {number: line for number, line in enumerate(lines, 1) if line and not line.startswith("#")}
+    for number, line in keys.items():
+        try:
+            PublicKey.of(line)
+        except ValueError as fault:
+            raise ConfigurationError(f"{path}, line {number}: {fault}") from None
+    if not keys:
+        raise ConfigurationError(f"{path}: holds no public key: write a line of KEY.pub there")
+    return tuple(keys.values())
+
+
+def to_be_signed(content: bytes, hash_name: str) -> bytes:
+    """What the key signs instead of the content."""
+    digest = hashlib.new(hash_name, content).digest()
+    return MAGIC + b"".join(map(_string, (NAMESPACE, b"", hash_name.encode(), digest)))
+
+
+def armoured(key: PublicKey, hash_name: str, signed: bytes) -> str:
+    """The file in which ssh-keygen delivers the 64 bytes ``signed``."""
+    inner = _string(KEY_TYPE) + _string(signed)
+    blob = MAGIC + VERSION + b"".join(map(_string, (key.blob, NAMESPACE, b"", hash_name.encode(), inner)))
+    return BEGIN + "\n".join(textwrap.wrap(base64.b64encode(blob).decode(), COLUMNS)) + END
+
+
+def signature_path(path: Path) -> Path:
+    """Where the signature of ``path`` lies."""
+    return path.with_name(path.name + SUFFIX)
+
+
+def _signature_of(path: Path) -> str:
+    beside = signature_path(path)
+    try:
+        with beside.open("rb") as file:
+            return file.read(MOST_BYTES).decode("ascii")
+    except FileNotFoundError:
+        raise ValueError(f"not signed, there is no {beside.name}; sign it where the key is") from None
+    except UnicodeDecodeError:
+        raise ValueError(NO_SIGNATURE) from None
+    except OSError as fault:
+        raise ValueError(f"{beside.name} cannot be read ({fault.strerror}); mend that or sign it anew") from None
+
+
+def _taken_apart(signature: str) -> tuple[PublicKey, str, bytes]:
+    """Who signed, over which hash, and the 64 bytes. Raises ValueError for what no ssh-keygen wrote."""
+    try:
+        blob = base64.b64decode("".join(signature.removeprefix(BEGIN).removesuffix(END).split()), validate=True)
+        start = len(MAGIC) + len(VERSION) + len(_string(b""))
+        key = PublicKey(blob[start : start + len(_string(KEY_TYPE)) + len(_string(bytes(KEY_BYTES)))])
+        signed = blob[-SIGNATURE_BYTES:]
+        hash_name = next(name for name in HASHES if armoured(key, name, signed) == signature)
+    except (binascii.Error, ValueError, StopIteration):
+        raise ValueError(NO_SIGNATURE) from None
+    return key, hash_name, signed
