@@ -5,14 +5,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A piece of the history: JSON texts in order, the cursor of each beside it.
+    """A piece of the history: JSON texts in order, the cursor of each beside it, and the number of the one before it.
 
+    That number is None for records from before it was kept.
     ``next_cursor`` asks for more, None where there is no more now; ``last_cursor`` is the newest row
     of this page: the place to go on from when more arrives (None while there is nothing at all).
     """
 
     items: tuple[str, ...]
     cursors: tuple[str, ...]
+    previous: tuple[int | None, ...]
     next_cursor: str | None
     last_cursor: str | None
 

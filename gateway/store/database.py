@@ -17,7 +17,7 @@ from gateway.log import Event, log_event
 from gateway.store.age import AgeClock
 from gateway.store.records import Stored, checksum, is_good, stored_row
 from gateway.store.retention import Retention, remove_old, remove_share
-from gateway.store.rows import EstimateRow, Row, bound
+from gateway.store.rows import Chain, EstimateRow, Row, bound
 from gateway.store.schema import connect_writer, pragma
 
 T = TypeVar("T")
@@ -87,6 +87,7 @@ class Database:
         self._opened_identity: tuple[tuple[int, int] | None, ...] = ()
         self._age: AgeClock | None = None
         self._is_reindexed = False
+        self.chain = Chain()  # replaced with every commit, never changed: any thread may copy it
         self.n_bad_records = 0
         self._lock_fd: int | None = None
 
@@ -116,14 +117,20 @@ class Database:
         """Commit rows in one transaction -> (rows that are new, estimates that were there already)."""
         connection = self._connected()
         n_new = n_known = 0
+        chain = Chain(self.chain)
         with _transaction(connection):
             for row in rows:
-                fields = bound(row)
-                if isinstance(row, EstimateRow):
-                    fields = (*fields, checksum(fields))
-                is_new = connection.execute(row.INSERT, fields).rowcount > 0
+                if not isinstance(row, EstimateRow):
+                    n_new += connection.execute(row.INSERT, bound(row)).rowcount
+                    continue
+                linked = chain.linked(row)
+                fields = bound(linked)
+                is_new = connection.execute(row.INSERT, (*fields, checksum(fields))).rowcount > 0
                 n_new += is_new
-                n_known += isinstance(row, EstimateRow) and not is_new
+                n_known += not is_new
+                if not is_new:
+                    chain.skip(linked)
+        self.chain = chain
         return n_new, n_known
 
     def prune(self, now_ns: int) -> int:

@@ -29,7 +29,7 @@ class Held:
         self._in_flight: tuple[Row, ...] = ()
         self._is_at_work = False
         self._epoch = epoch
-        self._next_seq = _after(last_seq)
+        self._number_behind(last_seq)
         self.n_dropped = 0
 
     @property
@@ -39,7 +39,8 @@ class Held:
     def rebase(self, epoch: str, last_seq: int) -> None:
         """Go on in a database that was found later, behind what it already holds."""
         with self._changed:
-            self._epoch, self._next_seq = epoch, _after(last_seq)
+            self._epoch = epoch
+            self._number_behind(last_seq)
             kept = (row for row in self._waiting if not isinstance(row, DeliveryRow))  # in numbers that are void now
             self._waiting = deque(self._renumbered(row) for row in kept)
 
@@ -61,12 +62,12 @@ class Held:
             self._append(newest)
             return True
 
-    def add_estimate(self, make_row: Callable[[int], EstimateRow]) -> str:
-        """Accept an estimate made with the number it gets here; its cursor."""
+    def add_estimate(self, make_row: Callable[[int, int], EstimateRow]) -> str:
+        """Accept an estimate made with the number it gets here and the one before it; its cursor."""
         with self._changed:
-            seq = self._take_number()
-            self._append(make_row(seq))
-            return f"{self._epoch}-{seq}"
+            row = make_row(*self._take_numbers())
+            self._append(row)
+            return f"{self._epoch}-{row.seq}"
 
     def wait_for_rows(self, timeout_s: float, has_other_work: Callable[[], bool]) -> None:
         """Sleep until a row waits, ``wake`` finds other work, or the time is out."""
@@ -130,15 +131,18 @@ class Held:
             self._waiting.popleft()
             self.n_dropped += 1
 
-    def _take_number(self) -> int:
-        seq = self._next_seq
-        self._next_seq += 1
-        return seq
+    def _number_behind(self, last_seq: int) -> None:
+        """The next number is the first of the stride behind ``last_seq``, which is the one before it."""
+        self._last_seq, self._next_seq = last_seq, (last_seq // SEQ_STRIDE + 1) * SEQ_STRIDE
+
+    def _take_numbers(self) -> tuple[int, int]:
+        """A new number, and the one given before it."""
+        seq, previous = self._next_seq, self._last_seq
+        self._last_seq, self._next_seq = seq, seq + 1
+        return seq, previous
 
     def _renumbered(self, row: Row) -> Row:
-        return replace(row, seq=self._take_number()) if isinstance(row, EstimateRow) else row
-
-
-def _after(last_seq: int) -> int:
-    """The first number of the stride behind ``last_seq``."""
-    return (last_seq // SEQ_STRIDE + 1) * SEQ_STRIDE
+        if not isinstance(row, EstimateRow):
+            return row
+        seq, previous = self._take_numbers()
+        return replace(row, seq=seq, previous=previous)

@@ -14,7 +14,7 @@ from gateway.history import Delivery, Page
 from gateway.records import json_line
 from gateway.store import records
 from gateway.store.database import is_damaged
-from gateway.store.rows import EstimateRow
+from gateway.store.rows import Chain, EstimateRow
 from gateway.store.schema import connect_reader
 from gateway.units import NS_PER_S
 
@@ -97,16 +97,20 @@ class StoreReader:
         with self._connection() as connection:
             found = ({}, []) if connection is None else records.page(connection, window, limit + 1, with_spectra)
             rows, bad = found
-            fresh = [row for row in held if window.holds(row) and not _is_stored(connection, row)]
+            fresh = [row for row in _not_stored(connection, held) if window.holds(row)]
         self._tell_bad(bad)
-        rows |= {row.seq: row.text if with_spectra else _without_spectra(row.text) for row in fresh}
+        rows |= {
+            row.seq: records.Good(row.text if with_spectra else _without_spectra(row.text), row.previous)
+            for row in fresh
+        }
         seqs = sorted(rows, reverse=newest_first)
         shown = seqs[:limit]
         cursors = tuple(f"{epoch}-{seq}" for seq in shown)
         newest = 0 if newest_first else -1
         return Page(
-            items=tuple(rows[seq] for seq in shown),
+            items=tuple(rows[seq].text for seq in shown),
             cursors=cursors,
+            previous=tuple(rows[seq].previous for seq in shown),
             next_cursor=cursors[-1] if len(seqs) > limit else None,
             last_cursor=cursors[newest] if shown else cursor,
         )
@@ -206,10 +210,16 @@ def _within_64_bits(t_ns: int) -> int:
     return min(max(t_ns, _FIRST_NS), _LAST_NS)
 
 
-def _is_stored(connection: sqlite3.Connection | None, row: EstimateRow) -> bool:
-    if connection is None:
-        return False
-    return connection.execute("SELECT 1 FROM estimates WHERE id = ?", (row.id,)).fetchone() is not None
+def _not_stored(connection: sqlite3.Connection | None, held: Sequence[EstimateRow]) -> Iterator[EstimateRow]:
+    """Those of the held rows that are not on disk: neither moved there meanwhile nor there already as another row."""
+    chain = Chain()
+    known: dict[str, int] = {}
+    for row in map(chain.linked, held):
+        on_disk = connection and connection.execute("SELECT seq FROM estimates WHERE id = ?", (row.id,)).fetchone()
+        if known.setdefault(row.id, on_disk[0] if on_disk else row.seq) != row.seq:
+            chain.skip(row)
+        elif not on_disk:
+            yield row
 
 
 def _newest_held(held: tuple[EstimateRow, ...], is_rejected: bool) -> tuple[int, str] | None:

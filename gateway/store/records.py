@@ -8,17 +8,26 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.store.rows import EstimateRow
-from gateway.store.schema import FIRST_WITH_SUMS, pragma
+from gateway.store.schema import FIRST_WITH_PREVIOUS, FIRST_WITH_SUMS, pragma
 
 _LAST: Final = (1 << 63) - 1
 _COLUMNS: Final = (
     "seq, CAST(id AS BLOB), t_end_ns, CAST(vehicle_id AS BLOB), CAST(estimator AS BLOB),"
-    " CAST(calibration_id AS BLOB), is_rejected, received_ns, CAST(text AS BLOB)"
+    " CAST(calibration_id AS BLOB), is_rejected, {previous}, received_ns, CAST(text AS BLOB), {checksum}"
 )
+_PREVIOUS: Final = 7  # its place among them
 # SQLite would end the whole question over a text that is no JSON
 _WITHOUT_SPECTRA: Final = "CASE WHEN json_valid(text) THEN CAST(json_remove(text, '$.spectra') AS BLOB) END"
 
 Stored = tuple[Any, ...]  # a row as SQLite gives it: every text as bytes, for a flipped bit makes it no UTF-8
+
+
+@dataclass(frozen=True, slots=True)
+class Good:
+    """What a good row holds. ``previous`` is None for one from before the chain."""
+
+    text: str
+    previous: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +61,14 @@ def _as_bytes(field: Any) -> bytes:
 def is_good(row: Stored) -> bool:
     """Whether a row is as it was written: by its sum; from before there were sums, by what its JSON repeats."""
     *fields, known = row
+    if fields[_PREVIOUS] is None:  # from before there was one: its sum knows nothing of it
+        del fields[_PREVIOUS]
     return checksum(fields) == known if known is not None else _agrees_with_its_json(fields)
 
 
 def _agrees_with_its_json(fields: Sequence[Any]) -> bool:
-    _, record_id, t_end_ns, vehicle_id, estimator, calibration_id, is_rejected, received_ns, text = fields
     try:
+        _, record_id, t_end_ns, vehicle_id, estimator, calibration_id, is_rejected, received_ns, text = fields
         record = json.loads(text.decode())
         said = (record["id"], record["vehicle_id"], record["estimator"], record["calibration_id"])
         in_columns = tuple(column and column.decode() for column in (record_id, vehicle_id, estimator, calibration_id))
@@ -69,9 +80,9 @@ def _agrees_with_its_json(fields: Sequence[Any]) -> bool:
 
 def page(
     connection: sqlite3.Connection, window: Window, limit: int, with_spectra: bool
-) -> tuple[dict[int, str], list[int]]:
-    """Up to ``limit`` good rows, number -> text, and the numbers of bad ones met on the way."""
-    good: dict[int, str] = {}
+) -> tuple[dict[int, Good], list[int]]:
+    """Up to ``limit`` good rows by number, and the numbers of bad ones met on the way."""
+    good: dict[int, Good] = {}
     bad: list[int] = []
     shown = "NULL" if with_spectra else _WITHOUT_SPECTRA
     after = window.after_seq
@@ -81,7 +92,7 @@ def page(
         for *row, without_spectra in found:
             text = row[-2] if with_spectra else without_spectra
             if text is not None and is_good(tuple(row)):
-                good[row[0]] = text.decode()
+                good[row[0]] = Good(text.decode(), row[_PREVIOUS])
             else:
                 bad.append(row[0])
         if len(found) < wanted:
@@ -94,7 +105,7 @@ def newest(connection: sqlite3.Connection, is_rejected: bool) -> tuple[tuple[int
     """(received_ns, text) of the newest good row of one outcome, and the numbers of bad ones met on the way."""
     bad: list[int] = []
     last = _LAST
-    sql = f"""SELECT {_COLUMNS}, {_sum_column(connection)} FROM estimates
+    sql = f"""SELECT {_columns(connection)} FROM estimates
         WHERE is_rejected = ? AND seq < ? ORDER BY seq DESC LIMIT 1"""
     while (row := connection.execute(sql, (is_rejected, last)).fetchone()) is not None:
         if is_good(row):
@@ -106,7 +117,7 @@ def newest(connection: sqlite3.Connection, is_rejected: bool) -> tuple[tuple[int
 
 def stored_row(connection: sqlite3.Connection, seq: int) -> Stored | None:
     """One row as it is in the file."""
-    sql = f"SELECT {_COLUMNS}, {_sum_column(connection)} FROM estimates WHERE seq = ?"
+    sql = f"SELECT {_columns(connection)} FROM estimates WHERE seq = ?"
     found: Stored | None = connection.execute(sql, (seq,)).fetchone()
     return found
 
@@ -121,7 +132,7 @@ def _rows_behind(
     since_ns = -_LAST if window.since_ns is None else window.since_ns
     until_ns = _LAST if window.until_ns is None else window.until_ns
     sql = f"""
-        SELECT {_COLUMNS}, {_sum_column(connection)}, {shown} FROM estimates WHERE seq IN (
+        SELECT {_columns(connection)}, {shown} FROM estimates WHERE seq IN (
             SELECT seq FROM estimates {index}
             WHERE seq {beyond} ? AND t_end_ns >= ? AND t_end_ns < ? ORDER BY seq {order} LIMIT ?
         ) ORDER BY seq {order}
@@ -129,6 +140,10 @@ def _rows_behind(
     return connection.execute(sql, (start, since_ns, until_ns, limit)).fetchall()
 
 
-def _sum_column(connection: sqlite3.Connection) -> str:
+def _columns(connection: sqlite3.Connection) -> str:
     """An older file on a disk that refuses to be written has not been brought up to date."""
-    return "checksum" if pragma(connection, "user_version") >= FIRST_WITH_SUMS else "NULL"
+    version = pragma(connection, "user_version")
+    return _COLUMNS.format(
+        previous="previous" if version >= FIRST_WITH_PREVIOUS else "NULL",
+        checksum="checksum" if version >= FIRST_WITH_SUMS else "NULL",
+    )

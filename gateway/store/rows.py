@@ -1,16 +1,19 @@
 """The rows the database holds, each knowing its own INSERT."""
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from typing import Any, ClassVar
 
 
 @dataclass(frozen=True, slots=True)
 class EstimateRow:
-    """One batch: an estimate or a rejection. ``text`` is its JSON, compact; ``seq`` orders and never repeats."""
+    """One batch: an estimate or a rejection. ``text`` is its JSON, compact; ``seq`` orders and never repeats.
+
+    ``previous`` is the number of the one accepted before it, 0 where there is none: the chain shows what is missing.
+    """
 
     INSERT: ClassVar[str] = (
-        "INSERT INTO estimates (seq, id, t_end_ns, vehicle_id, estimator, calibration_id, is_rejected, received_ns,"
-        " text, checksum) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING"
+        "INSERT INTO estimates (seq, id, t_end_ns, vehicle_id, estimator, calibration_id, is_rejected, previous,"
+        " received_ns, text, checksum) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING"
     )
 
     seq: int
@@ -20,6 +23,7 @@ class EstimateRow:
     estimator: str
     calibration_id: str | None
     is_rejected: bool
+    previous: int
     received_ns: int
     text: str
 
@@ -66,3 +70,19 @@ Row = EstimateRow | EventRow | CalibrationRow | DeliveryRow
 def bound(row: Row) -> tuple[Any, ...]:
     """The row's fields in the order of its INSERT."""
     return astuple(row)
+
+
+class Chain:
+    """Links estimates to the one before them; one that was there already and is not stored again is no link."""
+
+    def __init__(self, known: "Chain | None" = None) -> None:
+        """Go on from ``known``, which stays as it is."""
+        self._skipped: dict[int, int] = {} if known is None else dict(known._skipped)
+
+    def linked(self, row: EstimateRow) -> EstimateRow:
+        """The row behind the last one that counts."""
+        return replace(row, previous=self._skipped.pop(row.previous, row.previous))
+
+    def skip(self, row: EstimateRow) -> None:
+        """Whoever comes behind this row is linked to the one before it."""
+        self._skipped[row.seq] = row.previous

@@ -70,8 +70,13 @@ MIGRATIONS: Final[tuple[str, ...]] = (
         UPDATE uplinks SET n_pruned = n_pruned + 1 WHERE seq < OLD.seq;
     END;
     """,
+    # the number of the estimate accepted before, under its sum (null: from before there was one)
+    """
+    ALTER TABLE estimates ADD COLUMN previous INTEGER;
+    """,
 )
 FIRST_WITH_SUMS: Final = 3
+FIRST_WITH_PREVIOUS: Final = 4
 
 
 def connect_writer(path: Path, migrations: Sequence[str] = MIGRATIONS) -> sqlite3.Connection:

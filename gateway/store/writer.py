@@ -18,7 +18,7 @@ from gateway.store.database import FILE_NAME, Database, is_damaged
 from gateway.store.held import Held
 from gateway.store.reader import StoreReader
 from gateway.store.retention import Retention
-from gateway.store.rows import CalibrationRow, EstimateRow, EventRow
+from gateway.store.rows import CalibrationRow, Chain, EstimateRow, EventRow
 
 IDLE_S: Final = 60.0  # without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5
@@ -76,7 +76,7 @@ class Store:
             raise ValueError("provisional estimates go to latest and the stream, not into the store")
         text, received_ns = json_line(record), self._clock_ns()
         return self._held.add_estimate(
-            lambda seq: EstimateRow(
+            lambda seq, previous: EstimateRow(
                 seq=seq,
                 id=record["id"],
                 t_end_ns=record["t_end_ns"],
@@ -84,6 +84,7 @@ class Store:
                 estimator=record["estimator"],
                 calibration_id=record["calibration_id"],
                 is_rejected=bool(record["rejected"]),
+                previous=previous,
                 received_ns=received_ns,
                 text=text,
             )
@@ -112,7 +113,7 @@ class Store:
         """Answers questions from any thread, from what is on disk and what is held."""
         return StoreReader(
             self._path,
-            self._held.estimates,
+            self._held_estimates,
             self._clock_ns,
             self._suspect_damage,
             self._suspect_records,
@@ -146,6 +147,11 @@ class Store:
         if n_lost:
             log_event(Event.STORE_LOST_ROWS, level=logging.ERROR, n_rows=n_lost, reason=self._reason or "no time")
         return n_lost
+
+    def _held_estimates(self) -> tuple[str, tuple[EstimateRow, ...]]:
+        """The epoch and what is not on disk yet, linked to what is."""
+        epoch, rows = self._held.estimates()
+        return epoch, tuple(map(Chain(self._database.chain).linked, rows))
 
     def _suspect_damage(self) -> None:
         self._suspect.set()

@@ -2,14 +2,18 @@
 
 import json
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from gateway.history import Delivery, Page
+from gateway.records import json_line
 
 
 @dataclass(frozen=True, slots=True)
 class Letter:
-    """One estimate or rejection: its place in the store, its idempotent id, its JSON without spectra."""
+    """One estimate or rejection: its place in the store, its idempotent id, its JSON without spectra.
+
+    The JSON has a ``sequence`` of its own: which store it comes from, its number there, and the number before it.
+    """
 
     cursor: str
     id: str
@@ -52,7 +56,8 @@ class Outbox:
         if page.cursors:
             self._handed_out = page.cursors[-1]
         return [
-            Letter(cursor, json.loads(text)["id"], text) for cursor, text in zip(page.cursors, page.items, strict=True)
+            _letter(cursor, previous, json.loads(text))
+            for cursor, previous, text in zip(page.cursors, page.previous, page.items, strict=True)
         ]
 
     def delivered(self, letter: Letter) -> None:
@@ -78,6 +83,12 @@ class Outbox:
             known = f"{epoch}-0"
             self._memory.write_delivery(self._name, known)  # from here on, what retention removes is counted
         self._delivered = self._handed_out = known
+
+
+def _letter(cursor: str, previous: int | None, record: dict[str, Any]) -> Letter:
+    stream, _, number = cursor.partition("-")
+    sequence = {"stream": stream, "number": int(number), "previous": previous}
+    return Letter(cursor, record["id"], json_line(record | {"sequence": sequence}))
 
 
 def _epoch(cursor: str | None) -> str:

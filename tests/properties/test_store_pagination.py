@@ -64,8 +64,8 @@ def test_two_readers_beside_a_writer_see_the_same_once(tmp_path: Path) -> None:
     assert followers == [list(range(n_rows))] * 2
 
 
-def row(seq: int) -> EstimateRow:
-    return EstimateRow(seq, str(seq), seq, None, "ratio_index", None, False, 0, "{}")
+def row(seq: int, previous: int) -> EstimateRow:
+    return EstimateRow(seq, str(seq), seq, None, "ratio_index", None, False, previous, 0, "{}")
 
 
 @given(

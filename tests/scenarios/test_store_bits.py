@@ -9,6 +9,7 @@ import pytest
 from support.estimates import make_record, texts
 from support.log import names
 from support.patience import PATIENCE_S, wait_until
+from support.sequence import without_sequence
 
 from gateway.errors import StoreError
 from gateway.log import Event
@@ -63,7 +64,7 @@ def ask(store: Store) -> set[str]:
     letters = Outbox(reader, store, "fleet").next_letters(1000)
     reader.delivery("fleet")
     reader.events()
-    assert {letter.text for letter in letters} <= set(PLAIN)
+    assert {without_sequence(letter.text) for letter in letters} <= set(PLAIN)
     return told
 
 
@@ -154,7 +155,7 @@ def test_records_from_before_there_were_sums_are_shown_where_their_parts_agree(t
             old.execute("INSERT INTO estimates VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", fields)
     with closing(schema.connect_reader(path)) as not_yet, closing(schema.connect_reader(path)):
         good, bad = records.page(not_yet, records.Window(None, None, None, False), 10, with_spectra=False)
-        assert (tuple(good.values()), bad) == ((PLAIN[0], PLAIN[1], PLAIN[3]), [2])
+        assert ([row.text for row in good.values()], bad) == ([PLAIN[0], PLAIN[1], PLAIN[3]], [2])
     with closing(Store.open(tmp_path)) as store:
         assert store.reader().estimates().items == (TEXTS[0], TEXTS[1], TEXTS[3])
 

@@ -13,6 +13,7 @@ import trustme
 from support.broker import CuttableLink, Listener, needs_mosquitto, running_broker
 from support.estimates import make_record
 from support.patience import PATIENCE_S, wait_until
+from support.sequence import BackEnd
 
 from gateway.store import Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings
@@ -75,6 +76,10 @@ def test_ten_thousand_estimates_arrive_in_order_through_twenty_cuts_restarts_and
                 on_disk.append(_n_delivered(state))
                 deliverer = _deliverer(state, link.port)
         wait_until(lambda: json.loads(listener.heard[-1].payload)["id"] == ids[-1])
+    back_end = BackEnd()
+    for message in listener.heard:
+        back_end.take(message.payload.decode())
+    assert (list(back_end.ids), back_end.missing) == (ids, [])
     came = _places(listener, ids)
     assert list(dict.fromkeys(came)) == list(range(len(ids)))  # all of them, each first seen in its turn
     steps = list(itertools.pairwise(came))

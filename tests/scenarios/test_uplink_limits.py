@@ -8,6 +8,7 @@ import pytest
 from support.estimates import make_record
 from support.log import fields_of
 from support.patience import wait_until
+from support.sequence import BackEnd
 from support.small_broker import Refusal, SmallBroker
 
 from gateway.log import Event
@@ -38,4 +39,8 @@ def test_a_record_over_the_brokers_limit_is_counted_and_passed_over(
     assert [json.loads(text)["id"] for text in broker.estimates] == [
         record["id"] for n, record in enumerate(records) if n not in LARGE
     ]
+    back_end = BackEnd()
+    for text in broker.estimates:
+        back_end.take(text)
+    assert len(back_end.missing) == len(LARGE)
     assert fields_of(caplog, Event.UPLINK_REFUSED)["id"] == records[LARGE[-1]]["id"]

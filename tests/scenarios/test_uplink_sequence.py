@@ -1,0 +1,216 @@
+"""Whatever is lost between the store and the back-end leaves a gap that the back-end sees, and nothing else does."""
+
+import json
+import random
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import jsonschema
+import pytest
+from support.estimates import make_record
+from support.patience import PATIENCE_S, wait_until
+from support.sequence import BackEnd
+
+from gateway.records import json_line
+from gateway.store import Retention, Store, schema
+from gateway.uplink import Outbox
+from gateway.uplink.outbox import Letter
+
+ROOT = Path(__file__).parents[2]
+SCHEMA = json.loads((ROOT / "docs/uplink.schema.json").read_text())
+DAY_NS = 86_400 * 10**9
+
+WRITER = """
+import pathlib, sys
+from support.estimates import make_record
+from gateway.store import Store
+store = Store.open(pathlib.Path(sys.argv[1]))
+for n in range(int(sys.argv[2]), 1_000_000):
+    store.write_estimate(make_record(n))
+    if n % 3 == 0:
+        store.flush(60.0)
+    print(n, flush=True)
+"""
+
+
+def write(store: Store, *numbers: int) -> None:
+    for n in numbers:
+        store.write_estimate(make_record(n))
+    assert store.flush(PATIENCE_S)
+
+
+def deliver(store: Store, back_end: BackEnd, is_lost: Callable[[Letter], bool] = lambda letter: False) -> None:
+    """All that waits; what is lost is lost behind the broker's acknowledgement, or refused."""
+    outbox = Outbox(store.reader(), store, "fleet")
+    while letters := outbox.next_letters(7):
+        for letter in letters:
+            jsonschema.validate(json.loads(letter.text), SCHEMA)
+            if not is_lost(letter):
+                back_end.take(letter.text)
+            outbox.delivered(letter)
+    assert store.flush(PATIENCE_S)
+
+
+def test_starts_and_clocks_leave_no_gap(tmp_path: Path) -> None:
+    back_end = BackEnd()
+    for start, now_ns in enumerate((20_000 * DAY_NS, 5, 30_000 * DAY_NS, 20_001 * DAY_NS)):
+        with closing(Store.open(tmp_path, clock_ns=lambda now_ns=now_ns: now_ns)) as store:
+            write(store, *range(10 * start, 10 * start + 10))
+            deliver(store, back_end)
+    assert back_end.missing == []
+    assert len(back_end.ids) == 40
+
+
+def test_what_is_lost_on_the_way_or_refused_leaves_a_gap(tmp_path: Path) -> None:
+    dice = random.Random(3)
+    lost = sorted(dice.sample(range(1, 99), 20))
+    lost_ids = {make_record(n)["id"] for n in lost}
+    n_gaps = sum(n - 1 not in lost for n in lost)
+    back_end = BackEnd()
+    with closing(Store.open(tmp_path)) as store:
+        write(store, *range(100))
+        deliver(store, back_end, lambda letter: letter.id in lost_ids)
+    assert len(back_end.missing) == n_gaps
+    assert len(back_end.ids) == 80
+
+
+def test_the_first_ones_are_missed_too(tmp_path: Path) -> None:
+    back_end = BackEnd()
+    with closing(Store.open(tmp_path)) as store:
+        write(store, 0, 1, 2)
+        deliver(store, back_end, lambda letter: letter.id == make_record(0)["id"])
+    assert len(back_end.missing) == 1
+
+
+def test_what_retention_removes_before_it_is_delivered_leaves_a_gap(tmp_path: Path) -> None:
+    back_end = BackEnd()
+    with closing(Store.open(tmp_path, Retention(max_bytes=1_000_000))) as store:
+        write(store, 0)
+        deliver(store, back_end)
+        ballast = "x" * 50_000
+        for n in range(1, 40):
+            store.write_estimate(make_record(n) | {"ballast": ballast})
+        assert store.flush(PATIENCE_S)
+        assert store.health().n_pruned > 0
+        deliver(store, back_end)
+    assert len(back_end.missing) == 1
+    assert len(back_end.ids) < 40
+
+
+def test_what_memory_had_to_drop_leaves_a_gap(tmp_path: Path) -> None:
+    (tmp_path / "mount").write_text("no directory can be made here")
+    back_end = BackEnd()
+    with closing(Store.open(tmp_path / "mount" / "state", Retention(max_held=5))) as store:
+        for n in range(9):
+            store.write_estimate(make_record(n))
+        outbox = Outbox(store.reader(), store, "fleet")
+        for letter in outbox.next_letters(100):
+            back_end.take(letter.text)
+    assert (len(back_end.missing), len(back_end.ids)) == (1, 4)  # the queue's own place takes one of five
+
+
+@pytest.mark.parametrize("is_flushed", [True, False])
+def test_a_batch_that_is_there_already_is_no_gap(tmp_path: Path, is_flushed: bool) -> None:
+    back_end = BackEnd()
+    with closing(Store.open(tmp_path)) as store:
+        write(store, 0, 1)
+        for n in (2, 0, 1, 3, 3, 1, 4, 2):
+            store.write_estimate(make_record(n))
+            if is_flushed:
+                assert store.flush(PATIENCE_S)
+        deliver(store, back_end)
+        store.write_estimate(make_record(5))  # asked for before it is on disk, behind one that never will be
+        deliver(store, back_end)
+    assert back_end.missing == []
+    assert len(back_end.ids) == 6
+
+
+def test_a_damaged_record_leaves_a_gap(tmp_path: Path) -> None:
+    back_end = BackEnd()
+    with closing(Store.open(tmp_path)) as store:
+        write(store, *range(6))
+    path = tmp_path / "springscale.db"
+    content = bytearray(path.read_bytes())
+    content[content.index(json_line(make_record(3)).encode()) + 9] ^= 1
+    path.write_bytes(content)
+    with closing(Store.open(tmp_path)) as store:
+        deliver(store, back_end)
+    assert len(back_end.ids) == 5
+    assert len(back_end.missing) == 1
+
+
+def test_a_damaged_link_is_a_damaged_record(tmp_path: Path) -> None:
+    with closing(Store.open(tmp_path)) as store:
+        write(store, *range(4))
+    with closing(sqlite3.connect(tmp_path / "springscale.db")) as other:
+        other.execute("UPDATE estimates SET previous = previous + 1 WHERE seq = (SELECT max(seq) FROM estimates)")
+        other.execute("UPDATE estimates SET previous = NULL WHERE seq = (SELECT min(seq) FROM estimates)")
+        other.commit()
+    back_end = BackEnd()
+    with closing(Store.open(tmp_path)) as store:
+        deliver(store, back_end)
+        assert wait_until(lambda: store.health().n_bad_records == 2)
+    assert len(back_end.ids) == 2
+
+
+def test_a_database_that_was_replaced_is_another_stream(tmp_path: Path) -> None:
+    back_end = BackEnd()
+    for directory in ("a", "b"):
+        with closing(Store.open(tmp_path / directory)) as store:
+            write(store, *(range(3) if directory == "a" else range(3, 6)))
+            deliver(store, back_end)
+    assert back_end.missing == []
+    assert len(back_end.ids) == 6
+
+
+def test_records_from_before_the_numbers_were_linked_are_delivered(tmp_path: Path) -> None:
+    path = tmp_path / "springscale.db"
+    with closing(Store.open(tmp_path)) as store:
+        write(store, 0, 1)
+    with closing(sqlite3.connect(path)) as database:
+        rows = database.execute("SELECT * FROM estimates").fetchall()
+        names = [row[1] for row in database.execute("PRAGMA table_info(estimates)")]
+    path.unlink()
+    with closing(schema.connect_writer(path, schema.MIGRATIONS[:3])) as old:
+        old.execute("INSERT INTO epochs VALUES ('abcd')")
+        kept = [name for name in names if name not in ("previous", "checksum")]
+        for row in rows:
+            fields = [dict(zip(names, row, strict=True))[name] for name in kept]
+            sql = f"INSERT INTO estimates ({', '.join(kept)}) VALUES ({', '.join('?' * len(kept))})"
+            old.execute(sql, fields)
+    back_end = BackEnd()
+    with closing(Store.open(tmp_path)) as store:
+        write(store, 2)
+        deliver(store, back_end)
+    assert back_end.missing == []
+    assert len(back_end.ids) == 3
+
+
+def test_kills_leave_no_gap_and_what_is_lost_afterwards_does(tmp_path: Path) -> None:
+    """Each start writes what the one before may have left unwritten, as a bus that is heard again would not."""
+    dice = random.Random(11)
+    back_end = BackEnd()
+    begin = 0
+    for kill in range(6):
+        process = subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(tmp_path), str(begin)],
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=ROOT / "tests",
+        )
+        assert process.stdout is not None
+        for _ in range(dice.randint(1, 40)):
+            begin = int(process.stdout.readline()) + 1
+        process.kill()
+        process.wait()
+        process.stdout.close()
+        with closing(Store.open(tmp_path)) as store:
+            newest = store.reader().estimates(newest_first=True, limit=1).items
+            deliver(store, back_end, lambda letter, kill=kill: kill == 3)
+        begin = max(begin, int(json.loads(newest[0])["t_end_ns"]) // (300 * 10**9)) if newest else begin
+    assert len(back_end.missing) == 1
+    assert len(back_end.ids) > 6
