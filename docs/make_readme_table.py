@@ -46,8 +46,9 @@ and front share in percent of 20 percentage points; how often the 95 % intervals
 were refused. "Published" are the figures of the paper, which measured the experiment on a real vehicle.
 
 **Everything of ours in this table is simulated.** The first four rows repeat the paper's tests. The next two are drives
-recorded from another simulator, written independently of this one. The last five are vans on which no choice in the
-estimators was tried; "another day" changes their dampers, tyres and springs after calibration.
+recorded from another simulator, written independently of this one. The others are vans on which no choice in the
+estimators was tried, with their roll rate mapped where a row says so; "another day" changes their dampers, tyres and
+springs after calibration.
 
 """
 HEAD: Final = (
@@ -61,11 +62,11 @@ def rows() -> list[str]:
     accuracy = json.loads((DOCS / "accuracy.json").read_text(encoding="utf-8"))["tables"]
     coverage = json.loads((DOCS / "coverage.json").read_text(encoding="utf-8"))["lines"]
     rungs = json.loads((DOCS / "learning_curve.json").read_text(encoding="utf-8"))["rungs"]
-    kinds = dict.fromkeys(line["kind"] for line in coverage if line["kind"] != "all")
+    kinds = dict.fromkeys((line["kind"], line["has_roll_rate"]) for line in coverage if line["kind"] != "all")
     return [
         *(_reproduced(key, accuracy) for key in DRIVES),
         *(_recorded(title, n_runs, judged_on, rungs) for title, (n_runs, judged_on) in RECORDED.items()),
-        *(_covered(kind, coverage) for kind in kinds),
+        *(_covered(kind, has_roll_rate, coverage) for kind, has_roll_rate in kinds),
     ]
 
 
@@ -97,12 +98,12 @@ def _recorded(title: str, n_runs: int, judged_on: str, rungs: list[dict[str, Any
     return f"| {title} | | {others} | **{errors}** | {held} | {100.0 * ours['rejected_share']:.0f} % |"
 
 
-def _covered(kind: str, lines: list[dict[str, Any]]) -> str:
-    of = {line["estimator"]: line for line in lines if line["kind"] == kind}
+def _covered(kind: str, has_roll_rate: bool, lines: list[dict[str, Any]]) -> str:
+    of = {line["estimator"]: line for line in lines if (line["kind"], line["has_roll_rate"]) == (kind, has_roll_rate)}
     ours = of["cross_spectrum"]
     held = _held(ours["payload_coverage"]["share"], ours["front_share_coverage"]["share"])
     refused = f"{ours['n_rejected']} of {ours['n_batches']}"
-    title = f"{ours['n_vans']} different vans, {kind}"
+    title = f"{ours['n_vans']} different vans, {kind}{', with roll rate' if has_roll_rate else ''}"
     errors, others = _pair(ours, "mean_abs_pct"), _pair(of["ratio_index"], "mean_abs_pct")
     return f"| {title} | | {others} | **{errors}** | {held} | {refused} |"
 

@@ -12,6 +12,7 @@ from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, scattered
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, SignalMap, load_signal_map
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import MEASURED_OFFSET_STD_M
 from gateway.core.vehicle import Vehicle as StatedVehicle
 from gateway.offline.batches import batches_of_motion
 from gateway.records import Motion
@@ -21,7 +22,7 @@ from gateway.sim.road import RoadRecipe, iso_road
 from gateway.sim.scenario import simulate_drive
 from gateway.sim.sensors import REFERENCE, Sensors
 from gateway.sim.vans import VANS
-from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg
+from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg, payload_left_m
 from gateway.workbench.campaigns import ON_PALLETS, PAPER_SPEED_MPS, share_range_pct
 from gateway.workbench.wiring import Wiring
 
@@ -30,6 +31,9 @@ CALIBRATED_PARTS: Final = (0.25, 0.6, 0.95)  # of the rated payload
 CALIBRATED_PLACES: Final = (0.2, 0.5, 1.0)  # of the wheelbase
 EMPTY_SHARE: Final = 0.15  # of the drives put to the test
 OTHER_SPEEDS_KMH: Final = (30.0, 110.0)
+SENSOR_OFF_M: Final = 0.4  # at most, to either side of the centre line
+NEAR_M: Final = (0.0, 0.1)  # from the centre line: where a load stands that nobody put beside it
+SIDEWAYS_M: Final = (0.15, 0.35)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +49,17 @@ class Scope:
 
 @dataclass(frozen=True, slots=True)
 class Trip:
-    """A kind of drive: its name, how it is driven and where, and what has changed since the calibration."""
+    """A kind of drive: its name, how it is driven and where, and what has changed since the calibration.
+
+    Loads stand off_m (least, most) from the centre line, to either side.
+    """
 
     kind: str
     drive: Callable[[Scope, np.random.Generator], Drive]
     road: RoadRecipe
     is_changed: bool = False
     is_on_pallets: bool = False
+    off_m: tuple[float, float] = NEAR_M
 
 
 def draw_van(number: int, rng: np.random.Generator) -> Vehicle:
@@ -61,15 +69,23 @@ def draw_van(number: int, rng: np.random.Generator) -> Vehicle:
     return replace(van, name=f"{van.name}_{number}")
 
 
-def stated(van: Vehicle) -> StatedVehicle:
+def draw_sensors(rng: np.random.Generator) -> Sensors:
+    """The reference unit, somewhere beside the centre line."""
+    left_m = float(rng.uniform(-SENSOR_OFF_M, SENSOR_OFF_M))
+    return replace(REFERENCE, mount=replace(REFERENCE.mount, left_m=left_m))
+
+
+def stated(van: Vehicle, sensors: Sensors = REFERENCE) -> StatedVehicle:
     """What a fitter would write into the campaign file: weights and places, nothing of springs."""
     return StatedVehicle(
         name=van.name,
         empty_mass_kg=van.sprung_kg,
         wheelbase_m=van.wheelbase_m,
         empty_front_share_pct=van.empty_front_share_pct,
-        sensor_position_m=REFERENCE.mount.position_m,
-        sensor_offset_left_m=REFERENCE.mount.left_m,
+        sensor_position_m=sensors.mount.position_m,
+        sensor_offset_left_m=sensors.mount.left_m,
+        sensor_offset_left_std_m=MEASURED_OFFSET_STD_M,
+        track_width_m=(van.front.track_m + van.rear.track_m) / 2.0,
         payload_range_kg=(0.0, van.rated_payload_kg),
         front_share_range_pct=share_range_pct(van),
     )
@@ -90,10 +106,16 @@ def unseen_load(van: Vehicle, rng: np.random.Generator) -> tuple[Load, ...]:
 
 
 def driven(
-    van: Vehicle, loads: tuple[Load, ...], trip: Trip, scope: Scope, seeds: np.random.SeedSequence, number: int
+    van: Vehicle,
+    loads: tuple[Load, ...],
+    trip: Trip,
+    scope: Scope,
+    seeds: np.random.SeedSequence,
+    number: int,
+    sensors: Sensors = REFERENCE,
 ) -> KnownRun:
     """One drive through sensors, frames and decoder, as batches with their truth."""
-    rows, today, carried = rows_of(van, loads, trip, scope, seeds)
+    rows, today, carried = rows_of(van, loads, trip, scope, seeds, sensors)
     return known_run(rows, number, trip.kind, today, carried)
 
 
@@ -109,19 +131,31 @@ def rows_of(
 
     The same seeds give the same road and drive whatever the sensors.
     """
-    plan_seed, day_seed = np.random.SeedSequence(seeds.entropy, spawn_key=seeds.spawn_key).spawn(2)
+    plan_seed, day_seed, side_seed = np.random.SeedSequence(seeds.entropy, spawn_key=seeds.spawn_key).spawn(3)
     plan_rng, day_rng = np.random.default_rng(plan_seed), np.random.default_rng(day_seed)
     today = scattered(van, FROM_DAY_TO_DAY, day_rng) if trip.is_changed else van
     carried = tuple(replace(load, **ON_PALLETS) for load in loads) if trip.is_on_pallets else loads
+    carried = beside(carried, trip.off_m, np.random.default_rng(side_seed))
     seed = int(seeds.generate_state(1)[0])
     simulated = simulate_drive(today, carried, trip.road, trip.drive(scope, plan_rng), sensors, seed)
     return Decoder(_map()).decode(Wiring(MAP_NAME).frames_of(simulated.recording)), today, carried
 
 
+def beside(loads: tuple[Load, ...], off_m: tuple[float, float], rng: np.random.Generator) -> tuple[Load, ...]:
+    """The same loads, all of them to one side of the centre line, off_m (least, most) from it."""
+    left_m = float(rng.uniform(*off_m)) * float(rng.choice([-1.0, 1.0]))
+    return tuple(replace(load, left_m=left_m) for load in loads)
+
+
+def without_roll_rate(run: KnownRun) -> KnownRun:
+    """The same run by a signal map without a roll rate: no other number of a batch changes."""
+    return replace(run, batches=tuple(replace(batch, roll_rate_radps=None) for batch in run.batches))
+
+
 def known_run(rows: Motion, number: int, name: str, van: Vehicle, carried: tuple[Load, ...]) -> KnownRun:
     """Decoded rows as batches with their truth."""
     batches = batches_of_motion(rows, _map(), BatchSettings())
-    return KnownRun(number, name, payload_kg(carried), front_share_pct(van, carried), batches)
+    return KnownRun(number, name, payload_kg(carried), front_share_pct(van, carried), batches, payload_left_m(carried))
 
 
 @lru_cache(maxsize=1)
@@ -162,6 +196,8 @@ TRIPS: Final[Mapping[str, Trip]] = MappingProxyType(
             Trip("mixed", _mixed, _CHANGING),
             Trip("mixed, another day", _mixed, _CHANGING, is_changed=True),
             Trip("mixed, on pallets", _mixed, _CHANGING, is_on_pallets=True),
+            Trip("as calibrated, load sideways", _as_calibrated, _SMOOTH_AND_ROUGH, off_m=SIDEWAYS_M),
+            Trip("mixed, load sideways", _mixed, _CHANGING, off_m=SIDEWAYS_M),
         )
     }
 )

@@ -1,5 +1,6 @@
 """Many batches of many vehicles in one table: errors (12), refusals and coverage, a line for each kind of drive."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
@@ -7,7 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.calibration.judgement import Coverage, Judged, coverage_of
-from gateway.core.vehicle import Vehicle
+from gateway.calibration.known_run import KnownRun
+from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.records import Why
 
 ALL_KINDS: Final = "all"
@@ -18,7 +20,8 @@ HALF_AN_ANSWER: Final = "no_front_share"  # where an estimator is calibrated for
 class JudgedBatch:
     """One batch: errors in percent of its vehicle's ranges, and whether the 95 % intervals held the truth.
 
-    Where the batch was rejected the errors are those of a mid-range answer, and no interval covers.
+    Where the batch was rejected the errors are those of a mid-range answer, and no interval covers. cg_left_error_m
+    is NaN where nothing was told of the centre of gravity sideways.
     """
 
     van: str
@@ -30,6 +33,9 @@ class JudgedBatch:
     front_share_error_pct: float
     is_payload_covered: bool
     is_front_share_covered: bool
+    has_roll_rate: bool = True
+    cg_left_error_m: float = math.nan
+    is_cg_left_covered: bool = False
 
     @property
     def is_rejected(self) -> bool:
@@ -46,6 +52,7 @@ class Line:
 
     kind: str
     estimator: str
+    has_roll_rate: bool
     n_vans: int
     n_runs: int
     n_batches: int
@@ -59,11 +66,16 @@ class Line:
     front_share_mean_abs_pct_with_misses: float
     front_share_coverage: Coverage | None
     front_share_coverage_by_van: Coverage | None
+    cg_left_mean_abs_mm: float | None
+    cg_left_coverage: Coverage | None
 
 
 @dataclass(frozen=True, slots=True)
 class CoverageTable:
-    """What a study of coverage found, line by line; the lines of all kinds together come last."""
+    """What a study of coverage found, line by line; the lines of all kinds together come last.
+
+    With and without a roll rate are never counted together.
+    """
 
     seed: int
     vans: tuple[str, ...]
@@ -75,25 +87,42 @@ class CoverageTable:
         return asdict(self)
 
 
-def judged_batches(judged: Sequence[Judged], vehicle: Vehicle, kind: str, estimator: str) -> list[JudgedBatch]:
-    """Complete batches in percent of this vehicle's ranges. Pieces shorter than a window are left out."""
-    return [_judged(one, vehicle, kind, estimator) for one in judged if Why.TOO_SHORT not in one.estimate.rejected]
+def judged_batches(
+    judged: Sequence[Judged], vehicle: Vehicle, kind: str, estimator: str, run: KnownRun, *, has_roll_rate: bool = True
+) -> list[JudgedBatch]:
+    """Complete batches of one run in percent of this vehicle's ranges. Pieces shorter than a window are left out."""
+    cg_m = math.nan if run.payload_left_m is None else cg_left_m(vehicle, run.payload_kg, run.payload_left_m)
+    return [
+        _judged(one, vehicle, kind, estimator, cg_m, has_roll_rate)
+        for one in judged
+        if Why.TOO_SHORT not in one.estimate.rejected
+    ]
+
+
+def roll_in_words(has_roll_rate: bool) -> str:
+    """As pages say it."""
+    return "with roll rate" if has_roll_rate else "without roll rate"
 
 
 def coverage_table(batches: Sequence[JudgedBatch], seed: int, refused: Sequence[str] = ()) -> CoverageTable:
-    """A line for every kind and estimator, then one for each estimator over all kinds."""
-    kinds = dict.fromkeys(batch.kind for batch in batches)
+    """A line for every kind, estimator and map with or without a roll rate, then the same over all kinds."""
+    kinds = dict.fromkeys((batch.kind, batch.has_roll_rate) for batch in batches)
+    pooled = dict.fromkeys((ALL_KINDS, batch.has_roll_rate) for batch in batches)
     estimators = dict.fromkeys(batch.estimator for batch in batches)
     lines = [
-        _line(kind, name, [b for b in batches if b.estimator == name and kind in (b.kind, ALL_KINDS)])
-        for kind in (*kinds, ALL_KINDS)
+        _line(kind, name, has_roll_rate, [b for b in batches if _is_of(b, kind, name, has_roll_rate)])
+        for kind, has_roll_rate in (*kinds, *pooled)
         for name in estimators
     ]
     vans = tuple(dict.fromkeys(batch.van for batch in batches))
     return CoverageTable(seed, vans, tuple(lines), tuple(refused))
 
 
-def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str) -> JudgedBatch:
+def _is_of(batch: JudgedBatch, kind: str, estimator: str, has_roll_rate: bool) -> bool:
+    return (batch.estimator, batch.has_roll_rate) == (estimator, has_roll_rate) and kind in (batch.kind, ALL_KINDS)
+
+
+def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str, cg_m: float, has_roll_rate: bool) -> JudgedBatch:
     found = one.estimate
     payload_kg, share_pct = found.payload.number, found.front_share.number
     rejected = tuple(str(why) for why in found.rejected)
@@ -109,6 +138,9 @@ def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str) -> JudgedB
         front_share_error_pct=_percent(share_pct, one.front_share_pct, vehicle.front_share_range_pct, bool(rejected)),
         is_payload_covered=_holds(found.payload.interval95, one.payload_kg),
         is_front_share_covered=_holds(found.front_share.interval95, one.front_share_pct),
+        has_roll_rate=has_roll_rate,
+        cg_left_error_m=found.cg_left.number - cg_m,
+        is_cg_left_covered=_holds(found.cg_left.interval95, cg_m),
     )
 
 
@@ -122,12 +154,14 @@ def _holds(interval: tuple[float, float], true: float) -> bool:
     return bool(interval[0] <= true <= interval[1])
 
 
-def _line(kind: str, estimator: str, batches: Sequence[JudgedBatch]) -> Line:
+def _line(kind: str, estimator: str, has_roll_rate: bool, batches: Sequence[JudgedBatch]) -> Line:
     answered = [batch for batch in batches if not batch.is_rejected]
+    placed = [batch for batch in answered if math.isfinite(batch.cg_left_error_m)]
     payload, share = (lambda b: b.is_payload_covered), (lambda b: b.is_front_share_covered)
     return Line(
         kind=kind,
         estimator=estimator,
+        has_roll_rate=has_roll_rate,
         n_vans=len({batch.van for batch in batches}),
         n_runs=len({batch.run for batch in batches}),
         n_batches=len(batches),
@@ -141,6 +175,8 @@ def _line(kind: str, estimator: str, batches: Sequence[JudgedBatch]) -> Line:
         front_share_mean_abs_pct_with_misses=float(np.mean(np.abs([batch.front_share_error_pct for batch in batches]))),
         front_share_coverage=_coverage(answered, share, lambda b: b.run),
         front_share_coverage_by_van=_coverage(answered, share, lambda b: b.van),
+        cg_left_mean_abs_mm=_mean_abs([1000.0 * batch.cg_left_error_m for batch in placed]),
+        cg_left_coverage=_coverage(placed, lambda b: b.is_cg_left_covered, lambda b: b.run),
     )
 
 

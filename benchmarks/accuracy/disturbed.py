@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.records import I64, Motion, Signal, Why
-from gateway.sim.sensors import REFERENCE, Sensors
+from gateway.records import F64, I64, Motion, Signal, Why
+from gateway.sim.sensors import Mount
 from gateway.units import NS_PER_S
 
 Rows = Callable[[Motion, np.random.Generator], Motion]
@@ -20,15 +20,17 @@ Rows = Callable[[Motion, np.random.Generator], Motion]
 
 @dataclass(frozen=True, slots=True)
 class Disturbance:
-    """One line of the table. ``rows`` disturbs what was decoded, ``sensors`` drive again.
+    """One line of the table. ``rows`` disturbs what was decoded, a ``remount`` drives again.
 
     ``is_mended``: errors should stay within a quarter of the undisturbed; ``reasons`` are the right ones to refuse.
     """
 
     name: str
     rows: Rows = lambda motion, rng: motion
-    sensors: Sensors = REFERENCE
+    remount: Callable[[Mount], Mount] = lambda mount: mount
     is_overloaded: bool = False
+    is_sideways: bool = False
+    has_roll_rate: bool = True
     is_mended: bool = False
     reasons: tuple[Why, ...] = ()
 
@@ -101,16 +103,38 @@ def amplified(by: float) -> Rows:
     return disturb
 
 
-def _remounted(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -> Sensors:
-    mount = REFERENCE.mount
-    return replace(
-        REFERENCE,
-        mount=replace(
-            mount,
-            position_m=mount.position_m + back_m,
-            left_m=mount.left_m + left_m,
-            yaw_deg=mount.yaw_deg + yaw_deg,
-        ),
+def half_of_the_time(signal: Signal, to: Callable[[F64], F64]) -> Rows:
+    """What one signal says in every other minute is replaced by ``to`` of its samples."""
+
+    def disturb(motion: Motion, rng: np.random.Generator) -> Motion:
+        columns = motion.columns.copy()
+        column = columns[:, motion.signals.index(signal)]
+        minute = (motion.t_ns - motion.t_ns[0]) // (60 * NS_PER_S)
+        touched = np.isfinite(column) & (minute % 2 == 1)
+        for each in np.unique(minute[touched]):
+            now = touched & (minute == each)
+            column[now] = to(column[now])
+        return replace(motion, columns=columns)
+
+    return disturb
+
+
+def stuck(samples: F64) -> F64:
+    """All of them the first."""
+    return np.full_like(samples, samples[0])
+
+
+def missing(samples: F64) -> F64:
+    """None of them."""
+    return np.full_like(samples, np.nan)
+
+
+def _moved(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -> Callable[[Mount], Mount]:
+    return lambda mount: replace(
+        mount,
+        position_m=mount.position_m + back_m,
+        left_m=mount.left_m + left_m,
+        yaw_deg=mount.yaw_deg + yaw_deg,
     )
 
 
@@ -134,9 +158,22 @@ DISTURBANCES: Final[Mapping[str, Disturbance]] = MappingProxyType(
             Disturbance("gyro late by 20 ms", lagging(0.020), is_mended=True),
             Disturbance("accelerometer's gain + 2 %", amplified(0.02), reasons=_SENSOR_MOVED),
             Disturbance("accelerometer's gain + 5 %", amplified(0.05), reasons=_SENSOR_MOVED),
-            Disturbance("sensor moved 0.2 m left", sensors=_remounted(left_m=0.2), reasons=_SENSOR_MOVED),
-            Disturbance("sensor moved 0.2 m back", sensors=_remounted(back_m=0.2), reasons=_SENSOR_MOVED),
-            Disturbance("sensor turned by 10 degrees", sensors=_remounted(yaw_deg=10.0), reasons=_SENSOR_MOVED),
+            Disturbance("sensor moved 0.2 m left", remount=_moved(left_m=0.2), reasons=_SENSOR_MOVED),
+            Disturbance("sensor moved 0.2 m back", remount=_moved(back_m=0.2), reasons=_SENSOR_MOVED),
+            Disturbance("sensor turned by 10 degrees", remount=_moved(yaw_deg=10.0), reasons=_SENSOR_MOVED),
+            Disturbance("no roll rate", has_roll_rate=False),
+            Disturbance("load sideways", is_sideways=True),
+            Disturbance("load sideways, no roll rate", is_sideways=True, has_roll_rate=False),
+            Disturbance(
+                "load sideways, roll rate stuck half the time",
+                half_of_the_time(Signal.ROLL_RATE, stuck),
+                is_sideways=True,
+            ),
+            Disturbance(
+                "load sideways, roll rate missing half the time",
+                half_of_the_time(Signal.ROLL_RATE, missing),
+                is_sideways=True,
+            ),
             Disturbance("load beyond the calibrated", is_overloaded=True, reasons=_BEYOND),
         )
     }

@@ -1,29 +1,38 @@
 """The vans and drives of the coverage study, and that every van is judged on loads it was not calibrated with."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from support.calibrated import ratio_index_calibration
+from support.drives import assert_same_batch, drive, with_roll
 from support.half_car_road import batch_over_road
 
 from benchmarks.accuracy import coverage
 from benchmarks.accuracy.coverage_drives import (
     AS_CALIBRATED,
+    NEAR_M,
+    SIDEWAYS_M,
     TRIPS,
     Scope,
     Trip,
+    beside,
     draw_van,
     driven,
     known_loads,
     stated,
     unseen_load,
+    without_roll_rate,
 )
+from benchmarks.accuracy.disturbed import half_of_the_time, missing, stuck
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.core.vehicle import front_share_pct as stated_share_pct
 from gateway.errors import CalibrationImpossibleError
+from gateway.records import Signal
+from gateway.sim.sensors import Sensors
 from gateway.sim.vehicle import Load, front_share_pct, payload_kg
 from gateway.sim.vehicle import Vehicle as Van
 
@@ -72,9 +81,16 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
     calibrated_with: list[tuple[float, ...]] = []
     seeds: list[int] = []
 
-    def drive(
-        one: Van, loads: tuple[Load, ...], trip: Trip, scope: Scope, seed: np.random.SeedSequence, number: int
+    def stand_in(
+        one: Van,
+        loads: tuple[Load, ...],
+        trip: Trip,
+        scope: Scope,
+        seed: np.random.SeedSequence,
+        number: int,
+        sensors: Sensors,
     ) -> KnownRun:
+        assert abs(sensors.mount.left_m) <= 0.4
         seeds.append(int(seed.generate_state(1)[0]))
         share_pct = front_share_pct(one, loads)
         batch = batch_over_road(100.0, 50.0, 1, duration_s=60.0, speed_mps=15.0)
@@ -86,16 +102,55 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
         calibrated_with.append(tuple(run.payload_kg for run in runs))
         return CalibratedVehicle("x", vehicle, (0.0, 1e4), (0.0, 100.0), ratio_index_calibration())
 
-    monkeypatch.setattr(coverage, "driven", drive)
+    monkeypatch.setattr(coverage, "driven", stand_in)
     monkeypatch.setattr(coverage, "calibrated_on", fit)
     done: list[tuple[int, int]] = []
     table = coverage.coverage(Scope(n_vans=2, n_known_loads=4, n_tests=3), 11, on_van=lambda *step: done.append(step))
-    assert len(calibrated_with) == 2
+    assert len(calibrated_with) == 4  # each van with its roll rate, and without
     assert all(len(set(loads)) > 2 and loads[0] == 0.0 for loads in calibrated_with)
     assert {line.kind for line in table.lines} == {*TRIPS, "all"}
     assert {line.estimator for line in table.lines} == {"ratio_index"}
-    assert all(line.n_batches == 6 and line.n_vans == 2 for line in table.lines[:-1])
-    assert table.lines[-1].n_runs == 30
-    assert len(set(seeds)) == len(seeds) == 2 * (4 + 15)  # no drive is driven twice
-    assert [text.split(": ")[1:] for text in table.refused] == [["cross_spectrum", "not today"]] * 2
+    *of_kinds, pooled, pooled_without = table.lines
+    assert all(line.n_batches == 6 and line.n_vans == 2 for line in of_kinds)
+    assert [line.has_roll_rate for line in of_kinds] == [True] * len(TRIPS) + [False] * len(TRIPS)
+    assert [line.has_roll_rate for line in (pooled, pooled_without)] == [True, False]
+    assert pooled.n_runs == pooled_without.n_runs == 2 * 3 * len(TRIPS)
+    assert len(set(seeds)) == len(seeds) == 2 * (4 + 3 * len(TRIPS))  # no drive is driven twice
+    assert [text.split(": ")[1:] for text in table.refused] == [
+        ["cross_spectrum, with roll rate", "not today"],
+        ["cross_spectrum, without roll rate", "not today"],
+    ] * 2
     assert done == [(0, 2), (1, 2), (2, 2)]
+
+
+def test_loads_stand_beside_the_centre_line_as_far_as_the_trip_says() -> None:
+    loads = (Load(100.0, 1.0), Load(50.0, 2.0))
+    for off_m in (NEAR_M, SIDEWAYS_M):
+        lefts_m = [beside(loads, off_m, np.random.default_rng(seed))[0].left_m for seed in range(50)]
+        assert all(off_m[0] <= abs(left_m) <= off_m[1] for left_m in lefts_m)
+        assert min(lefts_m) < 0.0 < max(lefts_m)
+
+
+def test_a_map_without_a_roll_rate_changes_nothing_else() -> None:
+    scope = Scope(steady_s=60.0)
+    run = driven(
+        van(), (Load(200.0, 1.2),), TRIPS["as calibrated, load sideways"], scope, np.random.SeedSequence([5]), 3
+    )
+    assert run.payload_left_m is not None
+    assert 0.15 <= abs(run.payload_left_m) <= 0.35
+    (batch,), (silent,) = run.batches, without_roll_rate(run).batches
+    assert batch.roll_usable_share == pytest.approx(1.0, abs=0.01)
+    assert silent.roll_rate_radps is None
+    assert_same_batch(replace(batch, roll_rate_radps=None), silent)
+
+
+def test_every_other_minute_of_a_signal_is_lost_or_stuck() -> None:
+    motion = with_roll(drive(300.0))
+    for fault, n_known in ((missing, 0), (stuck, 1)):
+        spoilt = half_of_the_time(Signal.ROLL_RATE, fault)(motion, np.random.default_rng(1))
+        t_s = (spoilt.of(Signal.ROLL_RATE)[0] - motion.t_ns[0]) / 1e9
+        second = spoilt.of(Signal.ROLL_RATE)[1][(t_s >= 60.0) & (t_s < 120.0)]
+        third = spoilt.of(Signal.ROLL_RATE)[1][(t_s >= 120.0) & (t_s < 180.0)]
+        assert len(set(second)) == n_known
+        assert len(set(third)) > 5000
+        np.testing.assert_array_equal(spoilt.of(Signal.PITCH_RATE)[1], motion.of(Signal.PITCH_RATE)[1])

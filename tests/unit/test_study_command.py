@@ -88,7 +88,7 @@ def test_coverage_says_whether_it_falls_short(
     table = coverage_table([*batches, refused], seed=4, refused=["b: ratio_index: too few"])
     monkeypatch.setattr(command.on_coverage, "coverage", lambda *_, **__: table)
     page = run("coverage", "--output", str(tmp_path / "out"))
-    assert f"cross spectrum, all drives, payload: {100 - n_missed // 2} %" in page
+    assert f"cross spectrum, with roll rate, all drives, payload: {100 - n_missed // 2} %" in page
     assert verdict in page
     assert "| 201 | 201 | 1: 1 gap |" in page
     assert "- b: ratio_index: too few" in page
