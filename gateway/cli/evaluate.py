@@ -1,5 +1,6 @@
 """springscale evaluate: the error table of (12)."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -69,6 +70,7 @@ def _text(table: ErrorTable) -> str:
         f"{'':14}{'mean |e|':>10}{'+ misses':>10}{'bias':>9}{'std':>9}{'max':>9}{'mean |e|':>12}{'covered':>9}",
         _row("payload", errors.payload),
         _row("front share", errors.front_share),
+        *_sideways_lines(errors),
         "",
         f"{'run':>4}  {'true':>18}{'batches':>9}{'rejected':>10}"
         f"{'payload, mean |e|':>19}{'bias':>10}{'share, mean |e|':>17}{'bias':>10}",
@@ -78,12 +80,31 @@ def _text(table: ErrorTable) -> str:
 
 
 def _row(name: str, errors: TargetErrors) -> str:
-    covered_pct = None if errors.coverage95 is None else 100.0 * errors.coverage95
     return (
         f"{name:14}{_cell(errors.mean_abs_pct, '%', 10)}{_cell(errors.mean_abs_pct_with_misses, '%', 10)}"
         f"{_cell(errors.bias_pct, '%', 9)}{_cell(errors.std_pct, '%', 9)}{_cell(errors.max_abs_pct, '%', 9)}"
-        f"{_cell(errors.mean_abs, errors.unit, 12)}{_cell(covered_pct, '%', 9)}"
+        f"{_cell(errors.mean_abs, errors.unit, 12)}{_percent(errors.coverage95, 9)}"
     )
+
+
+def _sideways_lines(errors: Errors) -> Iterator[str]:
+    """Where the load lies sideways and each wheel's load, as far as they are told."""
+    cg_left, wheels = errors.cg_left, errors.wheels
+    if cg_left is not None and cg_left.mean_abs_m is not None:
+        lengths = ((cg_left.bias_m, 9), (cg_left.std_m, 9), (cg_left.max_abs_m, 9), (cg_left.mean_abs_m, 12))
+        in_mm = "".join(_millimetres(length_m, width) for length_m, width in lengths)
+        yield f"{'c.g. left':14}{'':20}{in_mm}{_percent(cg_left.coverage95, 9)}"
+    if wheels is not None:
+        mean, most = wheels.mean_abs_pct_of_gross, wheels.max_abs_pct_of_gross
+        yield f"{'each wheel':14}{_cell(mean, '%', 10)}{'':28}{_cell(most, '%', 9)}{'of gross weight':>21}"
+
+
+def _millimetres(length_m: float | None, width: int) -> str:
+    return f"{'-' if length_m is None else f'{1000.0 * length_m:.1f} mm':>{width}}"
+
+
+def _percent(share: float | None, width: int) -> str:
+    return _cell(None if share is None else 100.0 * share, "%", width)
 
 
 def _run_row(first: Judged, errors: Errors) -> str:

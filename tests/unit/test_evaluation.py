@@ -9,13 +9,15 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.drives import T0_NS, drive, joined, later
 
-from gateway.calibration.judgement import Judged, error_table, errors_of
+from gateway.calibration.judgement import Judged, error_table, errors_of, judge
+from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import Window, build_batch
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
+from gateway.core.weights import weighed
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Batch, Why
@@ -92,6 +94,56 @@ def test_nothing_answered_is_null_not_zero() -> None:
     assert table.pop("mean_abs_pct_with_misses") == pytest.approx(25.0)
     assert set(table.values()) == {None}
     assert errors_of([], VAN).payload.mean_abs_pct_with_misses is None
+
+
+ROLLING = replace(VAN, track_width_m=1.5)
+
+
+def placed(true_m: float, found_m: float, half_m: float = 0.01, payload_kg: float = 200.0) -> Judged:
+    """A load told right but for its place beside the centre line."""
+    told = judged(payload_kg, payload_kg)
+    cg_left = Quantity(found_m, half_m / 2.0, (found_m - half_m, found_m + half_m))
+    estimate = weighed(replace(told.estimate, cg_left=cg_left, roll_share_front=0.6), ROLLING)
+    return replace(told, estimate=estimate, cg_left_m=true_m)
+
+
+def test_sideways_errors_by_hand() -> None:
+    errors = error_table([placed(0.05, 0.056), placed(-0.03, -0.05), placed(np.nan, 0.2)], ROLLING, "x").errors
+    assert errors.cg_left is not None
+    told = errors.cg_left.to_json()
+    expected = {"mean_abs_m": 0.013, "bias_m": -0.007, "std_m": 0.013, "max_abs_m": 0.02, "coverage95": 0.5}
+    assert told == pytest.approx(expected)
+    assert errors.wheels is not None
+    # 1440 kg of sprung mass 6 and 20 mm beside: moments of 8.64 and 28.8 kgm over 1.5 m, of which the front takes 0.6
+    gross_kg = 1240.0 + 200.0 + 60.0 + 100.0
+    off_kg = np.array([0.6, 0.4]) * 1440.0 * np.array([[0.006], [0.02]]) / 1.5
+    assert errors.wheels.mean_abs_pct_of_gross == pytest.approx(100.0 * np.mean(off_kg) / gross_kg)
+    assert errors.wheels.max_abs_pct_of_gross == pytest.approx(100.0 * np.max(off_kg) / gross_kg)
+
+
+def test_without_a_place_that_was_noted_nothing_sideways_is_judged() -> None:
+    errors = errors_of([placed(np.nan, 0.01)], ROLLING)
+    assert (errors.cg_left, errors.wheels) == (None, None)
+    table = error_table([judged(100.0, 100.0)], ROLLING, "x").to_json()
+    assert (table["cg_left"], table["wheels"], table["batches"][0]["true_cg_left_m"]) == (None, None, None)
+
+
+def test_a_place_that_was_noted_and_not_told_is_null() -> None:
+    errors = errors_of([replace(judged(100.0, 100.0), cg_left_m=0.02)], ROLLING)
+    assert errors.cg_left is not None
+    assert set(errors.cg_left.to_json().values()) == {None}
+    assert errors.wheels is None
+
+
+def test_the_truth_beside_the_centre_line_follows_from_where_the_payload_was_noted() -> None:
+    calibrated = calibration_file().for_core()
+    runs = [
+        KnownRun(1, "empty.log", 0.0, 50.0, (BATCH,)),
+        KnownRun(2, "noted.log", 310.0, 50.0, (BATCH,), -0.25),
+        KnownRun(3, "not_noted.log", 310.0, 50.0, (BATCH,)),
+    ]
+    truths_m = [one.cg_left_m for one in judge(runs, calibrated, "ratio_index")]
+    assert truths_m == pytest.approx([0.0, -0.05, np.nan], nan_ok=True)
 
 
 def answer(payload_kg: float = 200.0, front_share_pct: float = 48.0, batch: Batch = BATCH) -> Estimate:

@@ -29,6 +29,7 @@ from gateway.calibration.judgement.evaluation import (
     judge,
 )
 from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, Spread, curve_of
+from gateway.calibration.judgement.sideways import CgLeftErrors, WheelErrors
 from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "TARGETS",
     "Answers",
     "Assessment",
+    "CgLeftErrors",
     "Comparison",
     "Coverage",
     "ErrorTable",
@@ -52,6 +54,7 @@ __all__ = [
     "Target",
     "TargetErrors",
     "Verdict",
+    "WheelErrors",
     "answers_of",
     "assess_calibration",
     "assess_evaluation",

@@ -2,14 +2,16 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import isfinite, nan
 from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from gateway.calibration.judgement.sideways import Carried, CgLeftErrors, WheelErrors, cg_left_errors, wheel_errors
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
-from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.core.weights import weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
@@ -35,13 +37,17 @@ class Comparison(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One batch of a known run: what was estimated, and what was true."""
+    """One batch of a known run: what was estimated, and what was true.
+
+    cg_left_m is where the sprung mass had its centre of gravity left of the centre line, NaN where nobody noted it.
+    """
 
     run: int
     name: str
     payload_kg: float
     front_share_pct: float
     estimate: Estimate
+    cg_left_m: float = nan
 
     def compared(self, target: Target) -> Comparison:
         """One of the two quantities, truth and estimate."""
@@ -49,6 +55,16 @@ class Judged:
         if target == "payload":
             return Comparison(self.payload_kg, told.payload.number, *told.payload.interval95)
         return Comparison(self.front_share_pct, told.front_share.number, *told.front_share.interval95)
+
+    @property
+    def cg_left(self) -> Comparison:
+        """The centre of gravity's place beside the centre line in m, truth and estimate."""
+        return Comparison(self.cg_left_m, self.estimate.cg_left.number, *self.estimate.cg_left.interval95)
+
+    @property
+    def carried(self) -> Carried:
+        """The truth of the whole load beside the estimate."""
+        return Carried(self.payload_kg, self.front_share_pct, self.cg_left_m, self.estimate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,13 +107,18 @@ class TargetErrors:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """(12) over complete batches: pieces shorter than a window at the end of a run are no batches and not counted."""
+    """(12) over complete batches: pieces shorter than a window at the end of a run are no batches and not counted.
+
+    cg_left is None where no place beside the centre line was noted, wheels where their loads are not known.
+    """
 
     n_batches: int
     n_rejected: int
     rejected_by_reason: dict[str, int]
     payload: TargetErrors
     front_share: TargetErrors
+    cg_left: CgLeftErrors | None = None
+    wheels: WheelErrors | None = None
 
     @property
     def answered(self) -> str:
@@ -116,6 +137,8 @@ class Errors:
             "rejected_by_reason": self.rejected_by_reason,
             "payload": self.payload.to_json(),
             "front_share": self.front_share.to_json(),
+            "cg_left": self.cg_left.to_json() if self.cg_left else None,
+            "wheels": self.wheels.to_json() if self.wheels else None,
         }
 
 
@@ -153,12 +176,15 @@ def errors_of(judged: Sequence[Judged], vehicle: Vehicle) -> Errors:
     reasons = [str(why) for one in whole for why in one.estimate.rejected]
     payload = np.array([one.compared("payload") for one in whole], dtype=float).reshape(-1, 4)
     share = np.array([one.compared("front_share") for one in whole], dtype=float).reshape(-1, 4)
+    cg_left = np.array([one.cg_left for one in whole], dtype=float).reshape(-1, 4)
     return Errors(
         n_batches=len(whole),
         n_rejected=sum(not one.estimate.counted for one in whole),
         rejected_by_reason={why: reasons.count(why) for why in sorted(set(reasons))},
         payload=_target_errors(payload, vehicle.payload_range_kg, "kg", unloaded_kg=_unloaded_kg(vehicle)),
         front_share=_target_errors(share, vehicle.front_share_range_pct, "pp"),
+        cg_left=cg_left_errors(cg_left),
+        wheels=wheel_errors([one.carried for one in whole], vehicle),
     )
 
 
@@ -196,12 +222,13 @@ def _mean(x: F64) -> float | None:
     return float(np.mean(x)) if x.size else None
 
 
-def _truth(one: Judged) -> dict[str, int | float | str]:
+def _truth(one: Judged) -> dict[str, int | float | str | None]:
     return {
         "run": one.run,
         "log": one.name,
         "true_payload_kg": one.payload_kg,
         "true_front_share_pct": one.front_share_pct,
+        "true_cg_left_m": one.cg_left_m if isfinite(one.cg_left_m) else None,
     }
 
 
@@ -220,7 +247,15 @@ def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: st
             run.payload_kg,
             run.front_share_pct,
             weighed(estimate(batch, calibrated, estimator), calibrated.vehicle),
+            _noted_cg_left_m(run, calibrated.vehicle),
         )
         for run in runs
         for batch in run.batches
     ]
+
+
+def _noted_cg_left_m(run: KnownRun, vehicle: Vehicle) -> float:
+    """An empty vehicle's is the one that the campaign states; NaN for a load nobody placed."""
+    if run.payload_kg > 0.0 and run.payload_left_m is None:
+        return nan
+    return cg_left_m(vehicle, run.payload_kg, run.payload_left_m or 0.0)

@@ -1,9 +1,19 @@
 """The error table (12) for people: in short, run by run and batch by batch."""
 
 import math
+from collections.abc import Iterator
 from typing import Final
 
-from gateway.calibration.judgement import PART_NAMES, TARGETS, Comparison, Judged, Judgement, Part, TargetErrors
+from gateway.calibration.judgement import (
+    PART_NAMES,
+    CgLeftErrors,
+    Comparison,
+    Errors,
+    Judged,
+    Judgement,
+    Part,
+    TargetErrors,
+)
 from gateway.records import iso_utc
 from gateway.reports.calibration.text import NONE, decimal, percent
 from gateway.reports.charts import Table
@@ -14,17 +24,34 @@ _COLUMNS: Final = ("mean |e|", "bias", "std", "max", "mean |e| %", "with misses 
 def summary_table(judgement: Judgement) -> Table:
     """Both quantities over every set."""
     rows = [
-        (PART_NAMES[part], label, table.errors.answered, *_cells(table.errors.of(target)))
+        (PART_NAMES[part], label, table.errors.answered, *cells)
         for part, table in judgement.tables.items()
-        for label, target in zip(("payload", "share"), TARGETS, strict=True)
+        for label, cells in _labelled(table.errors)
     ]
     return Table(
         "Errors (12): in kg and percentage points, and in percent of the campaign's ranges; of gross: in percent of "
-        "the loaded vehicle's mass",
+        "the loaded vehicle's mass; where the centre of gravity lies left of the centre line: in mm",
         ("Batches of", "Quantity", "answered", *_COLUMNS),
         tuple(rows),
         n_heads=2,
     )
+
+
+def _labelled(errors: Errors) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """A line a quantity; sideways places and the wheels' loads only where they are known."""
+    yield "payload", _cells(errors.payload)
+    yield "share", _cells(errors.front_share)
+    if errors.cg_left is not None and errors.cg_left.mean_abs_m is not None:
+        yield "centre of gravity, left", _cg_left_cells(errors.cg_left)
+    if errors.wheels is not None:
+        of_gross = decimal(errors.wheels.mean_abs_pct_of_gross)
+        yield "each wheel's load", (NONE, NONE, NONE, NONE, NONE, NONE, of_gross, NONE)
+
+
+def _cg_left_cells(errors: CgLeftErrors) -> tuple[str, ...]:
+    lengths_m = (errors.mean_abs_m, errors.bias_m, errors.std_m, errors.max_abs_m)
+    in_mm = (decimal(None if m is None else 1000.0 * m, " mm") for m in lengths_m)
+    return (*in_mm, NONE, NONE, NONE, percent(errors.coverage95))
 
 
 def _cells(errors: TargetErrors) -> tuple[str, ...]:

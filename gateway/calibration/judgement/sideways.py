@@ -1,0 +1,88 @@
+"""Errors of where the load lies sideways, and of the loads of single wheels that follow from it."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from gateway.core.vehicle import Vehicle
+from gateway.core.weights import Sideways, weights_of
+from gateway.estimate import Estimate, Quantity
+from gateway.records import F64
+
+WHEELS: Final = ("front_left", "front_right", "rear_left", "rear_right")
+
+
+@dataclass(frozen=True, slots=True)
+class CgLeftErrors:
+    """Of the centre of gravity's place beside the centre line, in m. None where nothing was answered."""
+
+    mean_abs_m: float | None
+    bias_m: float | None
+    std_m: float | None
+    max_abs_m: float | None
+    coverage95: float | None
+
+    def to_json(self) -> dict[str, float | None]:
+        """The object that ``evaluate --json`` prints."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class WheelErrors:
+    """Of the four wheels' loads in percent of the gross weight. None where they are not known."""
+
+    mean_abs_pct_of_gross: float | None
+    max_abs_pct_of_gross: float | None
+
+    def to_json(self) -> dict[str, float | None]:
+        """The object that ``evaluate --json`` prints."""
+        return asdict(self)
+
+
+def cg_left_errors(compared: F64) -> CgLeftErrors | None:
+    """Of rows (n, 4): true, estimated, low and high of the 95 % interval. None where no truth is known."""
+    told = compared[np.isfinite(compared[:, 0])]
+    if not len(told):
+        return None
+    true, estimated, low, high = told[np.isfinite(told[:, 1])].T
+    error = estimated - true
+    if not error.size:
+        return CgLeftErrors(None, None, None, None, None)
+    return CgLeftErrors(
+        mean_abs_m=float(np.mean(np.abs(error))),
+        bias_m=float(np.mean(error)),
+        std_m=float(np.std(error)),
+        max_abs_m=float(np.max(np.abs(error))),
+        coverage95=float(np.mean((low <= true) & (true <= high))),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What a batch was told to have carried, beside what was estimated; the place is NaN where nobody noted it."""
+
+    payload_kg: float
+    front_share_pct: float
+    cg_left_m: float
+    estimate: Estimate
+
+    def wheels_off_pct(self, vehicle: Vehicle) -> F64:
+        """(4,) errors of the wheels' loads in percent of the gross weight; NaN where either is unknown.
+
+        How the axles divide a sideways moment no campaign says: the truth takes it as the estimate does.
+        """
+        known = replace(Sideways.of(self.estimate), cg_left=Quantity(self.cg_left_m, 0.0))
+        share = Quantity(self.front_share_pct, 0.0)
+        true = weights_of(vehicle, Quantity(self.payload_kg, 0.0), share, sideways=known)
+        told = self.estimate.weights
+        off_kg = [getattr(told, wheel).kg - getattr(true, wheel).kg for wheel in WHEELS]
+        return np.array(off_kg) / true.gross.kg * 100.0
+
+
+def wheel_errors(carried: Sequence[Carried], vehicle: Vehicle) -> WheelErrors | None:
+    """Over all batches whose wheels' loads are known, in truth and by the estimate; None where there is none."""
+    off_pct = np.array([one.wheels_off_pct(vehicle) for one in carried]).reshape(-1, len(WHEELS))
+    known = np.abs(off_pct[np.isfinite(off_pct).all(axis=1)])
+    return WheelErrors(float(np.mean(known)), float(np.max(known))) if known.size else None
