@@ -3,12 +3,13 @@
 import { known, show } from "/assets/dashboard/known.js";
 import { element, made, row, write } from "/assets/dashboard/page.js";
 import { colour, plot } from "/assets/dashboard/plot.js";
-import { between, clock, figure, kmh, words } from "/assets/dashboard/words.js";
+import { between, clock, figure, kmh, withStd, words } from "/assets/dashboard/words.js";
 
 const HOUR_MS = 3600e3;
 const QUANTITIES = {
   payload: { value: "payload_kg", interval: "payload_interval95_kg", digits: 0, unit: "kg" },
   share: { value: "front_share_pct", interval: "front_share_interval95_pct", digits: 1, unit: "%" },
+  side: { value: "cg_left_m", interval: "cg_left_interval95_m", digits: 3, unit: "m", isRare: true },
 };
 
 /** Local time without a zone, as the charts want it. */
@@ -60,7 +61,7 @@ function refusals(batches) {
 }
 
 function truthLine(truth, quantity, until) {
-  const shown = truth.filter((load) => load.t_start < until);
+  const shown = truth.filter((load) => load.t_start < until && load[quantity.value] != null);
   const x = shown.map((load) => local(load.t_start)), y = shown.map((load) => load[quantity.value]);
   if (shown.length) { x.push(local(until)); y.push(y.at(-1)); }
   return { x, y, type: "scatter", mode: "lines", line: { shape: "hv", color: colour("truth"), width: 5 }, opacity: 0.75, hovertemplate: `truly %{y:.${quantity.digits}f} ${quantity.unit}<extra></extra>` };
@@ -100,10 +101,13 @@ function drawCharts() {
   if (known.batches !== null) write("history-none", "No batch yet.");
   if (!batches.length) return;
   for (const [name, quantity] of Object.entries(QUANTITIES)) {
+    const isTold = !quantity.isRare || batches.some((batch) => batch[quantity.interval] != null);
+    element(`${name}-chart`).closest("figure").hidden = !isTold;
+    if (!isTold) continue;
     element(`${name}-chart-words`).textContent = inWords(batches, quantity);
     plot(element(`${name}-chart`), traces(batches, quantity), {
       xaxis: { type: "date", range: range(batches) },
-      yaxis: { zeroline: name === "payload" },
+      yaxis: { zeroline: name !== "share" },
       yaxis2: floor,
     });
   }
@@ -111,6 +115,8 @@ function drawCharts() {
 
 function drawTable({ batches }) {
   if (batches === null) return;
+  const isSideTold = batches.some((batch) => batch.cg_left_m != null);
+  element("side-head").hidden = !isSideTold;
   const rows = batches.map((batch) => {
     const isRejected = batch.rejected.length > 0;
     return row([
@@ -119,6 +125,7 @@ function drawTable({ batches }) {
       isRejected ? "–" : between(batch.payload_interval95_kg, 0, "kg"),
       isRejected ? "–" : figure(batch.front_share_pct, 1, "%"),
       isRejected ? "–" : between(batch.front_share_interval95_pct, 1, "%"),
+      ...(isSideTold ? [isRejected ? "–" : withStd(batch.cg_left_m, batch.cg_left_std_m, 3, "m")] : []),
       kmh(batch.mean_speed_mps),
       isRejected ? `not weighed: ${batch.rejected.map(words).join(", ")}` : "weighed",
     ], isRejected ? "rejected" : "");
