@@ -5,7 +5,7 @@ PORT := 8000
 BIN := .venv/bin
 PIP := $(BIN)/pip --disable-pip-version-check
 
-.PHONY: demo test check bench deb dist soak test-vm vm-image vcan lock docs site screenshots clean
+.PHONY: demo test check audit bench deb dist soak test-vm vm-image vcan lock docs site screenshots clean
 .DEFAULT_GOAL := demo
 
 .venv/bin/python:
@@ -51,6 +51,11 @@ check: .venv/.development
 	$(BIN)/python docs/make_readme_table.py --check
 	$(BIN)/python docs/make_site.py
 	$(BIN)/python docs/make_drawings.py --check
+	$(BIN)/python deploy/dist/audit_locks.py --advisory
+
+# Known weaknesses of the locked packages; fails where there is one, or where nobody can be asked.
+audit: .venv/.development
+	$(BIN)/python deploy/dist/audit_locks.py
 
 bench: .venv/.development
 	for what in day decode live simulator web; do echo "== $$what"; $(BIN)/python -m benchmarks.speed.$$what || exit 1; done
