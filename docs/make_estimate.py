@@ -53,7 +53,7 @@ NULL: Final = {
     "is_provisional": "absent in the estimate of a whole batch",
     "spectra": "absent where nothing could be transformed, and where the request says `spectra=false`",
     "diagnostics": "empty where rejected before a fit",
-    "epoch": "absent where rejected or provisional",
+    "epoch": "absent where rejected or provisional; the place is null where no batch told it",
     "tare": "absent where rejected, and where no tare is in use",
 }
 """When a field is unknown, by the part of Estimate that it shows. Empty: never."""

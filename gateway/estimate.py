@@ -50,6 +50,7 @@ class Epoch:
     payload: Quantity
     front_share: Quantity
     n_batches: int
+    cg_left: Quantity = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,17 +9,19 @@ shared hides no change of load. A batch that does not fit opens a new epoch by i
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
-from gateway.estimate import Epoch, Estimate, Quantity
+from gateway.estimate import UNKNOWN, Epoch, Estimate, Quantity
 
 LEAST_OWN_VARIANCE: Final = 0.25
 """Of a batch's variance: batches of one load scatter at least so much (the rest was measured as 0.73 to 0.82)."""
 PAYLOAD_OWN_STD_KG: Final = "payload_own_std_kg"
 FRONT_SHARE_OWN_STD_PCT: Final = "front_share_own_std_pct"
+CG_LEFT_OWN_STD_M: Final = "cg_left_own_std_m"
 """Names in ``Estimate.diagnostics`` of what is a batch's own, by its length and its road; half of it if absent."""
 CHANGE_THRESHOLD: Final = 13.8  # chi-squared of two degrees of freedom, one false alarm in a thousand
+CHANGE_THRESHOLD_SIDEWAYS: Final = 16.3  # likewise of three, where the load's place across is known too
 STOP_THAT_ENDS_EPOCH_S: Final = 60.0
 
 
@@ -66,33 +68,57 @@ class Fused:
 
 @dataclass(frozen=True, slots=True)
 class LoadEpoch:
-    """All that is known of one load, since t_start_ns. ``is_change`` is true where a jump opened it."""
+    """All that is known of one load, since t_start_ns. ``is_change`` is true where a jump opened it.
+
+    ``cg_left_m`` is of the batches that told it; None while none did.
+    """
 
     t_start_ns: int
     payload_kg: Fused
     front_share_pct: Fused
     is_change: bool = False
+    cg_left_m: Fused | None = None
+
+    def distance2(self, payload: Found, share: Found, cg_left: Found | None) -> float:
+        """How far another batch lies off, in parts of what would be a change."""
+        planar = self.payload_kg.distance2(payload) + self.front_share_pct.distance2(share)
+        if cg_left is None or self.cg_left_m is None:
+            return planar / CHANGE_THRESHOLD
+        return (planar + self.cg_left_m.distance2(cg_left)) / CHANGE_THRESHOLD_SIDEWAYS
 
 
 def fused(epoch: LoadEpoch | None, estimate: Estimate, could_have_changed: bool = False) -> LoadEpoch | None:
     """The epoch after ``estimate``: continued, or begun anew after a stop or at a jump.
 
     Rejected and provisional estimates teach nothing; after a stop they still end the old epoch.
-    Estimates without both numbers and their standard deviations are passed over.
+    Estimates without payload and front share and their standard deviations are passed over; the lateral place counts
+    where a batch tells it.
     """
     kept = None if could_have_changed else epoch
     if not _teaches(estimate):
         return kept
     payload = _found(estimate, estimate.payload, PAYLOAD_OWN_STD_KG)
     share = _found(estimate, estimate.front_share, FRONT_SHARE_OWN_STD_PCT)
-    begun = LoadEpoch(estimate.t_start_ns, _begun(payload), _begun(share))
+    cg_left = _found(estimate, estimate.cg_left, CG_LEFT_OWN_STD_M) if _is_told(estimate.cg_left) else None
+    begun = LoadEpoch(
+        estimate.t_start_ns, _begun(payload), _begun(share), cg_left_m=None if cg_left is None else _begun(cg_left)
+    )
     if kept is None:
         return begun
-    if kept.payload_kg.distance2(payload) + kept.front_share_pct.distance2(share) > CHANGE_THRESHOLD:
-        return LoadEpoch(begun.t_start_ns, begun.payload_kg, begun.front_share_pct, is_change=True)
-    return LoadEpoch(
-        kept.t_start_ns, kept.payload_kg.joined(payload), kept.front_share_pct.joined(share), kept.is_change
+    if kept.distance2(payload, share, cg_left) > 1.0:
+        return replace(begun, is_change=True)
+    return replace(
+        kept,
+        payload_kg=kept.payload_kg.joined(payload),
+        front_share_pct=kept.front_share_pct.joined(share),
+        cg_left_m=_joined(kept.cg_left_m, cg_left),
     )
+
+
+def _joined(before: Fused | None, found: Found | None) -> Fused | None:
+    if before is None or found is None:
+        return before if found is None else _begun(found)
+    return before.joined(found)
 
 
 def _found(estimate: Estimate, quantity: Quantity, own_name: str) -> Found:
@@ -110,15 +136,14 @@ def summary(epoch: LoadEpoch | None) -> Epoch | None:
     """What ``Estimate.epoch`` holds; nothing without an epoch."""
     if epoch is None:
         return None
-    return Epoch(epoch.payload_kg.quantity, epoch.front_share_pct.quantity, epoch.payload_kg.n)
+    cg_left = UNKNOWN if epoch.cg_left_m is None else epoch.cg_left_m.quantity
+    return Epoch(epoch.payload_kg.quantity, epoch.front_share_pct.quantity, epoch.payload_kg.n, cg_left)
 
 
 def _teaches(estimate: Estimate) -> bool:
-    stds = (estimate.payload.std, estimate.front_share.std)
-    numbers = (estimate.payload.number, estimate.front_share.number, *stds)
-    return (
-        estimate.counted
-        and not estimate.is_provisional
-        and all(math.isfinite(x) for x in numbers)
-        and all(s > 0.0 for s in stds)
-    )
+    is_whole = estimate.counted and not estimate.is_provisional
+    return is_whole and _is_told(estimate.payload) and _is_told(estimate.front_share)
+
+
+def _is_told(quantity: Quantity) -> bool:
+    return math.isfinite(quantity.number) and math.isfinite(quantity.std) and quantity.std > 0.0

@@ -16,7 +16,7 @@ import math
 from dataclasses import replace
 
 from gateway.core.vehicle import Vehicle
-from gateway.estimate import Epoch, Estimate, Quantity
+from gateway.estimate import Estimate, Quantity
 
 
 def told(estimate: Estimate, vehicle: Vehicle | None) -> Estimate:
@@ -31,7 +31,7 @@ def told(estimate: Estimate, vehicle: Vehicle | None) -> Estimate:
         front_share=front_share,
         correlation=estimate.correlation * kept,
         front_share_cg_left_correlation=estimate.front_share_cg_left_correlation * kept,
-        epoch=epoch and Epoch(epoch.payload, _absolute(epoch.front_share, epoch.payload, vehicle), epoch.n_batches),
+        epoch=epoch and replace(epoch, front_share=_absolute(epoch.front_share, epoch.payload, vehicle)),
     )
 
 

@@ -5,6 +5,9 @@
 
 A tare corrects an offset, whatever its cause. It is no calibration: the scale stays as it is, and the
 offset is the same at every load. Estimators and their gates see the raw numbers throughout.
+
+Where the load lies sideways is left as it is: an empty vehicle's own place is rarely stated, and an error of the
+sensor's place, which would be the cause, is no offset that stays at every load.
 """
 
 import math
@@ -15,7 +18,7 @@ from typing import Final
 from gateway.core.fusion import LoadEpoch
 from gateway.core.vehicle import Vehicle
 from gateway.errors import TareRefusedError
-from gateway.estimate import Correction, Epoch, Estimate, Quantity
+from gateway.estimate import Correction, Estimate, Quantity
 
 MOST_PAYLOAD_SHARE: Final = 0.05  # of the empty sprung mass: a larger offset is a load, or asks for a calibration
 MOST_FRONT_SHARE_PCT: Final = 3.0  # percentage points
@@ -140,7 +143,10 @@ def tared(estimate: Estimate, tare: Tare | None) -> Estimate:
         payload=_less(e.payload, payload),
         front_share=_less(e.front_share, front_share),
         correlation=e.correlation * _kept(e.payload, payload) * _kept(e.front_share, front_share),
-        epoch=epoch and Epoch(_less(epoch.payload, payload), _less(epoch.front_share, front_share), epoch.n_batches),
+        payload_cg_left_correlation=e.payload_cg_left_correlation * _kept(e.payload, payload),
+        front_share_cg_left_correlation=e.front_share_cg_left_correlation * _kept(e.front_share, front_share),
+        epoch=epoch
+        and replace(epoch, payload=_less(epoch.payload, payload), front_share=_less(epoch.front_share, front_share)),
         tare=Correction(tare.id, payload, front_share, raw_payload=e.payload, raw_front_share=e.front_share),
     )
 

@@ -178,6 +178,8 @@ FIELDS: Final = (
     EstimateField("epoch_payload_std_kg", "epoch.payload.std", NUMBER, _STD, 4.9, _KNOWN),
     EstimateField("epoch_front_share_pct", "epoch.front_share.number", NUMBER, _SHARE, 50.3, _KNOWN),
     EstimateField("epoch_front_share_std_pct", "epoch.front_share.std", NUMBER, _POINTS, 0.1, _KNOWN),
+    EstimateField("epoch_cg_left_m", "epoch.cg_left.number", NUMBER, _CG_LEFT, 0.02, _KNOWN),
+    EstimateField("epoch_cg_left_std_m", "epoch.cg_left.std", NUMBER, _STD, 0.003, _KNOWN),
     EstimateField("epoch_n_batches", "epoch.n_batches", COUNT, "batches since the load last changed", 3.0, _KNOWN),
     _field(
         "tare_id",

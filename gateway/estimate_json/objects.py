@@ -62,7 +62,8 @@ def _quantity(known: Mapping[str, Any], path: str) -> Quantity:
 def _epoch(known: Mapping[str, Any]) -> Epoch | None:
     if "epoch.n_batches" not in known:
         return None
-    return Epoch(_quantity(known, "epoch.payload"), _quantity(known, "epoch.front_share"), known["epoch.n_batches"])
+    quantities = {name: _quantity(known, f"epoch.{name}") for name in ("payload", "front_share", "cg_left")}
+    return Epoch(n_batches=known["epoch.n_batches"], **quantities)
 
 
 def _correction(known: Mapping[str, Any]) -> Correction | None:

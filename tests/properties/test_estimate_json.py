@@ -33,7 +33,7 @@ estimates = st.builds(
     st.booleans(),
     st.none() | spectra,
     by_name,
-    st.none() | st.builds(Epoch, quantities, quantities, st.integers(1, 10**6)),
+    st.none() | st.builds(Epoch, quantities, quantities, st.integers(1, 10**6), quantities),
     st.none() | st.builds(Correction, names, *[quantities] * 4),
     st.none() | names,
     st.none() | names,

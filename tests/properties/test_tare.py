@@ -23,7 +23,7 @@ from gateway.core.tare import (
 )
 from gateway.core.vehicle import Vehicle
 from gateway.errors import TareRefusedError
-from gateway.estimate import Estimate, Quantity
+from gateway.estimate import Epoch, Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
 
@@ -104,9 +104,11 @@ def test_intervals_move_with_the_number_and_never_narrow(found: Estimate, zero: 
 @given(batches)
 def test_a_zero_known_to_be_nothing_moves_nothing(found: Estimate) -> None:
     shown = tared(found, tare_of(Zero(0.0, 0.0, 0.0, 0.0)))
-    same = {"payload": found.payload, "front_share": found.front_share, "correlation": found.correlation}
+    correlations = ("correlation", "payload_cg_left_correlation", "front_share_cg_left_correlation")
+    same = {name: getattr(found, name) for name in ("payload", "front_share", *correlations)}
     assert replace(shown, tare=None, **same) == found
-    assert shown.correlation == pytest.approx(found.correlation, nan_ok=True)
+    for name in correlations:
+        assert getattr(shown, name) == pytest.approx(getattr(found, name), nan_ok=True)
     for after, before in ((shown.payload, found.payload), (shown.front_share, found.front_share)):
         assert (after.number, after.std) == (before.number, before.std)
         assert after.interval95 == pytest.approx(before.interval95)
@@ -136,6 +138,27 @@ def test_unknown_stays_unknown() -> None:
     assert shown.payload.number == 90.0
     record = estimate_to_json(shown)
     assert record["front_share_pct"] is record["front_share_std_pct"] is record["front_share_interval95_pct"] is None
+
+
+@given(batches, zeros, st.floats(-0.9, 0.9), st.floats(-0.9, 0.9))
+def test_where_the_load_lies_sideways_is_left_as_it_is(
+    found: Estimate, zero: Zero, with_payload: float, with_share: float
+) -> None:
+    """And how its error goes with the others': by their raw deviations, for the zero knows nothing of it."""
+    aside = replace(
+        found,
+        cg_left=Quantity(0.03, 0.006),
+        payload_cg_left_correlation=with_payload,
+        front_share_cg_left_correlation=with_share,
+        epoch=Epoch(found.payload, found.front_share, 1, Quantity(0.03, 0.005)),
+    )
+    shown = tared(aside, tare_of(zero))
+    assert shown.cg_left == aside.cg_left
+    assert shown.epoch.cg_left == aside.epoch.cg_left
+    assert shown.payload_cg_left_correlation * shown.payload.std == pytest.approx(with_payload * found.payload.std)
+    assert shown.front_share_cg_left_correlation * shown.front_share.std == pytest.approx(
+        with_share * found.front_share.std
+    )
 
 
 @given(batches, zeros)

@@ -113,3 +113,42 @@ def test_what_says_nothing_leaves_the_epoch_unless_a_stop_ended_it(silent: Estim
     assert fused(epoch, silent) == epoch
     assert fused(epoch, silent, could_have_changed=True) is None
     assert summary(None) is None
+
+
+def aside(left_m: float, std_m: float = 0.006, payload_kg: float = 270.0) -> Estimate:
+    return replace(batch(payload_kg), cg_left=Quantity(left_m, std_m))
+
+
+def test_the_place_across_is_fused_of_the_batches_that_tell_it() -> None:
+    told = summary(epoch_of(aside(0.020), batch(270.0), aside(0.026)))
+    assert told.n_batches == 3
+    assert told.cg_left.number == pytest.approx(0.023)
+    assert told.cg_left.std == pytest.approx(0.006 * math.sqrt(0.75))
+
+
+def test_without_a_word_of_it_the_place_across_is_unknown() -> None:
+    told = summary(epoch_of(batch(270.0), batch(271.0)))
+    assert math.isnan(told.cg_left.number)
+    assert math.isnan(told.cg_left.std)
+
+
+def test_a_load_moved_sideways_opens_a_new_epoch() -> None:
+    epoch = epoch_of(aside(0.05), aside(0.05), aside(-0.05))
+    assert epoch is not None
+    assert epoch.is_change
+    assert summary(epoch).cg_left.number == -0.05
+    assert summary(epoch).n_batches == 1
+
+
+def test_two_quantities_and_three_raise_one_false_alarm_in_a_thousand() -> None:
+    """Batches of one load, a draw in 20 000 at a time, about an epoch that is known for sure."""
+    rng = np.random.default_rng(5)
+    own = {"payload_own_std_kg": 10.0, "front_share_own_std_pct": 0.4, "cg_left_own_std_m": 0.006}
+    known = replace(batch(270.0, std_kg=1e-6), cg_left=Quantity(0.0, 1e-9), front_share=Quantity(50.0, 1e-9))
+    for is_aside in (False, True):
+        begun = fused(None, known if is_aside else replace(known, cg_left=Quantity()))
+        alarms = 0
+        for kg, pct, m in rng.standard_normal((20_000, 3)) * [10.0, 0.4, 0.006] + [270.0, 50.0, 0.0]:
+            one = replace(batch(kg, pct), cg_left=Quantity(m, 0.006), diagnostics=own)
+            alarms += fused(begun, one).is_change
+        assert 8 <= alarms <= 34
