@@ -1,6 +1,6 @@
 """A campaign's drives: read, cut into identification and validation, inspected, calibrated from and judged by."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final, Literal
 
@@ -11,10 +11,12 @@ from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
 from gateway.calibration.inspection import (
+    Finding,
     Inspection,
     LogFacts,
     SplitRun,
     inspect_campaign,
+    offset_findings,
     row_facts,
     unmapped_roll_findings,
 )
@@ -130,8 +132,15 @@ def inspect(
     """Reads the logs of the chosen runs and tells of each what is wrong with it, if anything."""
     split = split_runs(campaign, settings, numbers=numbers, on_run=on_run, keeps_unreadable=True)
     verdicts, findings = inspect_campaign(split, campaign.vehicle, settings)
-    unmapped = unmapped_roll_rate(load_signal_map(campaign.signals))
-    return Inspection(tuple(split), verdicts, (*findings, *unmapped_roll_findings(unmapped)))
+    return Inspection(tuple(split), verdicts, (*findings, *_sideways_findings(campaign)))
+
+
+def _sideways_findings(campaign: Campaign) -> Iterator[Finding]:
+    """What would tell where loads lie to the side, and is not there."""
+    signal_map = load_signal_map(campaign.signals)
+    if Signal.ROLL_RATE not in signal_map.signals:
+        yield from unmapped_roll_findings(unmapped_roll_rate(signal_map))
+    yield from offset_findings(campaign.vehicle)
 
 
 def calibrate(

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("campaign")
     write_campaign(bench_of("experiment", longest_s=DRIVE_S), directory)
     return directory
+
+
+UNTOLD = "note:roll_rate_sign_untold"  # one run with a sensor 0.15 m off the centre line is not enough for that
 
 
 def calibrate(campaign: Path, *options: str | Path) -> Result:
@@ -87,10 +91,23 @@ def test_a_sound_campaign_passes_without_a_word(folder: Path) -> None:
     assert lines[2].startswith("2 of 2 runs can be used: 0 to 420 kg")
 
 
+def test_what_would_tell_where_loads_lie_to_the_side_is_noted_where_it_is_missing(folder: Path) -> None:
+    text = (folder / "signals.toml").read_text(encoding="utf-8")
+    (folder / "no-roll-signals.toml").write_text(re.sub(r"\[signals\.roll_rate\][^[]*", "", text), encoding="utf-8")
+    head = head_with(folder, '"signals.toml"', '"no-roll-signals.toml"')
+    head = re.sub(r"sensor_offset_left_m = .*\n", "", head)
+    exit_code, found = check(altered(folder, "no-roll", head=head))
+    notes = ["note:roll_rate_unmapped", "note:sensor_offset_unknown"]
+    assert (exit_code, kinds(found)) == (0, {0: notes, 1: [], 2: [], 3: [], 4: []})
+    unmapped, unknown = found["campaign_findings"]
+    assert 'signal = "RollRate"' in unmapped["text"]
+    assert unknown["text"] == "sensor_offset_left_m is 0 ± 0.59 m (95 %)"
+
+
 def test_one_load_only_is_a_zero_point_and_nothing_for_the_ratio_index(folder: Path, tmp_path: Path) -> None:
     campaign = altered(folder, "one-load", [1])
     exit_code, found = check(campaign)
-    assert (exit_code, kinds(found)) == (0, {0: ["warning:one_load_only"], 1: []})
+    assert (exit_code, kinds(found)) == (0, {0: ["warning:one_load_only", UNTOLD], 1: []})
     done = calibrate(campaign, "--output", tmp_path / "zero.json")
     assert done.exit_code == 0, done.output
     held = load_calibration(tmp_path / "zero.json")
@@ -183,7 +200,7 @@ def test_every_log_at_fault_is_named_and_the_rest_goes_on(folder: Path) -> None:
 def test_faults_that_leave_one_load_of_several_are_refused(folder: Path) -> None:
     short = table_of(folder, 10).rstrip() + "\nend_s = 20.0\n\n"
     exit_code, found = check(altered(folder, "one-left", [1, 10], run10=short))
-    assert (exit_code, kinds(found)) == (1, {0: ["warning:one_load_only"], 1: [], 2: ["fault:too_short"]})
+    assert (exit_code, kinds(found)) == (1, {0: ["warning:one_load_only", UNTOLD], 1: [], 2: ["fault:too_short"]})
     assert found["refusal"] == "faults leave runs with 0 kg alone, which is no scale"
 
 
@@ -223,7 +240,7 @@ def test_a_campaign_may_hold_logs_of_any_kind(suffix: str, folder: Path) -> None
                     writer.on_message_received(message)
     table = f'\nlog = "{name}"\npayload_kg = 0.0\nfront_share_pct = 50.0\nstart_s = 10.0\nend_s = 150.0\n'
     exit_code, found = check(altered(folder, f"log{suffix}", [1], run1=table))
-    assert (exit_code, kinds(found)) == (0, {0: ["warning:one_load_only"], 1: []})
+    assert (exit_code, kinds(found)) == (0, {0: ["warning:one_load_only", UNTOLD], 1: []})
 
 
 def test_the_share_may_be_stated_instead_of_the_position(folder: Path) -> None:

@@ -10,7 +10,7 @@ from gateway.calibration.inspection.campaign import inspect_campaign
 from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
 from gateway.calibration.inspection.inspection import Inspection
 from gateway.calibration.inspection.log import LogFacts
-from gateway.calibration.inspection.roll import unmapped_roll_findings
+from gateway.calibration.inspection.roll import offset_findings, unmapped_roll_findings
 from gateway.calibration.inspection.rows import RowFacts, row_facts
 from gateway.calibration.inspection.split_run import SplitRun
 
@@ -23,6 +23,7 @@ __all__ = [
     "Severity",
     "SplitRun",
     "inspect_campaign",
+    "offset_findings",
     "row_facts",
     "unmapped_roll_findings",
 ]

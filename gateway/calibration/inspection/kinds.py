@@ -37,6 +37,7 @@ class Kind(StrEnum):
     ROLL_RATE_SIGN = "roll_rate_sign"
     ROLL_RATE_SIGN_UNTOLD = "roll_rate_sign_untold"
     SENSOR_POSITION = "sensor_position"
+    SENSOR_OFFSET_UNKNOWN = "sensor_offset_unknown"
     SPEED_MISSING = "speed_missing"
     SPEED_FROZEN = "speed_frozen"
     SPEED_OUTSIDE_GATE = "speed_outside_gate"

@@ -16,6 +16,8 @@ from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Severity
 from gateway.calibration.inspection.kinds import Kind
 from gateway.core.spectrum import BAND_HZ, frequencies_hz, segment_starts, segment_transforms
+from gateway.core.vehicle import Vehicle
+from gateway.estimate import Z95
 from gateway.records import C128, F64, Batch
 
 OVER_PITCH_RANGE: Final = (
@@ -29,6 +31,7 @@ ALIKE: Final = (
 )
 LOST_SHARE_NOTED: Final = 0.02
 LEAST_SEGMENTS: Final = 6
+HARDLY_KNOWN_M: Final = 0.1  # standard deviation; a tape gives 0.02
 ACCELERATION, PITCH, ROLL = range(3)
 
 
@@ -130,6 +133,14 @@ def roll_findings(spectra: RollSpectra) -> Iterator[Finding]:
 
 
 def unmapped_roll_findings(entry: str | None) -> Iterator[Finding]:
-    """``entry`` is what the signal map lacks, as it would stand there; None where it lacks nothing that is at hand."""
-    if entry is not None:
-        yield finding_of(Kind.ROLL_RATE_UNMAPPED, Severity.NOTE, f"the signal map could hold {entry}")
+    """Of a signal map without a roll rate; ``entry`` is what it could hold, None where names do not tell."""
+    found = f"the signal map could hold {entry}" if entry else "the pitch rate's message names none"
+    yield finding_of(Kind.ROLL_RATE_UNMAPPED, Severity.NOTE, found)
+
+
+def offset_findings(vehicle: Vehicle) -> Iterator[Finding]:
+    """A sensor whose place to the side nobody measured."""
+    std_m = vehicle.sensor_offset_left_std_m
+    if std_m > HARDLY_KNOWN_M:
+        text = f"sensor_offset_left_m is {vehicle.sensor_offset_left_m:g} ± {Z95 * std_m:.2g} m (95 %)"
+        yield finding_of(Kind.SENSOR_OFFSET_UNKNOWN, Severity.NOTE, text)

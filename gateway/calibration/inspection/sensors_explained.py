@@ -105,9 +105,9 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.ROLL_RATE_UNMAPPED: Explained(
             Topic.SENSORS,
             (Severity.NOTE,),
-            "the message of the pitch rate has a roll rate too, which the signal map does not name",
-            "add it to the signal map: it tells where a load lies to the side, and keeps it from passing for payload "
-            "where the sensor sits off the centre line",
+            "no roll rate is mapped: where a load lies to the side, and so the load of each wheel, is not told, and "
+            "with a sensor off the centre line such a load passes for more or less payload",
+            "add roll_rate to the signal map, if the device sends it",
         ),
         Kind.ROLL_RATE_LOST: Explained(
             Topic.SENSORS,
@@ -146,6 +146,13 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             (Severity.FAULT, Severity.WARNING),
             "the spectra put the sensor elsewhere than sensor_position_m says",
             "measure again from the front axle, check wheelbase_m and the speed's unit, or widen sensor_position_std_m",
+        ),
+        Kind.SENSOR_OFFSET_UNKNOWN: Explained(
+            Topic.SENSORS,
+            (Severity.NOTE,),
+            "how far beside the centre line the sensor sits is hardly known; off it, roll is taken for heave as soon "
+            "as a load lies to one side too",
+            "measure it with a tape: sensor_offset_left_m in the campaign file, and its standard deviation",
         ),
         Kind.COARSE_RESOLUTION: Explained(
             Topic.SENSORS,

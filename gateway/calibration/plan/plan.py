@@ -18,6 +18,7 @@ from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATIO
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import Design
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
+from gateway.calibration.plan.sideways import SidewaysLoad, sideways_load
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
@@ -57,7 +58,9 @@ class Advice:
 class LoadPlan:
     """Runs to drive, in order. ``now`` is None where nothing was driven yet.
 
-    ``least`` is the run that would help least, for comparison with the first of ``advice``.
+    ``least`` is the run that would help least, for comparison with the first of ``advice``. ``sideways`` is the load
+    to put to one side on one more run: what a load off the centre line does then shows, as do the signs of the roll
+    rate and of the sensor's place. None where one was driven, or no roll rate is mapped.
     """
 
     vehicle: str
@@ -66,6 +69,7 @@ class LoadPlan:
     now: Expected | None
     advice: tuple[Advice, ...]
     least: Advice | None
+    sideways: SidewaysLoad | None = None
 
     @property
     def is_enough_driven(self) -> bool:
@@ -124,6 +128,7 @@ def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadP
         now=planner.expected(known.covariance, driven),
         advice=planner.advice(known.covariance, driven, n_runs),
         least=planner.least(known.covariance, driven),
+        sideways=sideways_load(runs, vehicle),
     )
 
 

@@ -17,6 +17,13 @@ def plan_sentences(plan: LoadPlan) -> str:
     ]
     if plan.least is not None:
         lines.append(f"least useful would be: {_load(plan.least.load)}: then {_expected(plan.least.expected)}")
+    if plan.sideways is not None:
+        load, left_m = plan.sideways.load, plan.sideways.payload_left_m
+        lines.append(
+            f"one run with a load to one side: {_load(load)}, {left_m:g} m left or right of the centre line "
+            f"(payload_left_m = {left_m:g} or -{left_m:g}): what such a load does then shows, and no longer follows "
+            "from springs and road alone; so do the signs of the roll rate and of sensor_offset_left_m"
+        )
     return "\n".join(lines)
 
 

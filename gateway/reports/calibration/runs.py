@@ -3,7 +3,7 @@
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import Finding, RunVerdict, SplitRun
 from gateway.calibration.judgement import Assessment
-from gateway.calibration.plan import Advice, Expected, LoadPlan
+from gateway.calibration.plan import Advice, Expected, LoadPlan, SidewaysLoad
 from gateway.estimate import Z95
 from gateway.records import Why
 from gateway.reports.calibration.text import NONE, decimal, percent, span
@@ -68,7 +68,17 @@ def plan_section(plan: LoadPlan) -> Section:
         "The runs after which loads would be weighed best, each with those above it. The half-car says so of itself, "
         "to first order: it tells which run to drive rather than how good the result will be."
     )
-    return Section("next", "What to drive next", (text,), (), (Table(caption, columns, tuple(rows)),))
+    paragraphs = (text, *([_sideways(plan.sideways)] if plan.sideways else []))
+    return Section("next", "What to drive next", paragraphs, (), (Table(caption, columns, tuple(rows)),))
+
+
+def _sideways(sideways: SidewaysLoad) -> str:
+    load, left_m = sideways.load, sideways.payload_left_m
+    return (
+        f"One run with a load to one side, such as {load.payload_kg:g} kg {left_m:g} m left of the centre line "
+        f"(payload_left_m = {left_m:g}), would show what such a load does, which so far follows from springs and road "
+        "alone, and the signs of the roll rate and of sensor_offset_left_m."
+    )
 
 
 def best_next(plan: LoadPlan) -> str | None:
