@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.stated_share import measured
-from gateway.core.vehicle import Vehicle, left_share_pct
+from gateway.core.vehicle import Vehicle
 from gateway.estimate import UNKNOWN, Z95, Estimate, Lack, Quantity, Weight, Weights
 from gateway.records import F64
 
@@ -252,16 +252,6 @@ def place_of(
         left_m=left_m,
         left_std_m=left_std_m,
         correlation=errors.covariance(along, across) / (std_m * left_std_m) if is_both else math.nan,
-    )
-
-
-def left_share_of(cg_left: Quantity, track_width_m: float) -> Quantity:
-    """Share of the sprung weight on the left wheels (%), from the centre of gravity (core.vehicle.left_share_pct)."""
-    low_m, high_m = cg_left.interval95
-    return Quantity(
-        left_share_pct(cg_left.number, track_width_m),
-        100.0 * cg_left.std / track_width_m,
-        (left_share_pct(low_m, track_width_m), left_share_pct(high_m, track_width_m)),
     )
 
 

@@ -13,8 +13,8 @@ from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched, demo_c
 from support.web import Gateway, serving
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.vehicle import cg_left_m
-from gateway.core.weights import Sideways, left_share_of, place_of
+from gateway.core.vehicle import cg_left_m, left_share_pct
+from gateway.core.weights import Sideways, place_of
 from gateway.estimate import Estimate, Quantity
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
@@ -37,7 +37,7 @@ def leaning(n: int, calibrated: CalibratedVehicle, left_m: float = LEFT_M) -> Es
     return replace(
         weighed(n, PAYLOAD_KG, 48.0, calibrated),
         cg_left=cg_left,
-        left_share=left_share_of(cg_left, 1.5),
+        left_share=Quantity.normal(left_share_pct(cg_left.number, 1.5), 100.0 * cg_left.std / 1.5),
         roll_share_front=0.6,
         roll_share_front_std=0.05,
         front_share_cg_left_correlation=0.5,

@@ -8,13 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct
+from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct
 from gateway.core.weights import (
     RELEASE_SHARE,
     Place,
     Sideways,
     is_over_limit,
-    left_share_of,
     place_of,
     unsprung_kg,
     weighed,
@@ -192,7 +191,7 @@ def test_the_left_share_is_that_of_the_wheels_without_axles(payload_kg: float, l
     sideways = Sideways(Quantity(left_m, 0.0), 0.6, 0.0)
     weights = weights_of(bare, Quantity(payload_kg, 0.0), Quantity(51.0, 0.0), 0.0, sideways)
     share_pct = 100.0 * (weights.front_left.kg + weights.rear_left.kg) / weights.gross.kg
-    assert left_share_of(Quantity(left_m), 1.5).number == pytest.approx(share_pct)
+    assert left_share_pct(left_m, 1.5) == pytest.approx(share_pct)
 
 
 def sideways_draws() -> tuple[F64, F64]:
