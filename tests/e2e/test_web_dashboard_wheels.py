@@ -36,6 +36,7 @@ def leaning(n: int, calibrated: CalibratedVehicle, left_m: float = LEFT_M) -> Es
     cg_left = Quantity.normal(cg_left_m(calibrated.vehicle, PAYLOAD_KG, left_m), 0.008)
     return replace(
         weighed(n, PAYLOAD_KG, 48.0, calibrated),
+        front_share=Quantity.normal(48.0, 0.6),  # more than the stated empty share's
         cg_left=cg_left,
         left_share=Quantity.normal(left_share_pct(cg_left.number, 1.5), 100.0 * cg_left.std / 1.5),
         roll_share_front=0.6,
@@ -89,7 +90,7 @@ def test_the_ellipse_is_that_of_the_covariance(site: str, watched: Watched) -> N
     page.goto(site)
     drawn = page.locator("#van ellipse.spread")
     vehicle, found = tracked().vehicle, leaning(1, tracked())
-    place = place_of(vehicle, found.payload, found.front_share, 0.0, Sideways.of(found))
+    place = place_of(vehicle, found.payload, found.front_share, math.nan, Sideways.of(found))
     assert place is not None
     along, across = place.std_m * ALONG, place.left_std_m * ACROSS
     common = place.correlation * along * across
