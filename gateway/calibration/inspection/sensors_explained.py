@@ -107,8 +107,8 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             (Severity.NOTE,),
             "no roll rate is mapped: where a load lies to the side, and so the load of each wheel, is not told, and "
             "with a sensor off the centre line such a load passes for more or less payload",
-            "add roll_rate to the signal map, if the device sends it: where a load lies to the side and the load of each "
-            "wheel are then told, and the payload no longer suffers from it",
+            "add roll_rate to the signal map, if the device sends it: where a load lies to the side and the load of "
+            "each wheel are then told, and the payload suffers less from it",
         ),
         Kind.ROLL_RATE_LOST: Explained(
             Topic.SENSORS,
