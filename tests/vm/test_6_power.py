@@ -56,6 +56,7 @@ def test_no_power_cut_loses_or_doubles_a_committed_record(
         before = committed(vehicle)
         state_disk.mark("committed")
         time.sleep(moments.uniform(2.0, 4.0))
+        vehicle.wait_for(partial(state_disk.may_lose_writes, "committed"))
         state_disk.mark("cut")
         vehicle.machine.cut_power()
         if i % 2 == 0:

@@ -76,7 +76,9 @@ def cut(disk: Path, log: Path, since: str, moments: random.Random) -> Damage:
     each write is kept, lost or torn between its sectors.
     """
     entries = entries_of(log)
-    moment = moments.choice(_moments(entries, since))
+    found = _moments(entries, since)
+    assert found, f"nothing was written after {since}"
+    moment = moments.choice(found)
     n_flushed = _n_flushed(entries, moment)
     n_lost = n_kept = 0
     with disk.open("r+b") as target, log.open("rb") as source:
@@ -89,12 +91,15 @@ def cut(disk: Path, log: Path, since: str, moments: random.Random) -> Damage:
     return Damage(n_lost, n_kept)
 
 
+def has_moments(log: Path, since: str) -> bool:
+    """Whether the power could have gone, since the mark, while a write waited for its flush."""
+    return bool(_moments(entries_of(log), since))
+
+
 def _moments(entries: Sequence[Entry], since: str) -> list[int]:
     """Numbers of entries done when the power may go: behind the mark, with a write that waits for its flush."""
     marked = next(i for i, entry in enumerate(entries) if entry.mark == since)
-    found = [n for n in range(marked + 1, len(entries) + 1) if _is_waiting(entries[_n_flushed(entries, n) : n])]
-    assert found, f"nothing was written after {since}"
-    return found
+    return [n for n in range(marked + 1, len(entries) + 1) if _is_waiting(entries[_n_flushed(entries, n) : n])]
 
 
 def _n_flushed(entries: Sequence[Entry], moment: int) -> int:
