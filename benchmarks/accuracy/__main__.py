@@ -7,20 +7,22 @@ prints its page; ``--output`` also writes the numbers (NAME.json) and the page m
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
 
 from benchmarks.accuracy import advice as on_advice
 from benchmarks.accuracy import coverage as on_coverage
 from benchmarks.accuracy import disturbances as on_disturbances
+from benchmarks.accuracy import sensitivity as on_sensitivity
 from benchmarks.accuracy.bounds import limits, limits_table
 from benchmarks.accuracy.coverage_drives import Scope
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.disturbances_page import disturbances_page
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
+from benchmarks.accuracy.sensitivity import sensitivity_page
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection import SplitRun
 from gateway.calibration.judgement import learning_curve as on_learning
@@ -31,6 +33,18 @@ from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.vehicle import Vehicle
 from gateway.errors import SpringscaleError
 from gateway.offline import inspect
+
+Study = Callable[..., None]
+WORKERS: Final = "processes that drive"
+
+
+def _vans(seed: int) -> Callable[[Study], Study]:
+    """Options of a study that drives fresh vans."""
+    vans = click.option("--vans", "n_vans", type=click.IntRange(min=2), default=Scope().n_vans, show_default=True)
+    seeds = click.option("--seed", type=click.IntRange(min=0), default=seed, show_default=True)
+    workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
+    return lambda study: vans(seeds(workers(study)))
+
 
 _output = click.option("--output", type=FILE, default=None, help="directory to write the numbers and their page to")
 
@@ -90,9 +104,7 @@ def advice(campaign: Path, output: Path | None, window_s: float | None) -> None:
 
 
 @studies.command("coverage")
-@click.option("--vans", "n_vans", type=click.IntRange(min=2), default=Scope().n_vans, show_default=True)
-@click.option("--seed", type=click.IntRange(min=0), default=on_coverage.SEED, show_default=True)
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that drive")
+@_vans(on_coverage.SEED)
 @_output
 def coverage(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
     """Do 95 % intervals hold the truth? Simulated vans, each calibrated and then driven elsewhere; ~20 s a van."""
@@ -102,15 +114,23 @@ def coverage(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
 
 
 @studies.command("disturbances")
-@click.option("--vans", "n_vans", type=click.IntRange(min=2), default=Scope().n_vans, show_default=True)
-@click.option("--seed", type=click.IntRange(min=0), default=on_disturbances.SEED, show_default=True)
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that drive")
+@_vans(on_disturbances.SEED)
 @_output
 def disturbances(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
     """What jitter, losses, lags and sensors that moved do to calibrated vans; ~40 s a van."""
     with counted("calibrating, driving and disturbing vans") as on_van:
         found = on_disturbances.disturbances(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("disturbances", found, disturbances_page(found), output)
+
+
+@studies.command("sensitivity")
+@_vans(on_sensitivity.SEED)
+@_output
+def sensitivity(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
+    """What hangs on each constant that was chosen: halved and doubled in turn; ~4 minutes a van."""
+    with counted("driving vans, calibrating and weighing them over and over") as on_van:
+        found = on_sensitivity.sensitivity(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
+    _hand_out("sensitivity", found, sensitivity_page(found), output)
 
 
 @studies.command("bounds")

@@ -7,8 +7,6 @@ says otherwise. A drive as calibrated and a mixed one carry loads within what wa
 or 0.15 to 0.35 m beside it where a line says sideways; the last line carries half as much again as the van may.
 """
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -20,17 +18,13 @@ from benchmarks.accuracy.coverage_drives import (
     SIDEWAYS_M,
     TRIPS,
     Scope,
-    draw_sensors,
-    draw_van,
-    driven,
-    known_loads,
     known_run,
     rows_of,
-    stated,
     without_roll_rate,
 )
 from benchmarks.accuracy.coverage_table import CoverageTable, JudgedBatch, coverage_table, judged_batches
 from benchmarks.accuracy.disturbed import DISTURBANCES, Disturbance
+from benchmarks.accuracy.vans import OnVan, fresh_van, of_each_van
 from gateway.calibration.judgement import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.records import Motion
@@ -42,7 +36,6 @@ SEED: Final = 20_270
 WITHIN_PARTS: Final = (0.3, 0.9)  # of the rated payload
 WITHIN_PLACES: Final = (0.3, 0.9)  # of the wheelbase
 OVERLOAD: Final = 1.5  # times the rated payload
-OnVan = Callable[[int, int], None]
 
 
 def disturbances(
@@ -50,28 +43,19 @@ def disturbances(
 ) -> CoverageTable:
     """Calibrate every van, drive it, disturb what was recorded, and judge; a line for every disturbance."""
     batches: list[JudgedBatch] = []
-    on_van(0, scope.n_vans)
-    for done, of_van in enumerate(_vans(scope, seed, workers), 1):
+    for of_van in of_each_van(partial(of_one_van, scope, seed), scope.n_vans, workers, on_van):
         batches += of_van
-        on_van(done, scope.n_vans)
     return coverage_table(batches, seed)
 
 
 def of_one_van(scope: Scope, seed: int, number: int) -> list[JudgedBatch]:
     """One van's batches under every disturbance."""
-    van_seed, load_seed, known_seed, test_seed, sensor_seed = np.random.SeedSequence([seed, number]).spawn(5)
-    van, rng = draw_van(number, np.random.default_rng(van_seed)), np.random.default_rng(load_seed)
-    mounted = draw_sensors(np.random.default_rng(sensor_seed))
-    vehicle = stated(van, mounted)
-    loads = known_loads(van, scope.n_known_loads, rng)
-    runs = [
-        driven(van, carried, AS_CALIBRATED, scope, one, i, mounted)
-        for i, (carried, one) in enumerate(zip(loads, known_seed.spawn(len(loads)), strict=True), 1)
-    ]
+    fresh = fresh_van(scope, seed, number)
+    van, mounted, vehicle, runs, rng = fresh.van, fresh.sensors, fresh.vehicle, fresh.runs, fresh.rng
     with_roll_rate = calibrated_on(runs, vehicle, ESTIMATOR)
     without = calibrated_on([without_roll_rate(run) for run in runs], vehicle, ESTIMATOR)
     batches: list[JudgedBatch] = []
-    for trip, seeds in zip((AS_CALIBRATED, TRIPS["mixed"]), test_seed.spawn(2), strict=True):
+    for trip, seeds in zip((AS_CALIBRATED, TRIPS["mixed"]), fresh.test_seed.spawn(2), strict=True):
         place_m = float(rng.uniform(*WITHIN_PLACES)) * van.wheelbase_m
         within = (Load(float(rng.uniform(*WITHIN_PARTS)) * van.rated_payload_kg, place_m),)
         drives: dict[tuple[tuple[Load, ...], Sensors, bool], tuple[Motion, Vehicle, tuple[Load, ...]]] = {}
@@ -94,12 +78,3 @@ def of_one_van(scope: Scope, seed: int, number: int) -> list[JudgedBatch]:
 
 def _disturbed(rows: Motion, by: Disturbance, seed: int) -> Motion:
     return by.rows(rows, np.random.default_rng(seed))
-
-
-def _vans(scope: Scope, seed: int, workers: int) -> Iterator[list[JudgedBatch]]:
-    one = partial(of_one_van, scope, seed)
-    if workers <= 1:
-        yield from map(one, range(scope.n_vans))
-        return
-    with ProcessPoolExecutor(workers) as pool:
-        yield from pool.map(one, range(scope.n_vans))

@@ -9,7 +9,7 @@ from support.calibrated import ratio_index_calibration
 from support.drives import assert_same_batch, drive, with_roll
 from support.half_car_road import batch_over_road
 
-from benchmarks.accuracy import coverage
+from benchmarks.accuracy import coverage, vans
 from benchmarks.accuracy.coverage_drives import (
     AS_CALIBRATED,
     NEAR_M,
@@ -102,7 +102,8 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
         calibrated_with.append(tuple(run.payload_kg for run in runs))
         return CalibratedVehicle("x", vehicle, (0.0, 1e4), (0.0, 100.0), ratio_index_calibration())
 
-    monkeypatch.setattr(coverage, "driven", stand_in)
+    for module in (coverage, vans):
+        monkeypatch.setattr(module, "driven", stand_in)
     monkeypatch.setattr(coverage, "calibrated_on", fit)
     done: list[tuple[int, int]] = []
     table = coverage.coverage(Scope(n_vans=2, n_known_loads=4, n_tests=3), 11, on_van=lambda *step: done.append(step))

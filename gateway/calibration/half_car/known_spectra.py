@@ -16,7 +16,7 @@ from gateway.records import F64
 
 BAND_HZ: Final = (1.1, 14.0)
 N_SEGMENT: Final = 256
-EVIDENCE_WEIGHT: Final = 0.2  # minutes of driving repeat the same model error: less than they seem to say
+EVIDENCE_WEIGHT: Final = 0.2  # minutes of driving repeat the same model error; chosen, as docs/sensitivity.md shows
 
 
 class KnownSpectra:

@@ -25,6 +25,7 @@ GYRATION_PER_WHEELBASE: Final = 0.46
 SLACK: Final = 0.03
 SLOPE_STD_PER_KN: Final = 0.05
 BEND_STD_PER_KN: Final = 0.1
+"""Of each bend. The one at no added load repeats the slope but where a load relieves the axle; their priors add up."""
 DAMPER_FRICTION, DAMPER_FRICTION_STD = 0.1, 0.3  # shares of the rate at the usual amplitude
 SPRING_FRICTION, SPRING_FRICTION_STD = 0.03, 0.05
 TRACK_OFFSET_M: Final = 0.03

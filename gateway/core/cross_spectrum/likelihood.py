@@ -24,7 +24,7 @@ from gateway.core.vehicle import Load
 from gateway.records import C128, F64
 
 EFFECTIVE_SHARE: Final = 0.5  # neighbouring Hann bins and half-overlapping segments repeat each other
-ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line
+ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen, as docs/sensitivity.md shows
 ROAD_SLOPE_STD: Final = 0.3
 
 

@@ -1,0 +1,129 @@
+"""Constants of the estimator, of fusion and of inspection that were chosen rather than derived."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib import import_module
+from typing import Final
+
+FACTORS: Final = (0.5, 2.0)
+USED_IN: Final = (
+    "gateway.core.cross_spectrum",
+    "gateway.core.fusion",
+    "gateway.calibration.half_car",
+    "gateway.calibration.plan",
+    "gateway.calibration.inspection",
+)
+"""Rooms in which a constant is set; elsewhere the same name means something else."""
+
+
+class Acts(StrEnum):
+    """Where a constant makes a difference, and so what is done again with another."""
+
+    IN_CALIBRATION = "calibration"
+    IN_WEIGHING = "weighing"
+    IN_INSPECTION = "inspection"
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """``name`` in ``module``, and in a few words what it decides."""
+
+    name: str
+    module: str
+    acts: Acts
+    decides: str
+
+    @property
+    def current(self) -> float | tuple[float, ...]:
+        """As the code has it."""
+        found: float | tuple[float, ...] = getattr(import_module(self.module), self.name)
+        return found
+
+
+CONSTANTS: Final = (
+    Constant(
+        "EVIDENCE_WEIGHT", "gateway.calibration.half_car.known_spectra", Acts.IN_CALIBRATION,
+        "how much of their evidence known drives keep beside the priors",
+    ),
+    Constant(
+        "N_SEGMENT", "gateway.calibration.half_car.known_spectra", Acts.IN_CALIBRATION,
+        "samples in a segment: finer in frequency, or more segments",
+    ),
+    Constant(
+        "ROAD_RIPPLE", "gateway.core.cross_spectrum.likelihood", Acts.IN_CALIBRATION,
+        "how straight a road's spectrum is believed to be",
+    ),
+    Constant(
+        "LEVELS", "gateway.core.cross_spectrum.model.friction", Acts.IN_CALIBRATION,
+        "amplitudes at which a vehicle with friction is solved",
+    ),
+    Constant(
+        "MISFIT_MARGIN", "gateway.calibration.half_car.fit", Acts.IN_CALIBRATION,
+        "how much worse than in calibration a batch may fit",
+    ),
+    Constant(
+        "SCORE_MARGIN", "gateway.calibration.half_car.fit", Acts.IN_CALIBRATION,
+        "how much more like a moved sensor than in calibration it may look",
+    ),
+    Constant(
+        "UNSEEN_SPEED_SCALE", "gateway.core.cross_spectrum.estimator", Acts.IN_WEIGHING,
+        "how fast intervals widen away from calibrated speeds",
+    ),
+    Constant(
+        "UNSEEN_ROUGHNESS_SCALE", "gateway.core.cross_spectrum.estimator", Acts.IN_WEIGHING,
+        "how fast they widen on smoother and rougher roads",
+    ),
+    Constant(
+        "LEAST_OWN_VARIANCE", "gateway.core.fusion", Acts.IN_WEIGHING,
+        "how much of a batch's variance is its own at least",
+    ),
+    Constant(
+        "LEAST_EVIDENCE", "gateway.calibration.inspection.loads", Acts.IN_INSPECTION,
+        "from when on two loads count as swapped",
+    ),
+    Constant(
+        "DOUBT_EVIDENCE", "gateway.calibration.inspection.loads", Acts.IN_INSPECTION,
+        "from when on a label is doubted",
+    ),
+    Constant(
+        "DOUBT_STDS", "gateway.calibration.inspection.loads", Acts.IN_INSPECTION,
+        "how far off the others must weigh it",
+    ),
+    Constant(
+        "LEAST_COHERENCE", "gateway.calibration.inspection.axes", Acts.IN_INSPECTION,
+        "from when on two sensors move as one body",
+    ),
+    Constant(
+        "LEAST_AGREEMENT", "gateway.calibration.inspection.axes", Acts.IN_INSPECTION,
+        "from when on phases are a vehicle's",
+    ),
+    Constant(
+        "REVERSED_BY", "gateway.calibration.inspection.axes", Acts.IN_INSPECTION,
+        "by how much better the other sign must fit",
+    ),
+)  # fmt: skip
+
+
+@contextmanager
+def scaled(constant: Constant, factor: float) -> Iterator[None]:
+    """The constant so many times what it is, wherever USED_IN knows it by its name; then as it was."""
+    current = constant.current
+    if isinstance(current, tuple):
+        other: float | tuple[float, ...] = tuple(factor * one for one in current)
+    else:
+        other = type(current)(factor * current)  # a number of samples stays whole
+    holders = [
+        module
+        for name, module in list(sys.modules.items())
+        if name.startswith(USED_IN) and module.__dict__.get(constant.name) is current
+    ]
+    try:
+        for module in holders:
+            setattr(module, constant.name, other)
+        yield
+    finally:
+        for module in holders:
+            setattr(module, constant.name, current)

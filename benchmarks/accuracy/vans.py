@@ -1,0 +1,64 @@
+"""Fresh simulated vans, one after another or several at a time, each with the drives that calibrate it."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from benchmarks.accuracy.coverage_drives import (
+    AS_CALIBRATED,
+    Scope,
+    draw_sensors,
+    draw_van,
+    driven,
+    known_loads,
+    stated,
+)
+from gateway.calibration.known_run import KnownRun
+from gateway.core.vehicle import Vehicle as StatedVehicle
+from gateway.sim.sensors import Sensors
+from gateway.sim.vehicle import Vehicle
+
+Found = TypeVar("Found")
+OnVan = Callable[[int, int], None]  # (vans done, vans in all)
+
+
+@dataclass(frozen=True, slots=True)
+class FreshVan:
+    """A van and its sensors as simulated and as a fitter states them, its known drives, what to draw tests with."""
+
+    van: Vehicle
+    sensors: Sensors
+    vehicle: StatedVehicle
+    runs: list[KnownRun]
+    rng: np.random.Generator
+    test_seed: np.random.SeedSequence
+
+
+def fresh_van(scope: Scope, seed: int, number: int) -> FreshVan:
+    """The ``number``-th van of a study with this seed; it does not depend on the others."""
+    van_seed, load_seed, known_seed, test_seed, sensor_seed = np.random.SeedSequence([seed, number]).spawn(5)
+    van, rng = draw_van(number, np.random.default_rng(van_seed)), np.random.default_rng(load_seed)
+    sensors = draw_sensors(np.random.default_rng(sensor_seed))
+    loads = known_loads(van, scope.n_known_loads, rng)
+    runs = [
+        driven(van, carried, AS_CALIBRATED, scope, one, i, sensors)
+        for i, (carried, one) in enumerate(zip(loads, known_seed.spawn(len(loads)), strict=True), 1)
+    ]
+    return FreshVan(van, sensors, stated(van, sensors), runs, rng, test_seed)
+
+
+def of_each_van(of_one: Callable[[int], Found], n_vans: int, workers: int, on_van: OnVan) -> Iterator[Found]:
+    """What ``of_one`` finds of each van by its number, in order; so many ``workers`` are processes."""
+    on_van(0, n_vans)
+    if workers <= 1:
+        for number in range(n_vans):
+            yield of_one(number)
+            on_van(number + 1, n_vans)
+        return
+    with ProcessPoolExecutor(workers) as pool:
+        for done, found in enumerate(pool.map(of_one, range(n_vans)), 1):
+            yield found
+            on_van(done, n_vans)
