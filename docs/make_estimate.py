@@ -22,7 +22,7 @@ UNITS: Final = (
     ("_mps", "m/s"),
     ("_ns", "ns"),
 )
-SHARES: Final = ("gap_share", "usable_share", "shares")
+SHARES: Final = ("gap_share", "usable_share", "roll_usable_share", "shares")
 
 NULL: Final = {
     "id": "",
@@ -47,6 +47,7 @@ NULL: Final = {
     "mean_speed_mps": "null where no speed is known",
     "gap_share": "",
     "usable_share": "",
+    "roll_usable_share": "null without a roll rate in the signal map, and where nothing is usable",
     "roughness_mps2": "null without spectra or speed",
     "shares": "",
     "rejected": "",

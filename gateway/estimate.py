@@ -133,6 +133,7 @@ class Estimate:
     mean_speed_mps: float = math.nan
     gap_share: float = math.nan
     usable_share: float = math.nan
+    roll_usable_share: float = math.nan  # of the usable samples, those whose roll rate is known
     roughness_mps2: float = math.nan  # of the road (core.spectrum)
     shares: Mapping[str, float] = field(default_factory=dict)
     rejected: tuple[Why, ...] = ()

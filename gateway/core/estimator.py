@@ -1,5 +1,6 @@
 """The one interface of every estimator, the list of them, and the gates they have in common."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
@@ -33,6 +34,7 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
         mean_speed_mps=batch.mean_speed_mps,
         gap_share=batch.gap_share,
         usable_share=batch.usable_share,
+        roll_usable_share=_roll_usable_share(batch),
         roughness_mps2=roughness_mps2(spectra, batch.mean_speed_mps),
         shares={str(why): share for why, share in batch.shares.items()},
         rejected=batch.rejected,
@@ -47,6 +49,12 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
     if found.counted and calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
         return found.refused(Why.OUT_OF_RANGE)
     return found
+
+
+def _roll_usable_share(batch: Batch) -> float:
+    """NaN without a roll rate in the signal map, and where nothing of the batch is usable."""
+    share = batch.roll_usable_share
+    return share if share is not None and batch.usable.any() else math.nan
 
 
 def _by_cross_spectrum(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:

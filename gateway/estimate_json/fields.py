@@ -161,6 +161,7 @@ FIELDS: Final = (
     _field("mean_speed_mps", "mean_speed_mps", NUMBER, "over what every gate let through", 13.9),
     _field("gap_share", "gap_share", NUMBER, "share of the batch without samples", 0.001),
     _field("usable_share", "usable_share", NUMBER, "share of the batch that every gate let through", 0.93),
+    _field("roll_usable_share", "roll_usable_share", NUMBER, "of that, with a known roll rate", 0.99, presence=_LATER),
     EstimateField(
         "roughness_mps2",
         "roughness_mps2",

@@ -101,7 +101,11 @@ class Gateway:
             self.store,
             self.board,
             self.uplink,
-            warnings=lambda: tuple(fault for fault in (token_file.fault, self.tare.fault, self._reload.fault) if fault),
+            warnings=lambda: tuple(
+                fault
+                for fault in (token_file.fault, self.tare.fault, self._reload.fault, self.pipeline.roll_rate_fault)
+                if fault
+            ),
         )
         self.tare = TareDesk(
             settings.store.directory,

@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import math
 import threading
 import time
 from collections import Counter
@@ -24,6 +25,11 @@ from gateway.units import NS_PER_S
 from gateway.web import Board, boot_clock_s
 
 DRAIN_S = 0.1  # how long the inbox may gather before it is decoded: a hundred frames in one array operation
+ROLL_RATE_KNOWN_SHARE: Final = 0.9  # of a batch's usable samples; with fewer the sensor is at fault
+ROLL_RATE_LOST: Final = (
+    "the roll rate is known in only {:.0%} of the last batch (silent, stuck, at the end of its range or too slow): "
+    "check the sensor and the signal map; payload and front share go on"
+)
 STOP_WITHIN_S: Final = 6.0  # a full inbox holds several windows
 
 
@@ -72,6 +78,7 @@ class Pipeline:
         self.watch = SignalWatch(decoder.signals)
         self.n_estimates = self.n_rejected = self.n_provisional = 0
         self.rejected_by_reason: Counter[str] = Counter()
+        self.roll_rate_fault: str | None = None  # of the last batch, as people read it
         self.failure: BaseException | None = None
         self.n_frames = 0  # frames whose estimates, if any, are handed over
         self.progress = 0  # grows with every turn of the loop: what the watchdog follows
@@ -139,6 +146,9 @@ class Pipeline:
             self._on_batch(found)
 
     def _count(self, found: Estimate) -> None:
+        if math.isfinite(found.roll_usable_share):
+            is_lost = found.roll_usable_share < ROLL_RATE_KNOWN_SHARE
+            self.roll_rate_fault = ROLL_RATE_LOST.format(found.roll_usable_share) if is_lost else None
         if found.is_provisional:
             self.n_provisional += 1
         elif found.counted:
