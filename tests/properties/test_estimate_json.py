@@ -27,7 +27,7 @@ estimates = st.builds(
     st.none() | names,
     quantities,
     quantities,
-    *[numbers] * 6,
+    *[numbers] * 7,
     by_name,
     st.lists(st.sampled_from(Why), max_size=3).map(tuple),
     st.booleans(),
