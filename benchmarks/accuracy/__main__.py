@@ -107,7 +107,7 @@ def advice(campaign: Path, output: Path | None, window_s: float | None) -> None:
 @_vans(on_coverage.SEED)
 @_output
 def coverage(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
-    """Do 95 % intervals hold the truth? Simulated vans, each calibrated and then driven elsewhere; ~20 s a van."""
+    """Do 95 % intervals hold the truth? Simulated vans, each calibrated and then driven elsewhere; ~40 s a van."""
     with counted("calibrating and driving vans") as on_van:
         found = on_coverage.coverage(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("coverage", found, coverage_page(found), output)
@@ -117,7 +117,7 @@ def coverage(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
 @_vans(on_disturbances.SEED)
 @_output
 def disturbances(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
-    """What jitter, losses, lags and sensors that moved do to calibrated vans; ~40 s a van."""
+    """What jitter, losses, lags and sensors that moved do to calibrated vans; ~2 min a van."""
     with counted("calibrating, driving and disturbing vans") as on_van:
         found = on_disturbances.disturbances(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("disturbances", found, disturbances_page(found), output)
