@@ -29,16 +29,21 @@ class LoadPlace(BaseModel):
     correlation: float | None = Field(description="of both errors, -1 to 1", examples=[0.1])
 
 
-class LatestWeights(WeightFigures):
-    """Static weights, unsprung masses included, of the estimate that ``/estimates/latest`` shows.
-
-    ``is_over_limit`` begins above the limit and ends 3 % below it, looking back over the last estimates.
-    """
+class WeighedWhen(BaseModel):
+    """Which estimate weights are of, and how old it is."""
 
     id: str | None = Field(description="of the estimate")
     t_end: str | None
     age_s: float | None
     is_stale: bool
+
+
+class LatestWeights(WeightFigures, WeighedWhen):
+    """Static weights, unsprung masses included, of the estimate that ``/estimates/latest`` shows.
+
+    ``is_over_limit`` begins above the limit and ends 3 % below it, looking back over the last estimates.
+    """
+
     load: LoadPlace | None = Field(description="null: unknown, or no payload that is surely there")
 
 
