@@ -9,12 +9,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-import numpy as np
-
 from gateway.core.stated_share import measured
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import UNKNOWN, Z95, Estimate, Lack, Quantity, Weight, Weights
-from gateway.records import F64
 
 _BY_AXLES: Final = 2  # the first so many make the loads of axles
 RELEASE_SHARE: Final = 0.03  # of the limit: how far a load must fall below it before a warning ends
@@ -105,33 +102,47 @@ class _Errors:
     """Of what was estimated, in the module's order and units; NaN where one is unknown."""
 
     def __init__(self, payload: Quantity, front_share: Quantity, correlation: float, sideways: Sideways) -> None:
-        self._std = np.array(
-            [payload.std, front_share.std / 100.0, sideways.cg_left.std, sideways.roll_share_front_std]
-        )
-        self._together = np.eye(len(self._std))
-        of_cg = (sideways.payload_correlation, sideways.front_share_correlation)
-        for (one, other), shared in zip(((0, 1), (0, 2), (1, 2)), (correlation, *of_cg), strict=True):
-            self._together[one, other] = self._together[other, one] = np.nan_to_num(shared)
+        of_share, of_cg = front_share.std / 100.0, sideways.cg_left.std
+        self._std = (payload.std, of_share, of_cg, sideways.roll_share_front_std)
+        self._together = {
+            (0, 1): _known_or_0(correlation),
+            (0, 2): _known_or_0(sideways.payload_correlation),
+            (1, 2): _known_or_0(sideways.front_share_correlation),
+        }
 
     def std(self, slopes: Sequence[float]) -> float:
         """Of what has these slopes by the first so many."""
         errors = self._of(slopes)
-        largest = float(np.max(np.abs(errors)))
+        if any(map(math.isnan, errors)):
+            return math.nan
+        largest = max(map(abs, errors))
         if largest == 0.0:
             return 0.0
-        relative = errors / largest
-        return largest * math.sqrt(np.clip(self._common(relative, relative), 0.0, None))
+        relative = [error / largest for error in errors]
+        return largest * math.sqrt(max(0.0, self._common(relative, relative)))
 
     def covariance(self, slopes: Sequence[float], other_slopes: Sequence[float]) -> float:
         """Of two such."""
         return self._common(self._of(slopes), self._of(other_slopes))
 
-    def _of(self, slopes: Sequence[float]) -> F64:
-        errors: F64 = np.array(slopes) * self._std[: len(slopes)]
-        return errors
+    def _of(self, slopes: Sequence[float]) -> list[float]:
+        return [slope * std for slope, std in zip(slopes, self._std, strict=False)]
 
-    def _common(self, errors: F64, others: F64) -> float:
-        return float(errors @ self._together[: len(errors), : len(others)] @ others)
+    def _common(self, errors: Sequence[float], others: Sequence[float]) -> float:
+        alike = sum(error * other for error, other in zip(errors, others, strict=False))
+        crossed = (
+            shared * (_at(errors, one) * _at(others, other) + _at(errors, other) * _at(others, one))
+            for (one, other), shared in self._together.items()
+        )
+        return alike + sum(crossed)
+
+
+def _at(errors: Sequence[float], n: int) -> float:
+    return errors[n] if n < len(errors) else 0.0
+
+
+def _known_or_0(correlation: float) -> float:
+    return 0.0 if math.isnan(correlation) else correlation
 
 
 class _Known:
