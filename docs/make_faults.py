@@ -15,9 +15,14 @@ from generated import keep_up_to_date
 DOCS = Path(__file__).parent
 PAGE, MEASURED = DOCS / "faults.md", DOCS / "faults.json"
 ROWS = DOCS.parent / "tests" / "faults.toml"
-SOAK, VM_SOAK = DOCS / "soak.json", DOCS / "soak_faults.json"
+SOAK, ATTACK, VM_SOAK = DOCS / "soak.json", DOCS / "soak_attack.json", DOCS / "soak_faults.json"
 BUILD = DOCS.parent / "build"
-RECORDED = ((BUILD / "vm-results.json", MEASURED), (BUILD / "soak.json", SOAK), (BUILD / "vm-soak.json", VM_SOAK))
+RECORDED = (
+    (BUILD / "vm-results.json", MEASURED),
+    (BUILD / "soak.json", SOAK),
+    (BUILD / "soak_attack.json", ATTACK),
+    (BUILD / "vm-soak.json", VM_SOAK),
+)
 
 INTRODUCTION = """\
 # Faults
@@ -41,7 +46,11 @@ def faults_page() -> str:
             f"## {area}\n\n| fault | what is done | what must happen | recovery | test |\n|---|---|---|---|---|"
         )
         parts[-1] += "".join(_line(row, measured["tests"]) for row in rows if row["area"] == area) + "\n"
-    soaks = [_soak(json.loads(SOAK.read_text())), _vm_soak(json.loads(VM_SOAK.read_text()))]
+    soaks = [
+        _soak(json.loads(SOAK.read_text())),
+        _attack(json.loads(ATTACK.read_text())),
+        _vm_soak(json.loads(VM_SOAK.read_text())),
+    ]
     return "\n".join([*parts, _figures(measured["figures"]), *soaks])
 
 
@@ -109,6 +118,19 @@ def _bounds(soak: dict[str, Any]) -> str:
         f"From the first day's end to the last's, memory may grow by {grow['memory_mb']:g} MB, file handles by "
         f"{grow['handles']:g} and threads by {grow['threads']:g}; database and log together may reach "
         f"{most['database_mb']:g} MB. Beyond that it fails."
+    )
+
+
+def _attack(found: dict[str, Any]) -> str:
+    return (
+        "## Crowds at the door while it weighs\n\n"
+        f"`make soak`, over TLS: {found['crowds']} crowds, one after the other, {found['connections']} connections "
+        "from four addresses that are silent, ask for the history, its exports, old streams or assets and read "
+        f"nothing, during {found['hours']:g} h of driving at high speed. Of {found['estimates']} estimates "
+        f"{found['different']} differed from those without an attack. Memory: {found['memory_mb']:g} MB at most, "
+        f"{found['calm_mb']:g} MB without; "
+        f"{found['memory_allowed_mb']:g} MB are allowed. Another client had {found['answers']} answers, half of them "
+        f"within {found['answer_median_ms']:.0f} ms, the slowest after {found['answer_slowest_ms']:.0f} ms.\n"
     )
 
 

@@ -14,25 +14,16 @@ import sys
 import threading
 import time
 import urllib.request
-from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
-import numpy as np
-
-from gateway.bus.frames import empty_frames, take
-from gateway.bus.live.receiver import Burst
+from benchmarks.speed.endless_drive import EndlessDrive
 from gateway.config import load_settings
-from gateway.records import Frames
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
-from gateway.units import NS_PER_S
 from gateway.workbench import demo_drive, frames_of
 
-DAY_S: Final = 86_400
-BURST_S: Final = 10.0
 SETTINGS: Final = """\
 signals = "springscale:reference"
 calibration = "vehicle.json"
@@ -51,43 +42,6 @@ level = "error"
 GROWTH_ALLOWED: Final = {"memory_mb": 15.0, "handles": 2, "threads": 0}
 # The limit set above and a batch of rows; and the write-ahead log, which SQLite keeps below 4.2 MB.
 MOST_ALLOWED: Final = {"database_mb": 4.5 + 4.2}
-
-
-class EndlessDrive:
-    """A receiver: the frames of one drive over and over, each day's driving followed by a night of silence."""
-
-    dropped_kernel = 0
-
-    def __init__(self, drive: Frames, hours_a_day: float, n_days: int) -> None:
-        self.days_done = 0
-        self.is_over = False
-        self._drive, self._n_days = drive, n_days
-        self._length_ns = int(drive.t_ns[-1] - drive.t_ns[0]) + 20 * NS_PER_S  # parked a little between drives
-        self._drives_a_day = max(1, round(hours_a_day * 3600 * NS_PER_S / self._length_ns))
-        pieces = (drive.t_ns - drive.t_ns[0]) // int(BURST_S * NS_PER_S)
-        self._edges = [*np.searchsorted(pieces, np.arange(pieces[-1] + 1)), len(drive)]
-        self._bursts = self._all_bursts()
-
-    def receive(self, timeout_s: float) -> Burst:
-        """The next ten seconds of driving; empty bursts once the week is over."""
-        frames = next(self._bursts, None)
-        if frames is None:
-            self.is_over = True
-            time.sleep(timeout_s)
-            return Burst(empty_frames(self._drive.payload.shape[1]))
-        return Burst(frames)
-
-    def close(self) -> None:
-        """Nothing to give back."""
-
-    def _all_bursts(self) -> Iterator[Frames]:
-        for day in range(self._n_days):
-            for drive in range(self._drives_a_day):
-                later_ns = day * DAY_S * NS_PER_S + drive * self._length_ns
-                for begin, end in pairwise(self._edges):
-                    part = take(self._drive, slice(begin, end))
-                    yield Frames(part.t_ns + later_ns, part.can_id, part.length, part.payload)
-            self.days_done = day + 1
 
 
 def footprint(state: Path) -> dict[str, float]:

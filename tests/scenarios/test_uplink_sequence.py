@@ -143,6 +143,24 @@ def test_a_damaged_record_leaves_a_gap(tmp_path: Path) -> None:
     assert len(back_end.missing) == 1
 
 
+def test_a_record_whose_very_number_flipped_leaves_a_gap(tmp_path: Path) -> None:
+    """It is found no more under its number; the one behind it still names that."""
+    with closing(Store.open(tmp_path)) as store:
+        numbers = [int(store.write_estimate(make_record(n)).partition("-")[2]) for n in range(6)]
+        assert store.flush(PATIENCE_S)
+    path = tmp_path / "springscale.db"
+    content = bytearray(path.read_bytes())
+    as_varint = bytes([0x80 | numbers[3] >> 14, 0x80 | numbers[3] >> 7 & 0x7F, numbers[3] & 0x7F])
+    place = content.rindex(as_varint, 0, content.index(json_line(make_record(3)).encode()))
+    content[place + 2] ^= 0x10
+    path.write_bytes(content)
+    back_end = BackEnd()
+    with closing(Store.open(tmp_path)) as store:
+        deliver(store, back_end)
+    assert list(back_end.ids) == [make_record(n)["id"] for n in (0, 1, 2, 4, 5)]
+    assert len(back_end.missing) == 1
+
+
 def test_a_damaged_link_is_a_damaged_record(tmp_path: Path) -> None:
     with closing(Store.open(tmp_path)) as store:
         write(store, *range(4))

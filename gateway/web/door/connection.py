@@ -16,9 +16,9 @@ HEAD_BYTES: Final = 32_768  # request line and headers
 BODY_BYTES: Final = 32_768  # no route needs a tenth of it
 LINGER_S: Final = 1.0  # for a refused client to read why; closed at once, its unread bytes would reset the answer away
 UNREAD_S: Final = 20.0  # in which a client must read some more of what waits for it
-UNREAD_BYTES: Final = 32_768  # that wait for one client before the answer itself has to
-CONNECTIONS: Final = 512  # below the usual 1024 file descriptors of a process
-CONNECTIONS_PER_ADDRESS: Final = 128
+UNREAD_BYTES: Final = 16_384  # that wait for one client before the answer itself has to
+CONNECTIONS: Final = 256  # some are left where four addresses have all that one may have
+CONNECTIONS_PER_ADDRESS: Final = 48  # its answers from the history and its streams (turns.py)
 
 _log = logging.getLogger("uvicorn.error.connection")
 _log.setLevel(logging.ERROR)  # uvicorn warns of each request it cannot read: strangers could fill the log with them

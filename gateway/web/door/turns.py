@@ -12,7 +12,7 @@ ANSWERS: Final = 48  # from the history that are under way at a time
 ANSWERS_PER_CLIENT: Final = 16  # of one token, or of one address where there are none
 STREAMS_PER_CLIENT: Final = 32
 WAIT_S: Final = 5.0  # for a turn
-PIECE_BYTES: Final = 32_768
+PIECE_BYTES: Final = 16_384
 
 _HISTORY: Final = ("/api/v1/estimates", "/api/v1/export", "/rfms/")
 _STREAM: Final = "/api/v1/stream"

@@ -15,7 +15,7 @@ from gateway.web.reader import Reader
 
 GRACE_S: Final = 0.2  # for the last words of a stream that ends
 RETRY_MS: Final = 3000
-_REPLAY_PAGE: Final = 20  # events in memory for each client that reads what it missed
+_REPLAY_PAGE: Final = 5  # events in memory for each client that reads what it missed
 _REMEMBERED: Final = 1024  # replayed rows that may still arrive live: a row is published right after it is stored
 
 EVENT_SCHEMA: Final[dict[str, Any]] = {

@@ -25,7 +25,7 @@ from gateway.web.settings import PAGE_LIMIT, WebSettings
 
 PREFIX: Final = "/api/v1"
 JSON: Final = "application/json"
-_AT_A_TIME: Final = 25  # records in memory for each answer that is being sent
+_AT_A_TIME: Final = 10  # records in memory for each answer that is being sent
 _CURSOR: Final = r"^[0-9a-z]{1,32}-[0-9]{1,18}$"
 
 

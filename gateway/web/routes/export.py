@@ -18,7 +18,7 @@ from gateway.web.instant import Instant
 from gateway.web.reader import Reader
 from gateway.web.schemas import problem_responses
 
-_PAGE: Final = 25  # records in memory at a time, for each file that is being sent
+_PAGE: Final = 10  # records in memory at a time, for each file that is being sent
 
 Encoder = Callable[[Sequence[str]], str]
 
