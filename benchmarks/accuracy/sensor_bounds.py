@@ -83,7 +83,7 @@ def cramer_rao(
     point = Point(calibration.parameters, payload_kg, front_share_pct / 100.0)
     spectra = expected_of(steady_spectra(calibration.reading, drive), point, calibration.ground)
     whittle = Whittle(spectra, calibration.ground)
-    information = whittle.curvature(point, free, is_load_free=True).information
+    information = whittle.curvature(point, [*free, len(point.theta), len(point.theta) + 1]).information
     information += np.diag(np.r_[np.array(list(priors.values())) ** -2.0, 0.0, 0.0])
     payload_var, share_var = np.diag(np.linalg.inv(information))[-2:]
     return Bound(float(np.sqrt(payload_var)), 100.0 * float(np.sqrt(share_var)))

@@ -11,7 +11,14 @@ from gateway.estimate import Estimate
 from gateway.records import F64, Batch
 
 RATE_HZ = 50.0
-VAN = Vehicle("van", empty_mass_kg=1240.0, wheelbase_m=2.8, empty_front_share_pct=52.0, sensor_position_m=3.1)
+VAN = Vehicle(
+    "van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    empty_front_share_pct=52.0,
+    sensor_position_m=3.1,
+    sensor_offset_left_std_m=1e-3,  # a half-car has no width
+)
 CAR = HalfCar(
     empty_mass_kg=1240.0,
     empty_front_share=0.52,

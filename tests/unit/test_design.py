@@ -22,9 +22,9 @@ from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import Design
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cross_spectrum import locate
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFT_STD
-from gateway.core.cross_spectrum.estimator import locate
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import cross_spectra_of

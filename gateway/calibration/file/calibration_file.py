@@ -174,6 +174,9 @@ def _to_version_3(content: Content) -> None:
     vehicle |= {"front_wheel_limit_kg": None, "rear_wheel_limit_kg": None}
     if content["ratio_index"] is not None:
         content["ratio_index"]["roll_lever_m"] = 0.0
+    if content["cross_spectrum"] is not None:
+        places = {"sensor_left_m": vehicle["sensor_offset_left_m"], "sensor_left_std_m": offset_std_m}
+        content["cross_spectrum"] |= {"track_width_m": None, "cg_left_inflation": 1.0, **places}
     for run in content["provenance"]["runs"]:
         run["payload_left_m"] = None
 

@@ -7,10 +7,10 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import TERMS, RegressionModel
-from gateway.core.vehicle import Load
+from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
 from gateway.errors import CalibrationFileError
 from gateway.records import F64
 
@@ -173,6 +173,10 @@ class CrossSpectrumPart(Part):
     gravity_mps2: float | None = Field(None, gt=0.0)
     most_position_score: float = Field(SCORE, gt=0.0)
     most_noise_score: float = Field(SCORE, gt=0.0)
+    track_width_m: float | None = Field(None, gt=0.0)
+    cg_left_inflation: float = Field(1.0, gt=0.0)
+    sensor_left_m: float = 0.0
+    sensor_left_std_m: float = Field(UNKNOWN_OFFSET_STD_M, gt=0.0)
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "CrossSpectrumPart":
@@ -188,7 +192,7 @@ class CrossSpectrumPart(Part):
 
     def for_core(self) -> CrossSpectrumCalibration:
         """The same in the core's terms. Raises CalibrationFileError where the model has other parameters today."""
-        if self.names != tuple(PARAMETERS):
+        if self.names not in (PARAMETERS, PARAMETERS + ROLL_PARAMETERS):
             raise CalibrationFileError(
                 "the cross_spectrum part was fitted with another vehicle model than this springscale has: "
                 "calibrate again"

@@ -9,10 +9,10 @@ from gateway.calibration.half_car.fit import (
     CrossSpectrumFit,
     calibrate_cross_spectrum,
     fit_cross_spectrum,
-    fit_half_car,
     half_car_calibration,
 )
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
+from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
 from gateway.calibration.half_car.prior import Prior, prior_of
 
 __all__ = [

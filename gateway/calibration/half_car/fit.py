@@ -17,18 +17,18 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATION
-from gateway.calibration.half_car.inflation import inflation_of
+from gateway.calibration.half_car.inflation import inflation_of, of_places
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
-from gateway.calibration.half_car.prior import Prior, prior_of
+from gateway.calibration.half_car.most_probable_vehicle import fit_vehicle, seen_by
+from gateway.calibration.half_car.prior import Prior, can_roll, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import MOST_TENSION
-from gateway.core.cross_spectrum.estimator import locate
-from gateway.core.cross_spectrum.likelihood import Curvature
+from gateway.core.cross_spectrum.located import Located, locate
 from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import names_of, upright
 from gateway.core.cross_spectrum.reach import beyond
-from gateway.core.cross_spectrum.search import Found, most_probable
+from gateway.core.cross_spectrum.search import Found
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 
@@ -68,8 +68,8 @@ def fit_cross_spectrum(
     ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError where no
     run holds enough steady driving.
     """
-    known = known_spectra(runs, vehicle)
-    prior = prior_of(vehicle)
+    known = known_spectra(runs, vehicle, with_roll=can_roll(vehicle))
+    prior = prior_of(vehicle, with_roll=known[0].spectra.roll is not None)
     can_leave_out = len(known) >= LEAST_RUNS_TO_LEAVE_ONE_OUT
     step = _counted(progress, len(_STARTS) + (2 * len(_STARTS) + len(known)) * can_leave_out)
     found = _from_priors(known, prior, step)
@@ -79,13 +79,13 @@ def fit_cross_spectrum(
     errors: list[_LeftOut] = []
     without: dict[int, CrossSpectrumCalibration] = {}
     for one, others, start in _left_out_in_turn(known, prior, step):
-        without[one.run.number] = half_car_calibration(others, vehicle, fit_half_car(others, prior, start))
+        without[one.run.number] = half_car_calibration(others, vehicle, fit_vehicle(others, prior, [start]))
         errors.extend(_left_out_errors(one, without[one.run.number]))
         step()
     if not errors:
         return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
     columns = np.array([astuple(one) for one in errors]).T
-    payload_z, share_z, misfits, payload_kg, share_pct, reach, position_scores, noise_scores = columns
+    payload_z, share_z, misfits, payload_kg, share_pct, reach, position_scores, noise_scores, place_z = columns
     of_payload, of_share = inflation_of(payload_z, reach), inflation_of(share_z, reach)
 
     def tested(untested: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
@@ -97,6 +97,7 @@ def fit_cross_spectrum(
             front_share_inflation_per_reach=of_share.per_reach,
             most_position_score=max(SCORE, SCORE_MARGIN * float(np.max(position_scores))),
             most_noise_score=max(SCORE, SCORE_MARGIN * float(np.max(noise_scores))),
+            cg_left_inflation=of_places(place_z[np.isfinite(place_z)]),
             misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.nanmax([0.0, *misfits]))),
         )
 
@@ -117,11 +118,7 @@ def _counted(progress: Callable[[int, int], None] | None, n_steps: int) -> Calla
 
 def _from_priors(known: Sequence[KnownSpectra], prior: Prior, step: Callable[[], None]) -> Found:
     """The most probable of what is found from each of _STARTS: the posterior need not have one peak."""
-    tried = []
-    for shift in _STARTS:
-        tried.append(fit_half_car(known, prior, prior.start(*shift)))
-        step()
-    return min(tried, key=lambda one: one.cost)
+    return fit_vehicle(known, prior, [prior.start(*shift) for shift in _STARTS], step)
 
 
 def _left_out_in_turn(
@@ -137,37 +134,20 @@ def _left_out_in_turn(
         yield one, [k for k in known if k is not one], starts[i % 2]
 
 
-def fit_half_car(known: Sequence[KnownSpectra], prior: Prior, start: F64) -> Found:
-    """The most probable parameters (p,) of all known runs together, found from ``start`` (p,)."""
-    everything = list(range(len(PARAMETERS)))
-
-    def cost(theta: F64) -> float:
-        return sum(k.whittle.cost(k.at(theta)) for k in known)
-
-    def curvature(theta: F64) -> Curvature:
-        parts = [k.whittle.curvature(k.at(theta), everything, is_load_free=False) for k in known]
-        return Curvature(
-            gradient=np.sum([part.gradient for part in parts], axis=0),
-            information=np.sum([part.information for part in parts], axis=0),
-        )
-
-    return most_probable(start, prior.mean, np.diag(prior.std**-2.0), cost, curvature, tolerance=0.05)
-
-
 def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
     """What the known runs taught, its intervals not yet tested on any run left out."""
     reading = known[0].spectra.reading
     runs = [k.run for k in known]
     payloads, shares = [r.payload_kg for r in runs], [r.front_share_pct for r in runs]
     speeds = [batch.mean_speed_mps for run in runs for batch in run.batches if not batch.rejected]
-    misfits = [k.whittle.misfit(k.at(found.x)) for k in known]
+    misfits = [k.whittle.misfit(k.at(upright(found.x))) for k in seen_by(known, found.x)]
     return CrossSpectrumCalibration(
         empty_mass_kg=vehicle.empty_mass_kg,
         empty_front_share_pct=vehicle.empty_front_share_pct,
         wheelbase_m=vehicle.wheelbase_m,
         band_hz=reading.band_hz,
         n_segment=reading.n_segment,
-        names=PARAMETERS,
+        names=names_of(found.x),
         parameters=found.x,
         covariance=found.covariance,
         payload_inflation=UNTESTED_INFLATION,
@@ -181,6 +161,9 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         warnings=(SPRINGS_FROM_PRIORS,) if len({*payloads}) == 1 else (),
         known_loads=tuple(run.load for run in runs),
         usual_log_amplitude=reading.usual_log_amplitude,
+        track_width_m=vehicle.track_width_m,
+        sensor_left_m=vehicle.sensor_offset_left_m,
+        sensor_left_std_m=vehicle.sensor_offset_left_std_m,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),
     )
 
@@ -188,7 +171,8 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
 @dataclass(frozen=True, slots=True)
 class _LeftOut:
     """A batch of a run that the others weighed: errors in their own standard deviations, errors in kg and percentage
-    points, and how far the load that was found lies beyond the others'. The misfit is NaN where the run itself does.
+    points, and how far the load that was found lies beyond the others'. The misfit is NaN where the run itself does,
+    the place's error where nobody noted where the payload lay, or no roll rate tells.
     """
 
     payload_z: float
@@ -199,6 +183,7 @@ class _LeftOut:
     reach: float
     position_score: float
     noise_score: float
+    place_z: float
 
 
 def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -> list[_LeftOut]:
@@ -227,6 +212,17 @@ def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -
                 reach=reach,
                 position_score=abs(located.scores.position),
                 noise_score=located.scores.noise,
+                place_z=_place_z(one, located),
             )
         )
     return errors
+
+
+def _place_z(one: KnownSpectra, located: Located) -> float:
+    """Error of the centre of gravity's lateral place in its own standard deviations."""
+    run, found = one.run, located.sideways
+    if found is None or (run.payload_kg > 0.0 and run.payload_left_m is None):
+        return np.nan
+    truth_m = one.placed(located.point.theta, 0.0).cg_left_m
+    by_load = found.moves_with_load @ located.load_covariance @ found.moves_with_load
+    return float((found.cg_left_m - truth_m) / np.sqrt(found.variance + by_load))

@@ -41,5 +41,12 @@ def inflation_of(z: F64, reach: F64) -> Inflation:
     return Inflation(within, max(0.0, _at_90(growth)))
 
 
+def of_places(z: F64) -> float:
+    """Factor on the standard deviation of where loads lie sideways, from errors ``z`` (n,) of left-out batches."""
+    if len(z) < LEAST_BATCHES_WITHIN:
+        return LEAST
+    return max(LEAST, _at_90(np.abs(z)) / GAUSS_90)
+
+
 def _at_90(x: F64) -> float:
     return float(np.quantile(x, 0.9))

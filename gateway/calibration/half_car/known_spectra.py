@@ -1,44 +1,93 @@
 """The spectra of known-load drives, all read alike, each with its likelihood and its true load."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ
+from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
-from gateway.core.cross_spectrum.model.parameters import Ground
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, Ground, level, mount_of
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
 
 BAND_HZ: Final = (1.1, 14.0)
 N_SEGMENT: Final = 256
-EVIDENCE_WEIGHT: Final = 0.2  # minutes of driving repeat the same model error; chosen, as docs/sensitivity.md shows
+LEAST_MOMENT_STD_KGM: Final = 0.5
 
 
 class KnownSpectra:
-    """A run's spectra and likelihood with its true load."""
+    """A run's spectra and likelihood with its true load.
+
+    ``whittle`` is of vertical acceleration and pitch rate. With a roll rate, ``rolling`` is of all three sensors, and
+    :meth:`brought` makes ``whittle`` what it would be on the centre line.
+    """
 
     def __init__(self, run: KnownRun, vehicle: Vehicle, spectra: CrossSpectra) -> None:
-        ground = Ground.of(vehicle)
         self.run = run
         self.spectra = spectra
-        self.whittle = Whittle(spectra, ground, EVIDENCE_WEIGHT)
+        self._vehicle = vehicle
+        self._roll: F64 = np.empty(0)
+        self.whittle = self._whittle(spectra.without_roll)
+
+    @property
+    def rolling(self) -> Whittle:
+        """Of all three sensors as they read."""
+        return self._whittle(self.spectra.within(ROLL_BAND_HZ))
+
+    def brought(self, theta: F64) -> "KnownSpectra":
+        """The same run seen from the centre line, with the sensor where theta (n,) of a vehicle that rolls has it."""
+        one = copy(self)
+        reading = replace(self.spectra.reading, mount=mount_of(theta))
+        spectra = _spectra_of(self.run, reading)
+        if spectra is not None:
+            one.whittle = self._whittle(spectra.without_roll)
+        one._roll = level(theta)[len(PARAMETERS) :]
+        return one
 
     def at(self, theta: F64) -> Point:
-        """The parameters theta (p,) with the run's load."""
-        return Point.of(theta, self.run.load)
+        """The half-car's parameters theta (p,) with the run's load, where this was noted to lie."""
+        if not self.run.payload_left_m:
+            return Point.of(theta, self.run.load)
+        return self.placed(np.r_[theta, self._roll], 0.0) if len(self._roll) else Point.of(theta, self.run.load)
+
+    def placed(self, theta: F64, moment_off_kgm: float) -> Point:
+        """All parameters theta (n,) of a vehicle that rolls, the payload's moment about the centre line so far off."""
+        moment_kgm = self.run.payload_kg * (self.run.payload_left_m or 0.0) + moment_off_kgm
+        cg_left_m = self.empty_share * float(theta[INDEX["empty_left_m"]]) + moment_kgm / self.total_kg
+        return Point.of(theta, self.run.load, cg_left_m)
+
+    @property
+    def moment_std_kgm(self) -> float:
+        """How sure the payload's moment about the centre line is."""
+        return self.run.payload_kg * self.run.payload_left_std_m + LEAST_MOMENT_STD_KGM
+
+    @property
+    def total_kg(self) -> float:
+        """Of all that is sprung."""
+        return self._vehicle.empty_mass_kg + self.run.payload_kg
+
+    @property
+    def empty_share(self) -> float:
+        """Of it, the empty vehicle's."""
+        return self._vehicle.empty_mass_kg / self.total_kg
+
+    def _whittle(self, spectra: CrossSpectra) -> Whittle:
+        return Whittle(spectra, Ground.of(self._vehicle), EVIDENCE_WEIGHT)
 
 
-def known_spectra(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[KnownSpectra]:
+def known_spectra(runs: Sequence[KnownRun], vehicle: Vehicle, *, with_roll: bool = False) -> list[KnownSpectra]:
     """Those of ``runs`` that hold enough steady driving, their usual amplitude the median of all.
 
-    Raises CalibrationImpossibleError where none does.
+    ``with_roll`` reads the roll rate too, where every run has one. Raises CalibrationImpossibleError where no run holds
+    enough.
     """
-    reading = Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT)
+    reading = Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT, with_roll=with_roll)
     read = [(run, spectra) for run in runs if (spectra := _spectra_of(run, reading)) is not None]
     if not read:
         raise CalibrationImpossibleError(
@@ -46,7 +95,8 @@ def known_spectra(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[KnownSpect
             "minute at speed, and map both"
         )
     usual = float(np.median([spectra.reading.usual_log_amplitude for _, spectra in read]))
-    reading = replace(reading, usual_log_amplitude=usual)
+    with_roll = all(spectra.roll is not None for _, spectra in read)
+    reading = replace(reading, usual_log_amplitude=usual, with_roll=with_roll)
     again = [(run, _spectra_of(run, reading)) for run, _ in read]
     return [KnownSpectra(run, vehicle, spectra) for run, spectra in again if spectra is not None]
 

@@ -12,7 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectrum.model.parameters import BEND_SHARES, INDEX, PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import BEND_SHARES, INDEX, PARAMETERS, ROLL_PARAMETERS
+from gateway.core.cross_spectrum.model.usual_roll import usual_roll
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 
@@ -22,6 +23,8 @@ TYRE_NPM: Final = 400e3  # both tyres of an axle of a 1250 kg vehicle; scales wi
 MOUNT_NPM: Final = 500e3
 UNSPRUNG_SHARE: Final = 0.065  # of the empty sprung mass, an axle
 GYRATION_PER_WHEELBASE: Final = 0.46
+MOST_OFFSET_STD_M: Final = 0.1
+EMPTY_LEFT_STD_M: Final = 0.02  # driver, tank, sliding door
 SLACK: Final = 0.03
 SLOPE_STD_PER_KN: Final = 0.05
 BEND_STD_PER_KN: Final = 0.1
@@ -50,12 +53,35 @@ _LOG_STD: Final = {
 }
 
 
+_ROLL_STD: Final = {
+    "roll_inertia_kgm2": 0.3,
+    "payload_roll_gyration_m2": 0.7,
+    "anti_roll_front_npm": 1.0,
+    "anti_roll_rear_npm": 1.0,
+    "damper_against_front": 0.3,
+    "damper_against_rear": 0.3,
+    "tracks_apart_m": 0.5,
+    "twist_level": 0.5,
+    "gyro_yaw_rad": 0.05,  # 3 degrees
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Prior:
     """Independent Gaussians over the parameter vector: mean and std (p,)."""
 
     mean: F64
     std: F64
+
+    @property
+    def upright(self) -> "Prior":
+        """Of how the vehicle heaves and pitches."""
+        return Prior(self.mean[: len(PARAMETERS)], self.std[: len(PARAMETERS)])
+
+    @property
+    def roll(self) -> "Prior":
+        """Of how it rolls; empty where that is not asked."""
+        return Prior(self.mean[len(PARAMETERS) :], self.std[len(PARAMETERS) :])
 
     def start(self, log_springs: float, log_dampers: float) -> F64:
         """The centre, with springs and dampers moved by these logarithms."""
@@ -66,12 +92,36 @@ class Prior:
         return theta
 
 
-def prior_of(vehicle: Vehicle) -> Prior:
-    """The prior of a vehicle from its mass, wheelbase, share and sensor position."""
+def can_roll(vehicle: Vehicle) -> bool:
+    """Whether enough is known of a vehicle to make use of a roll rate: its track, and where the sensor sits.
+
+    An unknown lever arm cannot be read off the roll itself: suspension mounts and the body bring roll into the
+    acceleration that no lever arm of the sensor explains (docs/method.md).
+    """
+    return vehicle.track_width_m is not None and vehicle.sensor_offset_left_std_m <= MOST_OFFSET_STD_M
+
+
+def prior_of(vehicle: Vehicle, *, with_roll: bool = False) -> Prior:
+    """The prior of a vehicle from its mass, wheelbase, share and sensor position; with roll also from its track."""
     entries = _body(vehicle) | _axle("front", vehicle) | _axle("rear", vehicle)
-    entries |= {name: (log(SLACK), _LOG_STD["slack"]) for name in PARAMETERS if name.startswith("slack_")}
-    mean, std = np.array([entries[name] for name in PARAMETERS]).T
+    names = PARAMETERS
+    if with_roll:
+        names += ROLL_PARAMETERS
+        entries |= _roll(vehicle)
+    entries |= {name: (log(SLACK), _LOG_STD["slack"]) for name in names if name.startswith("slack_")}
+    mean, std = np.array([entries[name] for name in names]).T
     return Prior(mean, std)
+
+
+def _roll(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
+    if vehicle.track_width_m is None:
+        raise ValueError("a vehicle that rolls needs the width of its track")
+    usual = usual_roll(vehicle.empty_mass_kg, vehicle.track_width_m)
+    return {name: (mean, _ROLL_STD[name]) for name, mean in usual.items()} | {
+        "noise_roll_rate_rad2ps": (log(NOISE_PITCH_RATE_RAD2PS), _LOG_STD["noise"]),
+        "sensor_left_m": (vehicle.sensor_offset_left_m, vehicle.sensor_offset_left_std_m),
+        "empty_left_m": (vehicle.empty_cg_left_m, EMPTY_LEFT_STD_M),
+    }
 
 
 def _body(vehicle: Vehicle) -> dict[str, tuple[float, float]]:

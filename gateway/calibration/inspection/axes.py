@@ -25,7 +25,9 @@ from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import COHERENCE_BAND_HZ
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
-from gateway.core.cross_spectrum.model.expected import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.model.driven import spectral_model
+from gateway.core.cross_spectrum.model.expected import expected_spectra
+from gateway.core.cross_spectrum.model.matrix import SpectralMatrix
 from gateway.core.cross_spectrum.model.parameters import INDEX, Ground
 from gateway.core.vehicle import Load, Vehicle
 from gateway.estimate import Z95
@@ -96,7 +98,8 @@ def agreement(spectra: CrossSpectra, load: Load, vehicle: Vehicle) -> Agreement:
     ``load`` is what the half-car carries.
     """
     positions_m = np.arange(-BEYOND_AXLES_M, vehicle.wheelbase_m + BEYOND_AXLES_M + STEP_M / 2.0, STEP_M)
-    m_aa, m_gg, m_ga = _half_cars(spectra, load, vehicle, positions_m)
+    matrix = _half_cars(spectra, load, vehicle, positions_m)
+    (m_aa, m_gg), m_ga = matrix.auto, matrix.cross[0]
     n = spectra.n_segments
     seen: C128 = spectra.cross / np.sqrt(spectra.acceleration * spectra.pitch_rate)
     expected: C128 = m_ga / np.sqrt(m_aa * m_gg)
@@ -108,13 +111,13 @@ def agreement(spectra: CrossSpectra, load: Load, vehicle: Vehicle) -> Agreement:
     return Agreement(float((inner / np.sqrt(norms))[at]), float(positions_m[at]), scale)
 
 
-def _half_cars(spectra: CrossSpectra, load: Load, vehicle: Vehicle, positions_m: F64) -> tuple[F64, F64, C128]:
-    """The usual half-car's spectra (p, b, m) with its sensor at each of positions_m (p,)."""
+def _half_cars(spectra: CrossSpectra, load: Load, vehicle: Vehicle, positions_m: F64) -> SpectralMatrix:
+    """The usual half-car's spectra (2, p, b, m) with its sensor at each of positions_m (p,)."""
     theta = np.repeat(prior_of(vehicle).mean[None], len(positions_m), axis=0)
     theta[:, INDEX["sensor_position_m"]] = positions_m
     ground = Ground.of(vehicle)
     payload_kg, share = np.full(len(theta), load.payload_kg), np.full(len(theta), load.front_share)
-    return expected_spectra(spectral_model(theta, payload_kg, share, ground, spectra.freq_hz), spectra)
+    return expected_spectra(spectral_model(theta, (payload_kg, share), ground, spectra.freq_hz), spectra)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,8 @@ from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Severity
 from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.estimator import locate
 from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.located import locate
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found
@@ -134,7 +134,7 @@ class _Labelled:
         slope towards the load and S its information after the vehicle's parameters have moved along
         (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948).
         """
-        here = one.whittle.curvature(one.at(self.fitted.x), list(range(len(PARAMETERS))), is_load_free=True)
+        here = one.whittle.curvature(one.at(self.fitted.x), list(range(len(PARAMETERS) + 2)))
         slope, along = here.gradient[-2:], here.information[-2:, :-2]
         information = here.information[-2:, -2:] - along @ self.fitted.covariance @ along.T
         return float(0.5 * slope @ np.linalg.solve(information, slope))

@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gateway.calibration.half_car.known_spectra import BAND_HZ, EVIDENCE_WEIGHT, N_SEGMENT
+from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.calibration.plan.loads import PlacedLoad
 from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
-from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
 from gateway.core.cross_spectrum.measured import Reading
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, Ground
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, Ground, upright
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 
@@ -42,7 +42,7 @@ class Design:
     """What runs of a vehicle with parameters ``theta`` (p,) would teach, each driven as ``drive``."""
 
     def __init__(self, vehicle: Vehicle, theta: F64, drive: Drive, targets: Sequence[PlacedLoad]) -> None:
-        self._theta = theta
+        self._theta = upright(theta)
         self._ground = Ground.of(vehicle)
         self._reading = Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT)
         self._drive = drive
@@ -59,7 +59,7 @@ class Design:
         if load not in self._information:
             whittle, point = self._seen(load, self._drive, EVIDENCE_WEIGHT)
             everything = list(range(len(PARAMETERS)))
-            self._information[load] = whittle.curvature(point, everything, is_load_free=False).information
+            self._information[load] = whittle.curvature(point, everything).information
         return np.asarray(np.linalg.inv(np.linalg.inv(covariance) + self._information[load]), float)
 
     def spread(self, covariance: F64) -> Spread:
@@ -92,7 +92,7 @@ class Design:
         """
         whittle, point = self._seen(load, Drive(BATCH_S, self._drive.speed_mps), 1.0)
         n = len(PARAMETERS)
-        information = whittle.curvature(point, list(range(n)), is_load_free=True).information
+        information = whittle.curvature(point, list(range(n + 2))).information
         fitted = [*DRIFTING, n, n + 1]
         own = np.linalg.inv(information[np.ix_(fitted, fitted)] + np.pad(DRIFT_PRECISION, (0, 2)))
         moves = np.zeros((2, n))

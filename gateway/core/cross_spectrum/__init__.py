@@ -7,6 +7,7 @@ docs/method.md derives it.
 """
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.estimator import Located, by_cross_spectrum, locate
+from gateway.core.cross_spectrum.estimator import by_cross_spectrum
+from gateway.core.cross_spectrum.located import Located, locate
 
 __all__ = ["CrossSpectrumCalibration", "Located", "by_cross_spectrum", "locate"]

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.core.cross_spectrum.measured import Reading
-from gateway.core.cross_spectrum.model.parameters import Ground
-from gateway.core.vehicle import Load
+from gateway.core.cross_spectrum.model.parameters import Ground, mount_of
+from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
 from gateway.records import F64
 
 SCORE: Final = 6.0  # six standard deviations are no chance; a calibration that shows more of its own allows more
@@ -15,13 +15,13 @@ SCORE: Final = 6.0  # six standard deviations are no chance; a calibration that 
 class CrossSpectrumCalibration:
     """What known-load drives taught, as plain numbers and arrays.
 
-    parameters (p,) and covariance (p, p) follow ``names`` (parameters.PARAMETERS; logarithms where
-    these are positive quantities). The inflations widen standard deviations, by so much more per_reach
-    as a load lies beyond ``known_loads`` (reach.beyond); misfit_limit is the
-    largest likelihood ratio per degree of freedom that is still believed; the two amplitudes are
-    root mean squares within the band. usual_log_amplitude: see measured.Reading. gravity_mps2 is what the
-    accelerometer read on average; None where the file does not say. The two scores are the largest that are believed
-    of a sensor that nobody touched (sensor_change).
+    parameters (n,) and covariance (n, n) follow ``names`` (parameters.PARAMETERS, then ROLL_PARAMETERS where a roll
+    rate was read; logarithms where these are positive quantities). The inflations widen standard deviations, the first
+    two by so much more per_reach as a load lies beyond ``known_loads`` (reach.beyond); misfit_limit is the largest
+    likelihood ratio per degree of freedom that is still believed; the two amplitudes are root mean squares within the
+    band. usual_log_amplitude: see measured.Reading. gravity_mps2 is what the accelerometer read on average; None where
+    the file does not say. The two scores are the largest that are believed of a sensor that nobody touched
+    (sensor_change). The sensor sits sensor_left_m left of the centre line, as stated.
     """
 
     empty_mass_kg: float
@@ -48,13 +48,21 @@ class CrossSpectrumCalibration:
     gravity_mps2: float | None = None
     most_position_score: float = SCORE
     most_noise_score: float = SCORE
+    track_width_m: float | None = None
+    cg_left_inflation: float = 1.0
+    sensor_left_m: float = 0.0
+    sensor_left_std_m: float = UNKNOWN_OFFSET_STD_M
 
     @property
     def ground(self) -> Ground:
         """The vehicle as stated, in the core's terms."""
-        return Ground(self.empty_mass_kg, self.empty_front_share_pct / 100.0, self.wheelbase_m)
+        share = self.empty_front_share_pct / 100.0
+        return Ground(self.empty_mass_kg, share, self.wheelbase_m, self.track_width_m)
 
     @property
     def reading(self) -> Reading:
         """How spectra of this vehicle are taken."""
-        return Reading(self.wheelbase_m, self.band_hz, self.n_segment, self.usual_log_amplitude)
+        mount = mount_of(self.parameters)
+        return Reading(
+            self.wheelbase_m, self.band_hz, self.n_segment, self.usual_log_amplitude, mount is not None, mount
+        )

@@ -12,9 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import CrossSpectra
-from gateway.core.cross_spectrum.model.expected import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.model.driven import spectral_model
+from gateway.core.cross_spectrum.model.expected import expected_spectra
 from gateway.core.cross_spectrum.model.parameters import INDEX
+from gateway.core.vehicle import Load
 from gateway.records import F64, Bool, Spectra
 
 
@@ -35,20 +38,18 @@ class Fitted:
     delay_scale: float | None = None
     payload_mode_hz: float | None = None
     amplitude_ratio: float = 1.0
+    cg_left_m: float = 0.0
 
 
 def modelled_spectra(seen: Spectra, calibration: CrossSpectrumCalibration, fitted: Fitted) -> Spectra:
     """Spectra (k,) of the fitted vehicle at those k of the m seen frequencies that calibration has used."""
     is_used = (seen.freq_hz >= calibration.band_hz[0]) & (seen.freq_hz <= calibration.band_hz[1])
     measured = _as_one_group(seen, is_used, fitted, calibration)
-    model = spectral_model(
-        _parameters(calibration, fitted),
-        np.array(fitted.payload_kg),
-        np.array(fitted.front_share_pct / 100.0),
-        calibration.ground,
-        measured.freq_hz,
-    )
-    auto_a, auto_g, cross = (each[0] for each in expected_spectra(model, measured))
+    load = Load(fitted.payload_kg, fitted.front_share_pct)
+    point = Point.of(_parameters(calibration, fitted), load, fitted.cg_left_m)
+    model = spectral_model(point.theta, point.loaded, calibration.ground, measured.freq_hz)
+    matrix = expected_spectra(model, measured)
+    (auto_a, auto_g), cross = matrix.auto[:, 0], matrix.cross[0, 0]
     level = _road_level(measured, auto_a, auto_g)
     return Spectra(
         freq_hz=seen.freq_hz[is_used],

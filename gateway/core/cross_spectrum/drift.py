@@ -20,6 +20,7 @@ DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
         "damper_rear_nspm": 0.01,
         "delay_scale": 0.003,
         "payload_mode_hz": 0.3,
+        "payload_damping_ratio": 0.5,
         "gyro_lag_s": 0.001,
     }
 )

@@ -11,41 +11,22 @@ day. docs/method.md has the derivation.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import (
-    DRIFT_PRECISION,
-    DRIFTING,
-    MOST_TENSION,
-    STEADY,
-    drift_covariance,
-    tension_of,
-)
-from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
+from gateway.core.cross_spectrum.drift import MOST_TENSION
+from gateway.core.cross_spectrum.lateral.told import with_place
+from gateway.core.cross_spectrum.located import Located, locate
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
-from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.core.cross_spectrum.reach import beyond
-from gateway.core.cross_spectrum.search import Found, most_probable
-from gateway.core.cross_spectrum.sensor_change import (
-    FITTED,
-    MOST_GRAVITY_CHANGE_MPS2,
-    SensorScores,
-    gain_moves,
-    gain_std,
-    scores_of,
-)
+from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_std
 from gateway.core.fusion import FRONT_SHARE_OWN_STD_PCT, PAYLOAD_OWN_STD_KG
 from gateway.estimate import Estimate, Quantity
 from gateway.records import F64, Batch, Why
-
-START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
-LEAST_START_SHARE: Final = 0.33
-STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rate bends
-START_POSITION_SHARES: Final = (0.25, 0.5, 0.9)  # of the wheelbase
 
 COHERENCE_BAND_HZ: Final = (1.4, 4.5)
 LEAST_COHERENCE: Final = 0.2
@@ -55,27 +36,6 @@ MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
 UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
-
-
-@dataclass(frozen=True, slots=True)
-class Located:
-    """The best point of a batch with its covariance of (payload in kg, front share 0..1), not yet inflated.
-
-    own_covariance is the part of it that no other batch shares: what its length and road leave. drift_covariance is
-    what a change of the vehicle since its calibration adds, gain_moves (2,) by how much the load moves with the
-    accelerometer's gain; no inflation is due on either. tension is how far what drifts lies off its
-    calibration: drift.tension_of.
-    """
-
-    point: Point
-    load_covariance: F64
-    own_covariance: F64
-    drift_covariance: F64
-    gain_moves: F64
-    misfit: float
-    tension: float
-    scores: SensorScores
-    is_reversed: bool
 
 
 def by_cross_spectrum(batch: Batch, calibration: CrossSpectrumCalibration, blank: Estimate) -> Estimate:
@@ -88,82 +48,6 @@ def by_cross_spectrum(batch: Batch, calibration: CrossSpectrumCalibration, blank
     inflation = _unseen_inflation(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
     by_gain = located.gain_moves * gain_std(batch.gravity_mps2, calibration.gravity_mps2)
     return _judged(blank, spectra, located, inflation, by_gain, calibration)
-
-
-def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Located:
-    """The most probable load of ``spectra`` under a flat prior on payload and share."""
-    whittle = Whittle(spectra, calibration.ground)
-    found = _fit_load(whittle, calibration)
-    point = _point(found.x, calibration)
-    whole = whittle.curvature(point, list(range(len(PARAMETERS))), is_load_free=True)
-    # the fitted x moves by -C I_xt for each of the other parameters t
-    moves = -found.covariance @ whole.information[np.ix_(FITTED, STEADY)]
-    misfit = whittle.misfit(point)
-    return Located(
-        point=point,
-        load_covariance=_load_covariance(found, moves, calibration),
-        own_covariance=found.covariance[-2:, -2:],
-        drift_covariance=drift_covariance(found.covariance, moves)[-2:, -2:],
-        gain_moves=gain_moves(whole, whittle, point, found.covariance)[-2:],
-        misfit=misfit,
-        tension=tension_of(found.x[:-2] - calibration.parameters[DRIFTING]),
-        scores=scores_of(whole, point, found.covariance, calibration),
-        is_reversed=_is_reversed(whittle, point, misfit, calibration),
-    )
-
-
-def _is_reversed(whittle: Whittle, point: Point, misfit: float, calibration: CrossSpectrumCalibration) -> bool:
-    """True where the pitch rate fits better with the other sign: at this load or, if this fits badly, at any start.
-
-    Spectra with the wrong sign may drive the search to where neither sign fits.
-    """
-    reverse = Whittle(whittle.spectra.with_pitch_reversed(), calibration.ground)
-    tried = [point]
-    if not misfit <= calibration.misfit_limit:
-        usual = calibration.parameters[DRIFTING]
-        tried += [_point(np.r_[usual, load], calibration) for load in _starting_loads(calibration)]
-    return min(reverse.cost(one) for one in tried) < whittle.cost(point)
-
-
-def _point(x: F64, calibration: CrossSpectrumCalibration) -> Point:
-    theta = calibration.parameters.copy()
-    theta[DRIFTING] = x[:-2]
-    return Point(theta, float(x[-2]), float(x[-1]))
-
-
-def _fit_load(whittle: Whittle, calibration: CrossSpectrumCalibration) -> Found:
-    """Drift parameters, then payload (kg) and front share (0..1), from the best of a few starting loads."""
-    usual = calibration.parameters[DRIFTING]
-    prior_mean = np.r_[usual, 0.0, 0.0]
-    prior_precision = np.pad(DRIFT_PRECISION, (0, 2))  # flat in payload and share
-
-    def cost(x: F64) -> float:
-        return whittle.cost(_point(x, calibration))
-
-    def curvature(x: F64) -> Curvature:
-        return whittle.curvature(_point(x, calibration), DRIFTING, is_load_free=True)
-
-    starts = sorted((np.r_[usual, load] for load in _starting_loads(calibration)), key=cost)[:STARTS_TRIED]
-    peaks = [most_probable(start, prior_mean, prior_precision, cost, curvature) for start in starts]
-    return min(peaks, key=lambda found: found.cost)
-
-
-def _starting_loads(calibration: CrossSpectrumCalibration) -> list[tuple[float, float]]:
-    """(payload in kg, front share 0..1) for a few loads at a few places."""
-    empty_kg, share = calibration.empty_mass_kg, calibration.ground.empty_front_share
-    loads = []
-    most_kg = max(calibration.payload_seen_kg[1], LEAST_START_SHARE * empty_kg)
-    for payload_kg in np.linspace(0.0, most_kg, START_PAYLOADS_N).tolist():
-        for position in START_POSITION_SHARES if payload_kg else (0.5,):
-            front_kg = share * empty_kg + (1.0 - position) * payload_kg
-            loads.append((payload_kg, front_kg / (empty_kg + payload_kg)))
-    return loads
-
-
-def _load_covariance(found: Found, moves: F64, calibration: CrossSpectrumCalibration) -> F64:
-    """Covariance (2, 2) of payload and share: the batch's own, and what calibration left open."""
-    covariance = found.covariance + moves @ calibration.covariance[np.ix_(STEADY, STEADY)] @ moves.T
-    return covariance[-2:, -2:]
 
 
 def _unfit(batch: Batch, spectra: CrossSpectra | None, calibration: CrossSpectrumCalibration) -> Why | None:
@@ -210,8 +94,8 @@ def _judged(
     reach = beyond(load, calibration.known_loads, calibration.empty_mass_kg)
     of_payload = calibration.payload_inflation * (1.0 + calibration.payload_inflation_per_reach * reach)
     of_share = calibration.front_share_inflation * (1.0 + calibration.front_share_inflation_per_reach * reach)
-    wider = unseen * np.array([of_payload, of_share])
-    covariance = wider[:, None] * located.load_covariance * wider
+    wider = np.array([of_payload, of_share])
+    covariance = wider[:, None] * (unseen**2 * located.load_covariance + located.unseen_covariance) * wider
     not_inflated = located.drift_covariance + np.outer(by_gain, by_gain)
     covariance += not_inflated
     payload_std_kg, share_std = (float(std) for std in np.sqrt(np.diag(covariance)))
@@ -238,13 +122,14 @@ def _judged(
     why = _disbelieved(located, payload_std_kg, reach, calibration)
     if why is not None:
         return replace(blank, rejected=(why,), diagnostics=diagnostics)
-    return replace(
+    answer = replace(
         blank,
         payload=Quantity.normal(load.payload_kg, payload_std_kg),
         front_share=Quantity.normal(load.front_share_pct, 100.0 * share_std),
         correlation=float(covariance[0, 1]) / (payload_std_kg * share_std),
         diagnostics=diagnostics,
     )
+    return with_place(answer, located.point, located.sideways, covariance, calibration) if located.sideways else answer
 
 
 def _disbelieved(
@@ -260,7 +145,7 @@ def _disbelieved(
     if located.tension > MOST_TENSION:
         return Why.MODEL_MISFIT
     if not payload_std_kg <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:
-        return Why.TOO_UNCERTAIN
+        return Why.AMBIGUOUS if located.is_ambiguous else Why.TOO_UNCERTAIN
     return None
 
 

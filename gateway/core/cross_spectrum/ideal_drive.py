@@ -1,12 +1,13 @@
 """What a steady drive would show on average: the spectra that a load not driven yet can be expected to give."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
-from gateway.core.cross_spectrum.model.expected import expected_spectra, spectral_model
+from gateway.core.cross_spectrum.model.driven import spectral_model
+from gateway.core.cross_spectrum.model.expected import expected_spectra
 from gateway.core.cross_spectrum.model.parameters import Ground
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import F64
@@ -24,11 +25,8 @@ class Drive:
 
 def expected_of(spectra: CrossSpectra, point: Point, ground: Ground) -> CrossSpectra:
     """The spectra such a drive would show on average: ``spectra`` with what the model says at ``point``."""
-    model = spectral_model(
-        point.theta, np.array(point.payload_kg), np.array(point.front_share), ground, spectra.freq_hz
-    )
-    acceleration, pitch_rate, cross = expected_spectra(model, spectra)
-    return replace(spectra, acceleration=acceleration, pitch_rate=pitch_rate, cross=cross)
+    model = spectral_model(point.theta, point.loaded, ground, spectra.freq_hz, spectra.n_sensors)
+    return spectra.showing(expected_spectra(model, spectra))
 
 
 def steady_spectra(reading: Reading, drive: Drive) -> CrossSpectra:

@@ -1,4 +1,4 @@
-"""What the likelihood needs of a drive: cross-spectra of the two sensors, grouped by speed and amplitude.
+"""What the likelihood needs of a drive: cross-spectra of the sensors, grouped by speed and amplitude.
 
 Segments are short, tapered, detrended, and never cross a masked sample. Each is divided by its own
 power, so that a rough stretch does not drown the others. The road reaches the rear axle later than
@@ -6,11 +6,13 @@ the front by the wheelbase over the speed; the phase of that delay is averaged o
 inside each segment, because averaged spectra hold averaged phases.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gateway.core.cross_spectrum.model.matrix import SpectralMatrix
+from gateway.core.cross_spectrum.model.mount import Mount
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import C128, F64, I64, Batch, Bool, Why
 
@@ -19,6 +21,8 @@ AMPLITUDE_BIN = 0.5  # and in the logarithm of how much it moves: friction and n
 SPEED_CHANGE_MAX_MPS2 = 0.3  # braking and pulling away pitch the body without any road
 SPEED_SAMPLE_STEP = 8
 LEAST_SEGMENTS = 6
+LEAST_SHARE_WITH_ROLL = 0.7  # of the segments; with fewer, what the roll rate tells is not worth what it costs
+_NO_SEGMENT = np.empty((0, 0), np.complex128)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,13 +30,29 @@ class Reading:
     """How spectra are taken of a vehicle: band_hz is inclusive, n_segment in samples.
 
     usual_log_amplitude is how much the vehicle moved in calibration (:func:`log_amplitude_of`); None for as much as in
-    the drive that is read.
+    the drive that is read. with_roll: the roll rate is read too, where a drive has enough of it; then all is read as on
+    the centre line, if mount says where the sensor sits.
     """
 
     wheelbase_m: float
     band_hz: tuple[float, float]
     n_segment: int
     usual_log_amplitude: float | None = None
+    with_roll: bool = False
+    mount: Mount | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RollSpectra:
+    """What the roll rate adds to cross-spectra (b, m): its auto-spectrum, and it times the conjugate of the others."""
+
+    roll_rate: F64
+    with_acceleration: C128
+    with_pitch_rate: C128
+
+    def times(self, acceleration: float, pitch_rate: float) -> "RollSpectra":
+        """As if these sensors had so many times their gain."""
+        return RollSpectra(self.roll_rate, acceleration * self.with_acceleration, pitch_rate * self.with_pitch_rate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +65,7 @@ class CrossSpectra:
     (b, 1) the number of segments in each group. inverse_power (b, 1) is the mean of what segments were
     multiplied by, log_amplitude (b, 1) how much they moved over the usual. The two root mean squares are of
     the segments before division, in m/s2 and rad/s within the band; reading is how they were taken, the usual
-    amplitude filled in.
+    amplitude filled in. roll is None where no roll rate was read.
     """
 
     freq_hz: F64
@@ -60,6 +80,41 @@ class CrossSpectra:
     acceleration_rms_mps2: float
     pitch_rate_rms_radps: float
     reading: Reading
+    roll: RollSpectra | None = None
+
+    @property
+    def n_sensors(self) -> int:
+        """Three with a roll rate, else two."""
+        return 2 if self.roll is None else 3
+
+    @property
+    def matrix(self) -> SpectralMatrix:
+        """Of all sensors, (p, b, m)."""
+        if self.roll is None:
+            return SpectralMatrix(np.stack([self.acceleration, self.pitch_rate]), self.cross[None])
+        return SpectralMatrix(
+            np.stack([self.acceleration, self.pitch_rate, self.roll.roll_rate]),
+            np.stack([self.cross, self.roll.with_acceleration, self.roll.with_pitch_rate]),
+        )
+
+    @property
+    def without_roll(self) -> "CrossSpectra":
+        """Acceleration and pitch rate alone."""
+        return replace(self, roll=None)
+
+    def within(self, band_hz: tuple[float, float]) -> "CrossSpectra":
+        """The same at fewer frequencies; the guard frequencies lie outside the band."""
+        kept = np.flatnonzero((self.freq_hz[1:-1] >= band_hz[0]) & (self.freq_hz[1:-1] <= band_hz[1]))
+        inner, guarded = slice(kept[0], kept[-1] + 1), slice(kept[0], kept[-1] + 3)
+        matrix = SpectralMatrix(self.matrix.auto[..., inner], self.matrix.cross[..., inner])
+        fewer = replace(self, freq_hz=self.freq_hz[guarded], delay_phase=self.delay_phase[:, guarded])
+        return fewer.showing(matrix)
+
+    def showing(self, matrix: SpectralMatrix) -> "CrossSpectra":
+        """The same drive with these spectra (p, b, m), of as many sensors."""
+        auto, cross = matrix.auto, matrix.cross
+        roll = RollSpectra(auto[2], cross[1], cross[2]) if len(auto) > 2 else None
+        return replace(self, acceleration=auto[0], pitch_rate=auto[1], cross=cross[0], roll=roll)
 
     @property
     def log_amplitude_mean(self) -> float:
@@ -91,24 +146,40 @@ class CrossSpectra:
 
     def with_acceleration_times(self, gain: float) -> "CrossSpectra":
         """As if the accelerometer had so many times its gain; the division of segments stays."""
-        return replace(self, acceleration=gain**2 * self.acceleration, cross=gain * self.cross)
+        roll = self.roll and self.roll.times(gain, 1.0)
+        return replace(self, acceleration=gain**2 * self.acceleration, cross=gain * self.cross, roll=roll)
 
     def with_pitch_reversed(self) -> "CrossSpectra":
         """As if the pitch rate had the other sign."""
-        return replace(self, cross=-self.cross)
+        return replace(self, cross=-self.cross, roll=self.roll and self.roll.times(1.0, -1.0))
 
 
 @dataclass(frozen=True, slots=True)
 class _Segments:
-    """Transforms (k, m + 2) of k segments and their wheelbase delays (k, t)."""
+    """Transforms (k, m + 2) of k segments, by sensor, and their wheelbase delays (k, t)."""
 
-    acceleration: C128
-    pitch_rate: C128
+    sensed: tuple[C128, ...]
     delays_s: F64
 
 
 def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra | None:
-    """Cross-spectra of all usable segments of ``batches``, which share one rate; None if fewer than six."""
+    """Cross-spectra of all usable segments of ``batches``, which share one rate; None if fewer than six.
+
+    Where the roll rate is to be read and most segments lack it, they are read without.
+    """
+    batches = tuple(batches)
+    joined, freq_hz = _joined(batches, reading, with_roll=False)
+    if reading.with_roll and all(batch.roll_rate_radps is not None for batch in batches):
+        rolling, _ = _joined(batches, reading, with_roll=True)
+        if len(rolling.delays_s) >= max(LEAST_SEGMENTS, LEAST_SHARE_WITH_ROLL * len(joined.delays_s)):
+            joined = rolling
+    if len(joined.delays_s) < LEAST_SEGMENTS:
+        return None
+    return _grouped(joined, freq_hz, reading)
+
+
+def _joined(batches: Sequence[Batch], reading: Reading, *, with_roll: bool) -> tuple[_Segments, F64]:
+    """Segments of all batches and the frequencies (m + 2,) of their transforms."""
     parts: list[_Segments] = []
     freq_hz = np.empty(0)
     for batch in batches:
@@ -116,15 +187,10 @@ def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra
         step_hz = every_hz[1]
         kept = np.flatnonzero((every_hz >= reading.band_hz[0] - step_hz) & (every_hz <= reading.band_hz[1] + step_hz))
         freq_hz = every_hz[kept]
-        parts.append(_segments(batch, reading, kept))
-    if sum(len(part.delays_s) for part in parts) < LEAST_SEGMENTS:
-        return None
-    joined = _Segments(
-        np.concatenate([p.acceleration for p in parts]),
-        np.concatenate([p.pitch_rate for p in parts]),
-        np.concatenate([p.delays_s for p in parts]),
-    )
-    return _grouped(joined, freq_hz, reading)
+        parts.append(_segments(batch, reading, kept, with_roll=with_roll))
+    n_sensors = 3 if with_roll else 2
+    sensed = tuple(np.concatenate([part.sensed[i] for part in parts] or [_NO_SEGMENT]) for i in range(n_sensors))
+    return _Segments(sensed, np.concatenate([part.delays_s for part in parts] or [np.empty((0, 0))])), freq_hz
 
 
 def why_no_spectra(batch: Batch, reading: Reading) -> Why:
@@ -158,20 +224,26 @@ def log_amplitude_of(acceleration: F64, pitch_rate: F64) -> F64:
     return found
 
 
-def _segments(batch: Batch, reading: Reading, kept: I64) -> _Segments:
+def _segments(batch: Batch, reading: Reading, kept: I64, *, with_roll: bool) -> _Segments:
     n_segment = reading.n_segment
-    has_both = np.isfinite(batch.vertical_acceleration_mps2) & np.isfinite(batch.pitch_rate_radps)
-    starts = segment_starts(batch.usable & has_both, n_segment, n_segment // 2)
+    sensed = [batch.vertical_acceleration_mps2, batch.pitch_rate_radps]
+    if with_roll and batch.roll_rate_radps is not None:
+        sensed.append(batch.roll_rate_radps)
+    has_all = np.logical_and.reduce([np.isfinite(one) for one in sensed])
+    starts = segment_starts(batch.usable & has_all, n_segment, n_segment // 2)
     if starts.size:
         speeds_mps = np.lib.stride_tricks.sliding_window_view(batch.speed_mps, n_segment)[starts]
         is_steady = np.ptp(speeds_mps, axis=1) < SPEED_CHANGE_MAX_MPS2 * n_segment / batch.rate_hz
         starts, speeds_mps = starts[is_steady], speeds_mps[is_steady]
     if not starts.size:
         nothing = np.empty((0, len(kept)), np.complex128)
-        return _Segments(nothing, nothing, np.empty((0, len(range(0, n_segment, SPEED_SAMPLE_STEP)))))
+        return _Segments((nothing,) * len(sensed), np.empty((0, len(range(0, n_segment, SPEED_SAMPLE_STEP)))))
+    freq_hz = frequencies_hz(n_segment, batch.rate_hz)[kept]
+    a, g, *rolling = (segment_transforms(one, starts, n_segment, batch.rate_hz)[:, kept] for one in sensed)
+    if rolling and reading.mount is not None:
+        a, g, *rolling = reading.mount.levelled((a, g, rolling[0]), freq_hz)
     return _Segments(
-        segment_transforms(batch.vertical_acceleration_mps2, starts, n_segment, batch.rate_hz)[:, kept],
-        segment_transforms(batch.pitch_rate_radps, starts, n_segment, batch.rate_hz)[:, kept],
+        (a, g, *rolling),
         reading.wheelbase_m / speeds_mps[:, ::SPEED_SAMPLE_STEP],
     )
 
@@ -180,7 +252,7 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
     weight = np.hanning(reading.n_segment + 1)[:-1:SPEED_SAMPLE_STEP] ** 2
     weight = weight / weight.sum()
     mean_delay_s = segments.delays_s @ weight
-    a, g = segments.acceleration[:, 1:-1], segments.pitch_rate[:, 1:-1]
+    a, g, *rolling = (one[:, 1:-1] for one in segments.sensed)
     power_a, power_g = np.mean(np.abs(a) ** 2, axis=1), np.mean(np.abs(g) ** 2, axis=1)
     divisor = np.maximum(np.sqrt(power_a * power_g), np.finfo(float).tiny)[:, None]
     width_hz = float(freq_hz[-2] - freq_hz[1])
@@ -198,6 +270,13 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
         total /= n_segments
         return total
 
+    def with_roll(roll: C128) -> RollSpectra:
+        return RollSpectra(
+            roll_rate=np.real(mean(np.abs(roll) ** 2 / divisor)),
+            with_acceleration=mean(roll * np.conj(a) / divisor),
+            with_pitch_rate=mean(roll * np.conj(g) / divisor),
+        )
+
     phase = np.exp(-2j * np.pi * segments.delays_s[:, :, None] * freq_hz)
     return CrossSpectra(
         freq_hz=freq_hz,
@@ -212,4 +291,5 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
         acceleration_rms_mps2=rms_a,
         pitch_rate_rms_radps=rms_g,
         reading=replace(reading, usual_log_amplitude=usual),
+        roll=with_roll(rolling[0]) if rolling else None,
     )

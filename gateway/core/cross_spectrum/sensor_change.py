@@ -23,6 +23,12 @@ from gateway.records import F64
 
 FITTED: Final = [*DRIFTING, len(PARAMETERS), len(PARAMETERS) + 1]  # of all parameters, then payload and front share
 
+
+def weighed(point: Point) -> list[int]:
+    """Where FITTED stand in what a curvature at ``point`` may leave free: the load comes after all of theta."""
+    return [*DRIFTING, len(point.theta), len(point.theta) + 1]
+
+
 MOST_GRAVITY_CHANGE_MPS2: Final = 0.35
 """Offsets of such sensors move by 0.1 m/s2 (standard deviation) from day to day; so much is a gain off by 3.6 %."""
 
@@ -64,7 +70,7 @@ def scores_of(whole: Curvature, point: Point, covariance: F64, calibration: Cros
 def gain_moves(whole: Curvature, whittle: Whittle, point: Point, covariance: F64) -> F64:
     """(k,) by how much drifting parameters and load move for each unit of the logarithm of the accelerometer's gain."""
     stronger = Whittle(whittle.spectra.with_acceleration_times(1.0 + STEP), whittle.ground)
-    there = stronger.curvature(point, DRIFTING, is_load_free=True).gradient
+    there = stronger.curvature(point, weighed(point)).gradient
     moves: F64 = -covariance @ (there - whole.gradient[FITTED]) / np.log1p(STEP)
     return moves
 

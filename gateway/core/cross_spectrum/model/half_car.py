@@ -16,6 +16,7 @@ from gateway.records import C128, F64
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 Real = float | F64
+Rate = Real | C128
 
 INVERSE_PAYLOAD_KG = 30.0  # 1/L becomes L / (L^2 + this^2): an empty vehicle has no payload position
 
@@ -81,10 +82,10 @@ def frequency_response(car: HalfCar, payload_kg: Real, front_share: Real, freq_h
     road: over each axle the displacement is that of the road there.
     """
     omega = 2.0 * np.pi * freq_hz
-    mass_ff, mass_rr, mass_fr = _body_mass(car, payload_kg, front_share, freq_hz)
-    added_front_kg, added_rear_kg = _added_axle_masses_kg(car, payload_kg, front_share)
-    body_front, road_front = _axle(car.front, added_front_kg, omega)
-    body_rear, road_rear = _axle(car.rear, added_rear_kg, omega)
+    mass_ff, mass_rr, mass_fr = body_mass(car, payload_kg, front_share, freq_hz)
+    added_front_kg, added_rear_kg = added_axle_masses_kg(car, payload_kg, front_share)
+    body_front, road_front = axle_forces(car.front, added_front_kg, omega)
+    body_rear, road_rear = axle_forces(car.rear, added_rear_kg, omega)
     d_ff = body_front - omega**2 * mass_ff
     d_rr = body_rear - omega**2 * mass_rr
     d_fr = -(omega**2) * mass_fr
@@ -104,44 +105,60 @@ def _sensed(car: HalfCar, over_front: C128, over_rear: C128, omega: F64) -> tupl
     return acceleration, pitch_rate
 
 
-def _axle(axle: Axle, added_kg: Real, omega: F64) -> tuple[C128, C128]:
+def axle_forces(axle: Axle, added_kg: Real, omega: F64) -> tuple[C128, C128]:
     """Force on the body per minus its displacement, and per road displacement, in N/m.
 
-    With K the suspension and T = k_t - m_u omega^2 the wheel held by its tyre: K T / (K + T) and
-    K k_t / (K + T); the wheel's own movement is eliminated.
+    With K the suspension and T the wheel held by its tyre: K T / (K + T) and K k_t / (K + T); the wheel's own movement
+    is eliminated.
     """
-    added_kn = added_kg * (STANDARD_GRAVITY_MPS2 / 1000.0)
-    log_stiffening = axle.spring_slope_per_kn * added_kn
-    for bend, load_kn in zip(axle.spring_bends_per_kn, axle.bend_loads_kn, strict=True):
-        log_stiffening = log_stiffening + bend * np.maximum(added_kn - load_kn, 0.0)
-    damper = 1j * omega * axle.damper_nspm
-    suspension = axle.spring_npm * np.exp(log_stiffening) + damper / (1.0 + damper / axle.damper_mount_npm)
-    wheel = axle.tyre_npm - omega**2 * axle.unsprung_kg
+    suspension, wheel = suspension_npm(axle, added_kg, omega), wheel_npm(axle, omega)
     in_series = suspension / (suspension + wheel)
     return np.asarray(in_series * wheel, np.complex128), np.asarray(in_series * axle.tyre_npm, np.complex128)
 
 
-def _added_axle_masses_kg(car: HalfCar, payload_kg: Real, front_share: Real) -> tuple[Real, Real]:
+def suspension_npm(axle: Axle, added_kg: Real, omega: F64) -> Rate:
+    """Springs, and beside them dampers on their elastic mounts, under ``added_kg`` on the axle."""
+    damper = 1j * omega * axle.damper_nspm
+    return spring_npm(axle, added_kg) + damper / (1.0 + damper / axle.damper_mount_npm)
+
+
+def wheel_npm(axle: Axle, omega: F64) -> Real:
+    """T = k_t - m_u omega^2: both wheels held by their tyres."""
+    wheel: Real = axle.tyre_npm - omega**2 * axle.unsprung_kg
+    return wheel
+
+
+def spring_npm(axle: Axle, added_kg: Real) -> Real:
+    """Rate of both springs under ``added_kg`` on the axle."""
+    added_kn = added_kg * (STANDARD_GRAVITY_MPS2 / 1000.0)
+    log_stiffening = axle.spring_slope_per_kn * added_kn
+    for bend, load_kn in zip(axle.spring_bends_per_kn, axle.bend_loads_kn, strict=True):
+        log_stiffening = log_stiffening + bend * np.maximum(added_kn - load_kn, 0.0)
+    stiffened: Real = axle.spring_npm * np.exp(log_stiffening)
+    return stiffened
+
+
+def added_axle_masses_kg(car: HalfCar, payload_kg: Real, front_share: Real) -> tuple[Real, Real]:
     """What the payload adds on the front and on the rear axle."""
     front_kg = front_share * (car.empty_mass_kg + payload_kg) - car.empty_front_share * car.empty_mass_kg
     return front_kg, payload_kg - front_kg
 
 
-def _body_mass(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> tuple[C128, C128, C128]:
+def body_mass(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> tuple[C128, C128, C128]:
     """Mass matrix (front-front, rear-rear, front-rear) of body and payload for the displacements over the axles.
 
     A point mass L at d adds L (1 - d/l)^2, L (d/l)^2 and L (1 - d/l)(d/l); written with the masses
     F and R it puts on the axles, the last is q = L/4 - (R - F)^2 / (4 L) and the others F - q and R - q.
     """
     share, length = car.empty_front_share, car.wheelbase_m
-    front_kg, rear_kg = _added_axle_masses_kg(car, payload_kg, front_share)
+    front_kg, rear_kg = added_axle_masses_kg(car, payload_kg, front_share)
     inverse_payload = payload_kg / (payload_kg**2 + INVERSE_PAYLOAD_KG**2)
     coupling = (
         payload_kg / 4.0
         - (rear_kg - front_kg) ** 2 / 4.0 * inverse_payload
         - payload_kg * car.payload_gyration_m2 / length**2
     )
-    felt = _payload_felt(car, freq_hz)
+    felt = payload_felt(car, freq_hz)
     turning = car.pitch_inertia_kgm2 / length**2
     front_front = car.empty_mass_kg * share**2 + turning + felt * (front_kg - coupling)
     rear_rear = car.empty_mass_kg * (1.0 - share) ** 2 + turning + felt * (rear_kg - coupling)
@@ -149,7 +166,7 @@ def _body_mass(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) 
     return front_front, rear_rear, front_rear
 
 
-def _payload_felt(car: HalfCar, freq_hz: F64) -> C128:
+def payload_felt(car: HalfCar, freq_hz: F64) -> C128:
     """By which factor the payload feels heavier than it is, moving on its own floor: a base-excited oscillator."""
     ratio = freq_hz / car.payload_mode_hz
     damping = 2j * car.payload_damping_ratio * ratio

@@ -13,6 +13,8 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar
+from gateway.core.cross_spectrum.model.mount import Mount
+from gateway.core.cross_spectrum.model.rolling_car import Against, RollingCar
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 from gateway.units import STANDARD_GRAVITY_MPS2
@@ -58,11 +60,32 @@ _SIGNED: Final = (
     "rear_lag_s",
 )
 PARAMETERS: Final = _POSITIVE + _SIGNED
-INDEX: Final = {name: i for i, name in enumerate(PARAMETERS)}
-SLACK_ACCELERATION: Final = range(INDEX[_SLACK_ACCELERATION[0]], INDEX[_SLACK_ACCELERATION[-1]] + 1)  # one a knot
-SLACK_PITCH_RATE: Final = range(INDEX[_SLACK_PITCH_RATE[0]], INDEX[_SLACK_PITCH_RATE[-1]] + 1)
-_NOT_OF_THE_HALF_CAR: Final = ("slack_", "noise_", "track_offset_m", "delay_scale", "rear_lag_s")
-HALF_CAR_PARAMETERS: Final = frozenset(i for name, i in INDEX.items() if not name.startswith(_NOT_OF_THE_HALF_CAR))
+"""Of every calibration."""
+
+_SLACK_ROLL_RATE: Final = tuple(f"slack_roll_rate_{hz:g}hz" for hz in SLACK_KNOTS_HZ)
+_ROLL_POSITIVE: Final = (
+    "roll_inertia_kgm2",
+    "payload_roll_gyration_m2",
+    "anti_roll_front_npm",
+    "anti_roll_rear_npm",
+    "damper_against_front",
+    "damper_against_rear",
+    *_SLACK_ROLL_RATE,
+    "noise_roll_rate_rad2ps",
+    "tracks_apart_m",
+    "twist_level",
+)
+_ROLL_SIGNED: Final = ("sensor_left_m", "gyro_yaw_rad", "empty_left_m")
+ROLL_PARAMETERS: Final = _ROLL_POSITIVE + _ROLL_SIGNED
+"""What follows them in the vector of a vehicle that was calibrated with a roll rate."""
+
+INDEX: Final = {name: i for i, name in enumerate(PARAMETERS + ROLL_PARAMETERS)}
+SLACK_KNOTS: Final = tuple(
+    range(INDEX[names[0]], INDEX[names[-1]] + 1) for names in (_SLACK_ACCELERATION, _SLACK_PITCH_RATE, _SLACK_ROLL_RATE)
+)
+"""By sensor: where its slack's knots stand in the vector."""
+_OF_ROAD_AND_SENSORS: Final = ("slack_", "noise_", "track", "twist_", "delay_scale", "rear_lag_s")
+VEHICLE_PARAMETERS: Final = frozenset(i for name, i in INDEX.items() if not name.startswith(_OF_ROAD_AND_SENSORS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +95,12 @@ class Ground:
     empty_mass_kg: float
     empty_front_share: float
     wheelbase_m: float
+    track_width_m: float | None = None
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> "Ground":
         """Of a vehicle as its fitter states it."""
-        return cls(vehicle.empty_mass_kg, vehicle.empty_front_share, vehicle.wheelbase_m)
+        return cls(vehicle.empty_mass_kg, vehicle.empty_front_share, vehicle.wheelbase_m, vehicle.track_width_m)
 
     @property
     def half_weight_kn(self) -> float:
@@ -86,15 +110,49 @@ class Ground:
 
 def is_positive(name: str) -> bool:
     """True where the vector holds the logarithm of this parameter."""
-    return name in _POSITIVE
+    return name in _POSITIVE or name in _ROLL_POSITIVE
+
+
+def has_roll(theta: F64) -> bool:
+    """True where the vector theta (..., p) knows how the vehicle rolls."""
+    return bool(theta.shape[-1] > len(PARAMETERS))
+
+
+def names_of(theta: F64) -> tuple[str, ...]:
+    """What the entries of theta (..., p) are."""
+    return PARAMETERS + ROLL_PARAMETERS if has_roll(theta) else PARAMETERS
+
+
+def mount_of(theta: F64) -> Mount | None:
+    """Where theta (n,) has the sensor; None where it knows of no roll."""
+    if not has_roll(theta):
+        return None
+    return Mount(*(float(theta[INDEX[name]]) for name in ("sensor_left_m", "gyro_yaw_rad", "gyro_lag_s")))
+
+
+def level(theta: F64) -> F64:
+    """theta (n,) of the same vehicle that rolls, its sensor on the centre line and square to it."""
+    placed = theta.copy()
+    placed[[INDEX["sensor_left_m"], INDEX["gyro_yaw_rad"]]] = 0.0
+    return placed
+
+
+def upright(theta: F64) -> F64:
+    """What of theta (..., n) says how the vehicle heaves and pitches."""
+    return theta[..., : len(PARAMETERS)]
+
+
+def value_of(theta: F64, name: str) -> F64:
+    """(..., 1) one parameter of theta (..., p) in its own unit."""
+    column: F64 = theta[..., INDEX[name], None]
+    return np.exp(column) if is_positive(name) else column
 
 
 def half_car(theta: F64, ground: Ground) -> HalfCar:
     """The vehicles of the parameter vectors theta (..., p), broadcasting against frequency."""
 
     def of(name: str) -> F64:
-        column: F64 = theta[..., INDEX[name], None]
-        return np.exp(column) if is_positive(name) else column
+        return value_of(theta, name)
 
     def axle(end: str) -> Axle:
         return Axle(
@@ -120,6 +178,30 @@ def half_car(theta: F64, ground: Ground) -> HalfCar:
         payload_mode_hz=of("payload_mode_hz"),
         payload_damping_ratio=of("payload_damping_ratio"),
         gyro_lag_s=of("gyro_lag_s"),
+    )
+
+
+def rolling_car(theta: F64, ground: Ground) -> RollingCar:
+    """The same with roll. Raises ValueError where the ground does not say how wide the track is."""
+    if ground.track_width_m is None:
+        raise ValueError("a vehicle that rolls needs the width of its track")
+
+    def against(end: str) -> Against:
+        return Against(
+            anti_roll_npm=value_of(theta, f"anti_roll_{end}_npm"),
+            damper=value_of(theta, f"damper_against_{end}"),
+        )
+
+    return RollingCar(
+        half_car=half_car(theta, ground),
+        half_track_m=0.5 * ground.track_width_m,
+        roll_inertia_kgm2=value_of(theta, "roll_inertia_kgm2"),
+        payload_roll_gyration_m2=value_of(theta, "payload_roll_gyration_m2"),
+        front=against("front"),
+        rear=against("rear"),
+        sensor_left_m=value_of(theta, "sensor_left_m"),
+        gyro_yaw_rad=value_of(theta, "gyro_yaw_rad"),
+        empty_left_m=value_of(theta, "empty_left_m"),
     )
 
 

@@ -1,0 +1,59 @@
+"""The most probable vehicle: its half-car, and where a roll rate was read, how it rolls."""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from gateway.calibration.half_car.known_spectra import KnownSpectra
+from gateway.calibration.half_car.prior import Prior
+from gateway.calibration.half_car.rolling_fit import fit_roll
+from gateway.core.cross_spectrum.likelihood import Curvature
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, has_roll, upright
+from gateway.core.cross_spectrum.search import Found, most_probable
+from gateway.records import F64
+
+TURNS: Final = 2
+
+
+def fit_vehicle(
+    known: Sequence[KnownSpectra], prior: Prior, starts: Sequence[F64], step: Callable[[], None] = lambda: None
+) -> Found:
+    """The most probable parameters (n,) of all known runs together, of what is found from each of ``starts`` (n,).
+
+    ``step`` is called after each. For how half-car and roll take turns, see rolling_fit.
+    """
+    tried = []
+    for start in starts:
+        tried.append(fit_half_car(seen_by(known, start), prior.upright, upright(start)))
+        step()
+    found = min(tried, key=lambda one: one.cost)
+    if not has_roll(prior.mean):
+        return found
+    rolling = fit_roll(known, found, prior.roll, starts[0][len(PARAMETERS) :])
+    for _ in range(TURNS - 1):
+        found = fit_half_car(seen_by(known, rolling.x), prior.upright, found.x)
+        rolling = fit_roll(known, found, prior.roll, rolling.x[len(PARAMETERS) :])
+    return rolling
+
+
+def seen_by(known: Sequence[KnownSpectra], theta: F64) -> Sequence[KnownSpectra]:
+    """The runs as a half-car is held against them: from the centre line, if theta (n,) knows how the vehicle rolls."""
+    return [one.brought(theta) for one in known] if has_roll(theta) else known
+
+
+def fit_half_car(known: Sequence[KnownSpectra], prior: Prior, start: F64) -> Found:
+    """The most probable half-car (p,) of all known runs together, found from ``start`` (p,)."""
+    everything = range(len(PARAMETERS))
+
+    def cost(theta: F64) -> float:
+        return sum(k.whittle.cost(k.at(theta)) for k in known)
+
+    def curvature(theta: F64) -> Curvature:
+        parts = [k.whittle.curvature(k.at(theta), everything) for k in known]
+        return Curvature(
+            gradient=np.sum([part.gradient for part in parts], axis=0),
+            information=np.sum([part.information for part in parts], axis=0),
+        )
+
+    return most_probable(start, prior.mean, np.diag(prior.std**-2.0), cost, curvature, tolerance=0.05)

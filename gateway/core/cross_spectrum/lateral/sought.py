@@ -1,0 +1,97 @@
+"""Where the load lies to the side: what roll tells once payload and front share are known.
+
+A load off the centre line makes the body roll as it heaves, and heave as it rolls. Held against the likelihood of all
+three sensors with all else as the two others have it, this has one answer. What of roll has other causes, the tracks'
+own difference and how the payload is spread, is left free. The half-car's parameters are not: where the model of roll
+errs, it must not move the weight.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.core.cross_spectrum.drift import DRIFTING
+from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
+from gateway.core.cross_spectrum.model.parameters import INDEX
+from gateway.core.cross_spectrum.search import Found, most_probable
+from gateway.records import F64
+
+ROLL_BAND_HZ: Final = (1.1, 5.0)
+"""Where the body rolls on its springs; above it wheels, axles and seats do things that no model here knows."""
+
+CG_LEFT_STD_M: Final = 0.1  # of all that is sprung: a third of an empty mass 0.3 m off the centre line is 0.075
+FREE_STD: Final = {"twist_level": 0.3, "tracks_apart_m": 0.2, "payload_roll_gyration_m2": 0.5}
+"""What another road and another load have of their own, standard deviations of logarithms."""
+
+FREE: Final = [INDEX[name] for name in FREE_STD]
+
+
+@dataclass(frozen=True, slots=True)
+class Sideways:
+    """The centre of gravity's place left of the centre line, with its variance; not yet inflated.
+
+    moves_with_load (2,) is by how much it moves with payload (kg) and front share (0..1).
+    """
+
+    cg_left_m: float
+    variance: float
+    moves_with_load: F64
+    misfit: float
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """What a search found of FREE and the place, with the covariance; the place is its last."""
+
+    found: Found
+
+    @property
+    def cg_left_m(self) -> float:
+        """Metres left of the centre line."""
+        return float(self.found.x[-1])
+
+
+def sought_sideways(rolling: Whittle, point: Point) -> Place:
+    """The most probable place under the payload and front share of ``point``; its own place is where to begin.
+
+    ``rolling`` is the likelihood of all three sensors.
+    """
+
+    def cost(x: F64) -> float:
+        return rolling.cost(_at(point, x))
+
+    def curvature(x: F64) -> Curvature:
+        there = _at(point, x)
+        return rolling.curvature(there, _free(there))
+
+    usual = point.theta[FREE]
+    precision = np.diag(np.r_[list(FREE_STD.values()), CG_LEFT_STD_M] ** -2.0)
+    return Place(
+        most_probable(np.r_[usual, point.cg_left_m], np.r_[usual, 0.0], precision, cost, curvature, tolerance=0.01)
+    )
+
+
+def told_sideways(rolling: Whittle, place: Place, point: Point, covariance: F64) -> Sideways:
+    """How sure the place is; ``covariance`` (n, n) is that of theta in calibration."""
+    there, n, found = _at(point, place.found.x), len(point.theta), place.found
+    information = rolling.curvature(there, range(n + 3)).information
+    moves = -found.covariance[-1] @ information[_free(there)]
+    others = [i for i in range(n) if i not in FREE and i not in DRIFTING]
+    left_open = float(moves[others] @ covariance[np.ix_(others, others)] @ moves[others])
+    return Sideways(
+        cg_left_m=place.cg_left_m,
+        variance=float(found.covariance[-1, -1]) + left_open,
+        moves_with_load=moves[n : n + 2],
+        misfit=rolling.misfit(there),
+    )
+
+
+def _at(point: Point, x: F64) -> Point:
+    theta = point.theta.copy()
+    theta[FREE] = x[:-1]
+    return Point(theta, point.payload_kg, point.front_share, float(x[-1]))
+
+
+def _free(point: Point) -> list[int]:
+    return [*FREE, len(point.theta) + 2]

@@ -1,0 +1,146 @@
+"""A vehicle on a road: its responses to each axle, and what segments see of them at their speed and amplitude.
+
+Three things make groups differ that carry the same load:
+
+- speed, by the delay of the rear axle, and by the tracks: axles whose wheels do not run in one track, and the two
+  tracks of one axle, meet roads that resemble each other the less the shorter the waves are;
+- how much the vehicle moves, by the friction of its axles;
+- sensor noise, which is the same on every road, so that it counts for more on a smooth one.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import k1
+
+from gateway.core.cross_spectrum.measured import CrossSpectra
+from gateway.core.cross_spectrum.model.friction import at_levels, level_weights
+from gateway.core.cross_spectrum.model.half_car import frequency_response
+from gateway.core.cross_spectrum.model.parameters import (
+    SLACK_KNOTS,
+    Ground,
+    half_car,
+    has_roll,
+    rolling_car,
+    slack_weights,
+    value_of,
+)
+from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_response
+from gateway.records import C128, F64
+
+SLACK_FLOOR: Final = 0.01
+_NOISES: Final = ("noise_acceleration_m2ps3", "noise_pitch_rate_rad2ps", "noise_roll_rate_rad2ps")
+
+Paths = tuple[C128, ...]
+"""Responses (p, ..., m) of p sensors by front and rear axle, both tracks alike; then one against the other."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpectralModel:
+    """Vehicles theta (..., n) with their loads, solved but not yet driven at any speed.
+
+    ``paths`` (p, ..., 3, m) are to a unit of road under one axle, at three amplitudes of movement; slack (p, ..., m) is
+    a share of each sensor's power, noise (p, ..., 1) a density in the square of the sensor's unit per hertz.
+    tracks_apart_m and twist_level are None for a vehicle that does not roll.
+    """
+
+    paths: Paths
+    slack: F64
+    noise: F64
+    track_offset_m: F64
+    delay_scale: F64
+    rear_lag_s: F64
+    wheelbase_m: float
+    tracks_apart_m: F64 | None = None
+    twist_level: F64 | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """What groups see: responses (p, ..., b, m); the rear axle's phase times its coherence with the front's; and the
+    power of what the tracks do against each other over what they do together (None: no roll).
+    """
+
+    paths: Paths
+    phase: C128
+    twist: F64 | None
+
+
+def spectral_model(
+    theta: F64,
+    load: tuple[F64 | float, ...],
+    ground: Ground,
+    freq_hz: F64,
+    n_sensors: int = 2,
+) -> SpectralModel:
+    """Solve for parameter vectors theta (..., n) and loads at freq_hz (m,), for the first ``n_sensors`` sensors.
+
+    ``load`` is payload in kg, front share (0..1) and, for a vehicle that rolls, the centre of gravity's place left of
+    the centre line in m, each (...,).
+    """
+    with_roll = has_roll(theta)
+    return SpectralModel(
+        paths=responses(theta, load, ground, freq_hz, n_sensors),
+        slack=np.stack([_slack(theta, knots, freq_hz) for knots in SLACK_KNOTS[:n_sensors]]),
+        noise=np.stack([value_of(theta, name) for name in _NOISES[:n_sensors]]),
+        track_offset_m=value_of(theta, "track_offset_m"),
+        delay_scale=value_of(theta, "delay_scale"),
+        rear_lag_s=value_of(theta, "rear_lag_s"),
+        wheelbase_m=ground.wheelbase_m,
+        tracks_apart_m=value_of(theta, "tracks_apart_m") if with_roll else None,
+        twist_level=value_of(theta, "twist_level") if with_roll else None,
+    )
+
+
+def responses(theta: F64, load: tuple[F64 | float, ...], ground: Ground, freq_hz: F64, n_sensors: int) -> Paths:
+    """Responses (p, ..., 3, m) by front and rear axle, at each of friction.LEVELS."""
+    acting = at_levels(theta)
+    payload_kg, front_share, *cg_left_m = (np.asarray(one)[..., None, None] for one in load)
+    if not has_roll(theta):
+        r = frequency_response(half_car(acting, ground), payload_kg, front_share, freq_hz)
+        return (
+            np.stack([r.acceleration_front, r.pitch_rate_front]),
+            np.stack([r.acceleration_rear, r.pitch_rate_rear]),
+        )
+    rolling = rolling_response(
+        rolling_car(acting, ground), SidewaysLoad(payload_kg, front_share, cg_left_m[0]), freq_hz
+    )
+    every = (rolling.together_front, rolling.together_rear, rolling.against_front, rolling.against_rear)
+    return tuple(one[:n_sensors] for one in every)
+
+
+def driven(model: SpectralModel, spectra: CrossSpectra) -> Driven:
+    """The model as the groups of ``spectra`` drive."""
+    weights = level_weights(spectra.log_amplitude)
+    later_s = spectra.delay_s * model.delay_scale[..., None, :] + model.rear_lag_s[..., None, :]
+    phase = spectra.delay_phase * np.exp(-2j * np.pi * spectra.freq_hz * later_s)
+    x = along(model.track_offset_m, model, spectra)
+    return Driven(tuple(weights @ path for path in model.paths), phase * (x * k1(x)), _twist(model, spectra))
+
+
+def along(apart_m: F64, model: SpectralModel, spectra: CrossSpectra) -> F64:
+    """2 pi n d (..., b, m), wavenumber n = f/v times the distance d (..., 1) between two tracks.
+
+    On a road that is alike in all directions, of displacement density n^-2, two parallel tracks have
+    the coherence x K1(x) (K. M. A. Kamash and J. D. Robson, J. Sound Vib. 57, 1978).
+    """
+    per_metre = spectra.freq_hz * spectra.delay_s / model.wheelbase_m
+    x: F64 = 2.0 * np.pi * per_metre * apart_m[..., None, :]
+    return x
+
+
+def _twist(model: SpectralModel, spectra: CrossSpectra) -> F64 | None:
+    """(1 - c) / (1 + c) with c the coherence of left and right, times the level."""
+    if model.tracks_apart_m is None or model.twist_level is None:
+        return None
+    x = along(model.tracks_apart_m, model, spectra)
+    coherence = x * k1(x)
+    twist: F64 = model.twist_level[..., None, :] * (1.0 - coherence) / (1.0 + coherence)
+    return twist
+
+
+def _slack(theta: F64, knots: range, freq_hz: F64) -> F64:
+    """Slack (..., m) of one sensor: log-linear between its knots, above a floor."""
+    slack: F64 = SLACK_FLOOR + np.exp(theta[..., knots.start : knots.stop] @ slack_weights(freq_hz))
+    return slack

@@ -1,0 +1,79 @@
+"""Spectral matrices of p sensors: Hermitian, as their diagonals and what is below these."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.records import C128, F64
+
+PAIRS: Final = ((1, 0), (2, 0), (2, 1))
+"""Which sensor against the conjugate of which: pitch rate and acceleration; roll rate and each of these."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpectralMatrix:
+    """auto (p, ..., m) and cross (p (p - 1) / 2, ..., m), the latter of as many of PAIRS."""
+
+    auto: F64
+    cross: C128
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Of the sensors, those that ``cross`` holds."""
+        return PAIRS[: len(self.cross)]
+
+    @classmethod
+    def zeros(cls, n_sensors: int, shape: tuple[int, ...]) -> "SpectralMatrix":
+        """Nothing, to be filled in."""
+        n_pairs = n_sensors * (n_sensors - 1) // 2
+        return cls(np.zeros((n_sensors, *shape)), np.zeros((n_pairs, *shape), np.complex128))
+
+
+@dataclass(frozen=True, slots=True)
+class Whitener:
+    """M = L L^H by its pivots: L is unit lower triangular times diag(roots).
+
+    roots (p, ..., m); below (p (p - 1) / 2, ..., m) holds what of earlier rows is in later ones, by PAIRS.
+    """
+
+    roots: F64
+    below: C128
+
+    @classmethod
+    def of(cls, matrix: SpectralMatrix) -> "Whitener":
+        """Of a positive definite matrix; pivots that vanish by rounding are kept off zero."""
+        auto, cross = matrix.auto, matrix.cross
+        below = np.empty_like(cross)
+        pivots = [auto[0]]
+        below[0] = cross[0] / pivots[0]
+        pivots.append(_kept_off_zero(auto[1] - np.abs(below[0]) ** 2 * pivots[0], auto[1]))
+        if len(auto) > 2:
+            below[1] = cross[1] / pivots[0]
+            below[2] = (cross[2] - below[1] * np.conj(cross[0])) / pivots[1]
+            left = auto[2] - np.abs(below[1]) ** 2 * pivots[0] - np.abs(below[2]) ** 2 * pivots[1]
+            pivots.append(_kept_off_zero(left, auto[2]))
+        return cls(np.sqrt(np.stack(pivots)), below)
+
+    def __call__(self, matrix: SpectralMatrix) -> SpectralMatrix:
+        """L^-1 X L^-H of matrices X whose arrays are (p, ..., m) as the whitener's or (p, k, ..., m)."""
+        auto, cross = matrix.auto, matrix.cross
+        below, root = self.below, self.roots
+        lower = cross[0] - below[0] * auto[0]
+        second = auto[1] - 2.0 * np.real(cross[0] * np.conj(below[0])) + np.abs(below[0]) ** 2 * auto[0]
+        whitened_auto = [auto[0] / root[0] ** 2, second / root[1] ** 2]
+        whitened_cross = [lower / (root[0] * root[1])]
+        if len(auto) > 2:
+            last_first = cross[1] - below[1] * auto[0] - below[2] * lower
+            unmixed = cross[2] - cross[1] * np.conj(below[0])
+            last_second = unmixed - below[1] * np.conj(lower) - below[2] * second
+            last = np.conj(below[1]) * cross[1] + np.conj(below[2]) * unmixed
+            last += below[1] * np.conj(last_first) + below[2] * np.conj(last_second)
+            whitened_auto.append((auto[2] - last.real) / root[2] ** 2)
+            whitened_cross += [last_first / (root[2] * root[0]), last_second / (root[2] * root[1])]
+        return SpectralMatrix(np.stack(whitened_auto), np.stack(whitened_cross))
+
+
+def _kept_off_zero(pivot: F64, auto: F64) -> F64:
+    kept: F64 = np.maximum(pivot, 1e-12 * auto)
+    return kept
