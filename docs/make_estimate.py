@@ -71,10 +71,11 @@ DIAGNOSTICS: Final = {
     "front_share_drift_std_pct": "the same of the front share",
     "payload_own_std_kg": "part of `payload_std_kg` that this batch shares with no other of the load",
     "front_share_own_std_pct": "the same of the front share",
-    "tension": "how far the vehicle lies off its calibration: chi-squared of four; refused above 23.5",
+    "tension": "how far the vehicle lies off its calibration: chi-squared of five; refused above 25.7",
     "sensor_position_score": "pull to another place or gain of the sensor, in standard deviations; refused beyond 6",
     "sensor_noise_score": "pull towards more noise in the acceleration, as roll makes it, likewise; refused above 6",
     "payload_mode_hz": "frequency at which the payload rings on its floor",
+    "payload_damping_ratio": "how much its floor or mount damps that, of critical",
     "delay_s": "mean time from axle to axle",
     "delay_std_s": "its standard deviation over the segments",
 }

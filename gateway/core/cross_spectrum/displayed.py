@@ -37,6 +37,7 @@ class Fitted:
     damper_rear_ratio: float = 1.0
     delay_scale: float | None = None
     payload_mode_hz: float | None = None
+    payload_damping_ratio: float | None = None
     amplitude_ratio: float = 1.0
     cg_left_m: float = 0.0
 
@@ -68,6 +69,8 @@ def _parameters(calibration: CrossSpectrumCalibration, fitted: Fitted) -> F64:
         theta[INDEX["delay_scale"]] = fitted.delay_scale
     if fitted.payload_mode_hz is not None:
         theta[INDEX["payload_mode_hz"]] = np.log(fitted.payload_mode_hz)
+    if fitted.payload_damping_ratio is not None:
+        theta[INDEX["payload_damping_ratio"]] = np.log(fitted.payload_damping_ratio)
     return theta
 
 

@@ -116,6 +116,7 @@ def _judged(
         "sensor_position_score": located.scores.position,
         "sensor_noise_score": located.scores.noise,
         "payload_mode_hz": math.exp(located.point.theta[INDEX["payload_mode_hz"]]),
+        "payload_damping_ratio": math.exp(located.point.theta[INDEX["payload_damping_ratio"]]),
         "delay_s": spectra.delay_mean_s,
         "delay_std_s": spectra.delay_std_s,
     }

@@ -11,6 +11,7 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import cross_spectra_of
+from gateway.core.cross_spectrum.model.parameters import upright
 from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64, Spectra
@@ -49,8 +50,8 @@ def fits_of(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration) -> 
             cross.delay_std_s,
             amplitude_ratio=math.exp(cross.log_amplitude_mean),
         )
-        point = Point.of(calibration.parameters, run.load)
-        misfit = Whittle(cross, calibration.ground).misfit(point)
+        point = Point.of(upright(calibration.parameters), run.load)
+        misfit = Whittle(cross.without_roll, calibration.ground).misfit(point)
         fits.append(Fit(run, measured, modelled_spectra(measured, calibration, at_truth), misfit))
     return fits
 

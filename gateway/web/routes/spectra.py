@@ -112,7 +112,9 @@ def _fitted(heard: Estimate, wheelbase_m: float) -> Fitted | None:
         damper_rear_ratio=told.get("damper_rear_ratio") or 1.0,
         delay_scale=told.get("delay_scale"),
         payload_mode_hz=told.get("payload_mode_hz"),
+        payload_damping_ratio=told.get("payload_damping_ratio"),
         amplitude_ratio=told.get("amplitude_ratio") or 1.0,
+        cg_left_m=heard.cg_left.number if math.isfinite(heard.cg_left.number) else 0.0,
     )
 
 
