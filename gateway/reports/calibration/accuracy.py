@@ -1,6 +1,6 @@
 """Estimates against the truth: charts of errors, of residuals and of how often intervals hold."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -42,11 +42,26 @@ def accuracy_section(judgement: Judgement) -> Section:
     return Section(
         f"accuracy-{judgement.estimator.replace('_', '-')}",
         f"Accuracy of the {name}",
-        tuple(PART_TEXT[part] for part in judgement.tables),
+        (*(PART_TEXT[part] for part in judgement.tables), *_sideways(judgement)),
         tuple(chart for chart in charts if chart is not None),
         (summary_table(judgement),),
         (("Errors run by run", tables), ("Every batch", batches)),
     )
+
+
+def _sideways(judgement: Judgement) -> Iterator[str]:
+    """A sentence for every set in which places beside the centre line were noted and answered."""
+    for part, table in judgement.tables.items():
+        found = table.errors.cg_left
+        if found is None or found.mean_abs_m is None:
+            continue
+        wheels = table.errors.wheels
+        of_wheels = wheels.mean_abs_pct_of_gross if wheels else None
+        yield (
+            f"To the side, {PART_NAMES[part]}: the centre of gravity's place beside the centre line errs by "
+            f"{1000.0 * found.mean_abs_m:.0f} mm on average, and its 95 % intervals held in {percent(found.coverage95)}"
+            + ("." if of_wheels is None else f"; a wheel's load errs by {of_wheels:.1f} % of the gross weight.")
+        )
 
 
 def _has_answers(judgement: Judgement, target: Target) -> bool:

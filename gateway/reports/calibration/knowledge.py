@@ -1,4 +1,4 @@
-"""What the data could tell of each parameter of the half-car, and what they could not."""
+"""What the data could tell of each parameter of the half-car and of how it rolls, and what they could not."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 
 from gateway.calibration.half_car import prior_of
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, is_positive
+from gateway.core.cross_spectrum.model.parameters import ROLL_PARAMETERS, has_roll, is_positive, names_of
 from gateway.core.vehicle import Vehicle
 from gateway.reports.charts import Axis, Chart, Panel, Points, Rule, Table
 
@@ -29,11 +29,11 @@ class Known:
 
 def knowledge_of(calibration: CrossSpectrumCalibration, vehicle: Vehicle) -> list[Known]:
     """What calibration made of the prior, in the order of the parameters."""
-    prior, stds = prior_of(vehicle), np.sqrt(np.diag(calibration.covariance))
+    theta = calibration.parameters
+    prior, stds = prior_of(vehicle, with_roll=has_roll(theta)), np.sqrt(np.diag(calibration.covariance))
     known = []
-    for name in PARAMETERS:
-        i = INDEX[name]
-        before, after, std = float(prior.mean[i]), float(calibration.parameters[i]), float(stds[i])
+    for i, name in enumerate(names_of(theta)):
+        before, after, std = float(prior.mean[i]), float(theta[i]), float(stds[i])
         if is_positive(name):
             before, after, spread = float(np.exp(before)), float(np.exp(after)), f"{100.0 * std:.1f} %"
         else:
@@ -56,8 +56,10 @@ def told(known: Sequence[Known]) -> str:
 
 def knowledge_chart(known: Sequence[Known]) -> Chart:
     """Standard deviations left over, parameter by parameter."""
+    plain = [one for one in known if not one.is_slack and "_bend_" not in one.name]
     groups = (
-        ("vehicle", [one for one in known if not one.is_slack and "_bend_" not in one.name]),
+        ("vehicle", [one for one in plain if one.name not in ROLL_PARAMETERS]),
+        ("roll", [one for one in plain if one.name in ROLL_PARAMETERS]),
         ("bends of spring rates", [one for one in known if "_bend_" in one.name]),
         ("slack", [one for one in known if one.is_slack]),
     )
@@ -66,7 +68,7 @@ def knowledge_chart(known: Sequence[Known]) -> Chart:
         "identifiability",
         "Standard deviation of every parameter after calibration, in percent of what it was before. Left: the data "
         "told it; at 100 % they said nothing and the prior stands. Slack: power of a "
-        "sensor (acceleration a, pitch rate g) that does not come through the modelled path.",
+        "sensor (acceleration a, pitch rate g, roll rate r) that does not come through the modelled path.",
         "Identifiability: share of the prior standard deviation left over after calibration, parameter by parameter.",
         panels,
         most_columns=3,
@@ -84,10 +86,12 @@ def _panel(title: str, members: Sequence[Known]) -> Panel:
 def _short(name: str) -> str:
     stem, _, unit = name.rpartition("_")
     plain = (stem if unit in _UNITS else name).replace("spring_bend_", "").replace("_per", "").replace("slack_", "")
-    return plain.replace("acceleration_", "a ").replace("pitch_rate_", "g ").replace("_", " ")
+    for sensor, letter in (("acceleration_", "a "), ("pitch_rate_", "g "), ("roll_rate_", "r ")):
+        plain = plain.replace(sensor, letter)
+    return plain.replace("_", " ")
 
 
-_UNITS: Final = {"npm", "nspm", "kg", "kgm2", "m2", "m", "kn", "s"}
+_UNITS: Final = {"npm", "nspm", "kg", "kgm2", "m2", "m", "kn", "s", "rad"}
 
 
 def knowledge_table(known: Sequence[Known]) -> Table:
@@ -98,4 +102,4 @@ def knowledge_table(known: Sequence[Known]) -> Table:
         if not one.is_slack
     )
     columns = ("Parameter", "before", "after", "standard deviation", "of the prior's")
-    return Table("Parameters of the half-car, in the unit that ends their name", columns, rows)
+    return Table("Parameters of the vehicle, in the unit that ends their name", columns, rows)
