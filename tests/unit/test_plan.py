@@ -5,14 +5,16 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.linalg import block_diag
 from support.calibrated import calibration_file
 from support.half_car_road import VAN
 from support.known_runs import split_run
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.half_car import CrossSpectrumFit, calibrate_cross_spectrum
+from gateway.calibration.half_car import CrossSpectrumFit, calibrate_cross_spectrum, prior_of
 from gateway.calibration.inspection import Inspection, RunVerdict
 from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, usual_drive
 from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
@@ -81,6 +83,18 @@ def test_after_two_runs_a_heavy_load_comes_next(outcome: Outcome) -> None:
     assert first.payload_std_kg < least.payload_std_kg <= plan.now.payload_std_kg * 1.001
     assert plan.drive.speed_mps == pytest.approx(14.0)
     assert plan.drive.duration_s == pytest.approx(200.0, rel=0.01)
+
+
+def test_what_is_known_of_roll_changes_no_plan(outcome: Outcome) -> None:
+    assert outcome.cross_spectrum is not None
+    known = outcome.cross_spectrum.calibration
+    roll = prior_of(replace(VAN, track_width_m=1.5), with_roll=True).roll
+    rolling = replace(
+        known,
+        parameters=np.r_[known.parameters, roll.mean],
+        covariance=block_diag(known.covariance, np.diag(roll.std**2)),
+    )
+    assert plan_next(replace(outcome, cross_spectrum=CrossSpectrumFit(rolling, {})), VAN) == plan_next(outcome, VAN)
 
 
 def test_a_plan_is_told_in_sentences_and_in_numbers(outcome: Outcome) -> None:

@@ -20,6 +20,7 @@ from gateway.calibration.plan.design import Design
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
 from gateway.calibration.plan.sideways import SidewaysLoad, sideways_load
 from gateway.core.cross_spectrum.ideal_drive import Drive
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
@@ -120,14 +121,15 @@ def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadP
     drive = usual_drive(runs)
     inflation = known.payload_inflation, known.front_share_inflation
     planner = _Planner(vehicle, known.parameters, drive, inflation)
+    of_half_car = known.covariance[: len(PARAMETERS), : len(PARAMETERS)]  # what was learned of roll weighs no load
     driven = tuple(PlacedLoad(run.payload_kg, None, run.front_share_pct) for run in runs)
     return LoadPlan(
         vehicle=vehicle.name,
         n_driven=len(runs),
         drive=drive,
-        now=planner.expected(known.covariance, driven),
-        advice=planner.advice(known.covariance, driven, n_runs),
-        least=planner.least(known.covariance, driven),
+        now=planner.expected(of_half_car, driven),
+        advice=planner.advice(of_half_car, driven, n_runs),
+        least=planner.least(of_half_car, driven),
         sideways=sideways_load(runs, vehicle),
     )
 
