@@ -45,8 +45,8 @@ class Constant:
 
 CONSTANTS: Final = (
     Constant(
-        "EVIDENCE_WEIGHT", "gateway.calibration.half_car.known_spectra", Acts.IN_CALIBRATION,
-        "how much of their evidence known drives keep beside the priors",
+        "EVIDENCE_WEIGHT", "gateway.core.cross_spectrum.likelihood", Acts.IN_CALIBRATION,
+        "how much of their evidence drives keep beside what is known beforehand",
     ),
     Constant(
         "N_SEGMENT", "gateway.calibration.half_car.known_spectra", Acts.IN_CALIBRATION,

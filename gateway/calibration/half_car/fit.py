@@ -35,7 +35,7 @@ from gateway.records import F64
 LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
 MISFIT_MARGIN: Final = 3.0
 SCORE_MARGIN: Final = 1.5
-"""For other roads and loads than those of calibration. Chosen; docs/sensitivity.md says what hangs on both."""
+"""For other roads and loads than those of calibration. Chosen; `benchmarks.accuracy sensitivity` tells what they do."""
 SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
 UNTESTED: Final = "intervals_untested"
 

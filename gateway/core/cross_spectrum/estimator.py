@@ -32,7 +32,7 @@ COHERENCE_BAND_HZ: Final = (1.4, 4.5)
 LEAST_COHERENCE: Final = 0.2
 LEAST_POWER_SHARE: Final = 0.05  # of the calibrated amplitude
 MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
-# chosen, both; docs/sensitivity.md says what hangs on them
+# chosen, both; `benchmarks.accuracy sensitivity` tells what hangs on them
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
 UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed

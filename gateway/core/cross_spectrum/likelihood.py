@@ -28,9 +28,9 @@ from gateway.core.vehicle import Load
 from gateway.records import F64
 
 EFFECTIVE_SHARE: Final = 0.5  # neighbouring Hann bins and half-overlapping segments repeat each other
-ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen, as docs/sensitivity.md shows
+ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen (`benchmarks.accuracy sensitivity`)
 ROAD_SLOPE_STD: Final = 0.3
-EVIDENCE_WEIGHT: Final = 0.2  # minutes of driving repeat the same model error; chosen, as docs/sensitivity.md shows
+EVIDENCE_WEIGHT: Final = 0.2  # minutes of driving repeat the same model error; chosen likewise
 
 
 @dataclass(frozen=True, slots=True)
