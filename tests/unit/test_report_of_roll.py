@@ -4,13 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.estimates import make_estimate
 from support.half_car_road import VAN
 
 from gateway.calibration.half_car import prior_of
-from gateway.calibration.judgement import CgLeftErrors, Errors, ErrorTable, Judgement, Part, TargetErrors, WheelErrors
+from gateway.calibration.judgement import (
+    CgLeftErrors,
+    Errors,
+    ErrorTable,
+    Judged,
+    Judgement,
+    Part,
+    TargetErrors,
+    WheelErrors,
+)
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS, has_roll, names_of
-from gateway.records import F64
+from gateway.estimate import Quantity
+from gateway.records import F64, Why
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.knowledge import knowledge_chart, knowledge_of, knowledge_table, told
 
@@ -66,16 +77,18 @@ def test_a_calibration_without_a_roll_rate_says_nothing_of_roll() -> None:
 
 
 def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgement:
-    """One set in which no weight was answered."""
+    """One set: a place answered to a noted one, one to a load that nobody placed, and no weight."""
     none = TargetErrors("kg", None, None, None, None, None, None, None, None, None, None)
     errors = Errors(0, 0, {}, none, replace(none, unit="pp"), cg_left, wheels)
-    return Judgement("cross_spectrum", {Part.VALIDATION: ErrorTable("cross_spectrum", (), errors, ())})
+    told = replace(make_estimate(0, Why.TOO_SLOW), cg_left=Quantity.normal(0.01, 0.02))
+    batches = (Judged(1, "1.log", 0.0, 52.0, told, 0.0), Judged(2, "2.log", 100.0, 50.0, told))
+    return Judgement("cross_spectrum", {Part.VALIDATION: ErrorTable("cross_spectrum", batches, errors, ())})
 
 
 def test_how_well_places_to_the_side_were_told_stands_with_the_accuracy() -> None:
     found = CgLeftErrors(mean_abs_m=0.0123, bias_m=0.0, std_m=0.02, max_abs_m=0.03, coverage95=0.9)
     (sentence,) = accuracy_section(judged(found, WheelErrors(1.26, 2.0))).paragraphs[1:]
-    assert "12 mm" in sentence
+    assert "12 mm on average over 1 answer " in sentence
     assert "90 %" in sentence
     assert "1.3 % of the gross weight" in sentence
     (sentence,) = accuracy_section(judged(found, None)).paragraphs[1:]

@@ -23,6 +23,7 @@ from gateway.records import F64
 from gateway.reports.calibration.error_tables import batches_table, runs_table, summary_table
 from gateway.reports.calibration.text import decimal, estimator_name, percent
 from gateway.reports.charts import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
+from gateway.words import counted
 
 _MARKERS: Final[Mapping[Part, Marker]] = {Part.LEFT_OUT: "circle", Part.VALIDATION: "diamond"}
 _COLOURS: Final[Mapping[Part, int]] = {Part.LEFT_OUT: 0, Part.VALIDATION: 1, Part.IDENTIFICATION: 3, Part.ALL: 0}
@@ -57,9 +58,11 @@ def _sideways(judgement: Judgement) -> Iterator[str]:
             continue
         wheels = table.errors.wheels
         of_wheels = wheels.mean_abs_pct_of_gross if wheels else None
+        n_told = sum(bool(np.isfinite(one.cg_left[:2]).all()) for one in table.judged)
         yield (
             f"To the side, {PART_NAMES[part]}: the centre of gravity's place beside the centre line errs by "
-            f"{1000.0 * found.mean_abs_m:.0f} mm on average, and its 95 % intervals held in {percent(found.coverage95)}"
+            f"{1000.0 * found.mean_abs_m:.0f} mm on average over {counted(n_told, 'answer')} to a load whose place was "
+            f"noted, and its 95 % intervals held in {percent(found.coverage95)}"
             + ("." if of_wheels is None else f"; a wheel's load errs by {of_wheels:.1f} % of the gross weight.")
         )
 
