@@ -1,0 +1,66 @@
+"""The third gyro axis on recorded drives: calibrated with a roll rate, what is promised of loads that lie sideways.
+
+The bounds are promises to users, not fits: they may only ever be tightened.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from support.recordings import recordings
+
+from gateway.cli import springscale
+
+CROSS = ("--estimator", "cross_spectrum")
+QUANTITIES = ("payload", "front_share", "cg_left")
+
+
+def run(*arguments: str | Path) -> str:
+    found = CliRunner().invoke(springscale, [str(argument) for argument in arguments], catch_exceptions=False)
+    assert found.exit_code == 0, found.output
+    return found.stdout
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """On the identification parts of all ten known loads, none of which lies sideways."""
+    output = tmp_path_factory.mktemp("vehicle") / "vehicle.json"
+    run("calibrate", recordings() / "known_loads/campaign_roll.toml", "--output", output, "--json", *CROSS)
+    return output
+
+
+@pytest.mark.parametrize(
+    ("drives", "arguments", "n_batches", "payload_pct", "front_share_pct", "cg_left_m"),
+    [
+        ("known_loads", [], 10, 1.4, 0.6, None),
+        ("known_loads", ["--window-s", "60"], 50, 2.0, 1.2, None),
+        ("speeds", [], 15, 3.6, 1.3, None),
+        ("sideways", [], 10, 2.0, 0.8, 0.006),
+        ("mixed", [], 24, 3.6, 1.3, 0.007),
+    ],
+    ids=["known loads", "known loads by the minute", "speeds", "sideways", "mixed"],
+)
+def test_errors_stay_small_and_intervals_true(
+    calibration: Path,
+    drives: str,
+    arguments: list[str],
+    n_batches: int,
+    payload_pct: float,
+    front_share_pct: float,
+    cg_left_m: float | None,
+) -> None:
+    campaign = recordings() / drives / "campaign_roll.toml"
+    found: dict[str, Any] = json.loads(
+        run("evaluate", campaign, "--calibration", calibration, "--json", *CROSS, *arguments)
+    )
+    assert found["n_batches"] == n_batches
+    assert found["n_rejected"] <= 0.1 * n_batches
+    assert found["payload"]["mean_abs_pct"] <= payload_pct
+    assert found["front_share"]["mean_abs_pct"] <= front_share_pct
+    assert {
+        quantity: found[quantity]["coverage95"] for quantity in QUANTITIES if found[quantity]["coverage95"] < 0.9
+    } == {}
+    if cg_left_m is not None:
+        assert found["cg_left"]["mean_abs_m"] <= cg_left_m
