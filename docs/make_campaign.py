@@ -59,8 +59,10 @@ split = "validation"                  # takes no part in the fit
 RANGES = """\
 `payload_range_kg` and `front_share_range_pct` are what errors are stated in percent of (equation (12) of the paper) and
 what plans and the error over all loads keep within. No estimate is clipped to them. Limits on weights are for warnings
-(`/api/v1/weights/latest`) and for plans. A weight on the road needs unsprung masses or kerb axle weights; without
-either it is null.
+(`/api/v1/weights/latest`) and for plans. A weight on the road needs unsprung masses or kerb axle weights. Where
+neither is stated it takes the unsprung masses that the calibration of `cross_spectrum` found, is less sure by their
+standard deviation, and [says so](estimate.md#weights-on-the-road). Without such a calibration it is null. Plans check
+limits by stated figures alone.
 
 **To the side.** The centre line runs midway between left and right tyres; left is the driver's left. Measure the sensor
 with a tape, from a side wall or sill, and take half of the vehicle's width there. A sensor off the centre line feels

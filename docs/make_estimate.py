@@ -78,13 +78,15 @@ DIAGNOSTICS: Final = {
     "payload_damping_ratio": "how much its floor or mount damps that, of critical",
     "delay_s": "mean time from axle to axle",
     "delay_std_s": "its standard deviation over the segments",
+    "cg_left_own_std_m": "part of `cg_left_std_m` that this batch shares with no other; absent without a roll rate",
 }
 """What cross_spectrum says of its own; the ratio index says nothing."""
 
 LACKS: Final = {
     Lack.CALIBRATION: "nobody says what the vehicle weighs empty: no calibration is in use",
     Lack.ESTIMATE: "the batch was rejected, or the estimator does not tell the front share",
-    Lack.UNSPRUNG_MASS: "`[vehicle]` of the campaign states neither the axle's unsprung mass nor its kerb weight",
+    Lack.UNSPRUNG_MASS: "`[vehicle]` of the campaign states neither the axle's unsprung mass nor its kerb weight, and "
+    "the calibration has no part for cross_spectrum, which would have found it",
     Lack.TRACK_WIDTH: "`[vehicle]` of the campaign states no `track_width_m`",
     Lack.ROLL_RATE: "nothing tells where the load lies sideways: no roll rate, or a calibration without one",
 }
@@ -110,8 +112,9 @@ ON_THE_ROAD = """\
 
 `weights` holds one object for each of {places}.
 It has `kg` and `std_kg`, `limit_kg` as the campaign's `[vehicle]` has it (null: not stated), `is_over_limit` (this
-number is above it; warnings with hysteresis are at `/api/v1/weights/latest`), and `lacks`: null where the weight is
-known, else the first thing that is missing:
+number is above it; warnings with hysteresis are at `/api/v1/weights/latest`), `is_unsprung_estimated` (calibration
+found the unsprung mass in it, as nobody stated one; false where the weight is unknown), and `lacks`: null where the
+weight is known, else the first thing that is missing:
 
 | `lacks` | meaning |
 |---|---|
@@ -122,6 +125,11 @@ mass. Its wheels bear half of that each, and the left ones more, the right ones 
 of the whole about the centre line: `roll_share_front` of it at the front axle, the rest at the rear. Standard
 deviations are of first order in payload, front share, `cg_left_m` and `roll_share_front` with the correlations told
 above; the vehicle's empty figures count as exact.
+
+What is unsprung is, axle by axle, `unsprung_*_kg` as stated; else what `kerb_*_axle_kg` leaves beside the sprung mass
+on the axle; else what the calibration of cross_spectrum found, with its standard deviation. This one joins that of
+the weight as independent: payload and share have almost no part of their error in common with it. It is there in
+estimates by the ratio index too, where one file holds both.
 """
 
 CSV = """\

@@ -76,12 +76,16 @@ class Lack(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Weight:
-    """A weight on the road, its standard deviation and what it may be (None: nobody said); NaN where unknown."""
+    """A weight on the road, its standard deviation and what it may be (None: nobody said); NaN where unknown.
+
+    ``is_unsprung_estimated`` where calibration found the unsprung mass in it, since nobody stated one.
+    """
 
     kg: float = math.nan
     std_kg: float = math.nan
     limit_kg: float | None = None
     lacks: Lack | None = Lack.CALIBRATION
+    is_unsprung_estimated: bool = False
 
     @property
     def is_known(self) -> bool:

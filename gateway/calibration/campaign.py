@@ -82,7 +82,7 @@ class VehicleTable(_Table):
         0.0, description="centre of gravity of the empty vehicle, driver aboard, left of the centre line"
     )
     unsprung_front_kg: float | None = Field(
-        None, gt=0.0, description="front axle, wheels and brakes; taken as known to 10 %"
+        None, gt=0.0, description="front axle, wheels and brakes; taken as known to 10 %; absent: found by calibration"
     )
     unsprung_rear_kg: float | None = Field(None, gt=0.0, description="the same at the rear")
     kerb_front_axle_kg: float | None = Field(

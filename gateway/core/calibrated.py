@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
+from gateway.core.weights import NOT_CALIBRATED, Unsprung
 
 RANGE_MARGIN = 0.25  # of the span seen in calibration, at either end
 
@@ -19,6 +20,11 @@ class CalibratedVehicle:
     front_share_seen_pct: tuple[float, float]
     ratio_index: RatioIndexCalibration | None = None
     cross_spectrum: CrossSpectrumCalibration | None = None
+
+    @property
+    def unsprung(self) -> Unsprung:
+        """As known loads tell it; the ratio index tells nothing of it."""
+        return NOT_CALIBRATED if self.cross_spectrum is None else self.cross_spectrum.unsprung
 
     def is_out_of_range(self, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]) -> bool:
         """True where a 95 % interval lies wholly outside what calibration saw, plus a quarter of its span.

@@ -11,7 +11,7 @@ from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.core.stated_share import told
 from gateway.core.tare import Tare, Weighed, remembered, tared
-from gateway.core.weights import weighed
+from gateway.core.weights import NOT_CALIBRATED, weighed
 from gateway.estimate import Epoch, Estimate
 from gateway.records import Batch, Motion
 
@@ -79,8 +79,10 @@ class Flow:
 
     def _shown(self, found: Estimate) -> Estimate:
         """As it leaves: less the zero, with the weights that follow; epochs and tares are made of what was measured."""
-        vehicle = self._calibrated.vehicle if self._calibrated else None
-        return weighed(tared(told(found, vehicle), self.tare), vehicle)
+        vehicle, unsprung = None, NOT_CALIBRATED
+        if self._calibrated:
+            vehicle, unsprung = self._calibrated.vehicle, self._calibrated.unsprung
+        return weighed(tared(told(found, vehicle), self.tare), vehicle, unsprung)
 
     def _fused(self, batch: Batch, found: Estimate) -> Epoch | None:
         """The load epoch that this batch belongs to; a new drive or a long stop opens a new one."""

@@ -78,6 +78,7 @@ def _weight(weight: Weight) -> dict[str, Any]:
         "limit_kg": weight.limit_kg,
         "is_over_limit": weight.is_over_limit,
         "lacks": None if weight.lacks is None else str(weight.lacks),
+        "is_unsprung_estimated": weight.is_unsprung_estimated,
     }
 
 
@@ -87,7 +88,8 @@ def _weights_of(told: Mapping[str, Mapping[str, Any]]) -> Weights:
 
 def _weight_of(told: Mapping[str, Any]) -> Weight:
     kg, std_kg = (math.nan if told[name] is None else told[name] for name in ("kg", "std_kg"))
-    return Weight(kg, std_kg, told["limit_kg"], None if told["lacks"] is None else Lack(told["lacks"]))
+    lacks = None if told["lacks"] is None else Lack(told["lacks"])
+    return Weight(kg, std_kg, told["limit_kg"], lacks, told.get("is_unsprung_estimated", False))
 
 
 def _weight_cells(shown: Mapping[str, Mapping[str, Any]]) -> list[Any]:

@@ -30,6 +30,9 @@ class WeightFigure(BaseModel):
     limit_kg: float | None = Field(description="null: nobody said", examples=[2100.0])
     is_over_limit: bool = Field(examples=[False])
     lacks: Lack | None = Field(description="what it would need to be known; null: it is", examples=[None])
+    is_unsprung_estimated: bool = Field(
+        False, description="whether calibration found the unsprung mass in it: nobody stated one", examples=[False]
+    )
 
 
 class WeightFigures(BaseModel):

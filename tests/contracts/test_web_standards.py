@@ -63,7 +63,7 @@ def to_the_left(n: int) -> Estimate:
 def test_weights_are_told_with_deviation_limit_and_warning(gateway: Gateway) -> None:
     gateway.publish(loaded(0))
     told = client(gateway).get("/api/v1/weights/latest").json()
-    known = {"is_over_limit": False, "lacks": None}
+    known = {"is_over_limit": False, "lacks": None, "is_unsprung_estimated": False}
     assert told["gross"] == {"kg": 1540.0, "std_kg": 6.0, "limit_kg": 1545.0, **known}
     assert told["front_axle"] == {"kg": 760.0, "std_kg": 7.341, "limit_kg": 900.0, **known}
     assert told["rear_axle"]["limit_kg"] is None
@@ -74,6 +74,7 @@ def test_wheels_are_weighed_where_the_load_is_known_to_lie_sideways(gateway: Gat
     gateway.publish(loaded(0))
     told = client(gateway).get("/api/v1/weights/latest").json()
     unknown = {"kg": None, "std_kg": None, "limit_kg": 400.0, "is_over_limit": False, "lacks": "roll_rate"}
+    unknown["is_unsprung_estimated"] = False
     assert told["front_left"] == unknown
     assert (told["load"]["left_m"], told["load"]["left_std_m"]) == (None, None)
     gateway.publish(to_the_left(1))
@@ -108,6 +109,7 @@ def test_every_record_brings_its_weights_to_the_history(gateway: Gateway) -> Non
         "limit_kg": 400.0,
         "is_over_limit": True,
         "lacks": None,
+        "is_unsprung_estimated": False,
     }
     assert refusal["weights"]["gross"]["lacks"] == "calibration"
     assert (answer["cg_left_m"], answer["left_share_pct"]) == (0.05, 53.3)

@@ -17,7 +17,7 @@ from gateway.core.estimator import estimate
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import weighed
+from gateway.core.weights import Unsprung, weighed
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Batch, Why
@@ -119,6 +119,17 @@ def test_sideways_errors_by_hand() -> None:
     off_kg = np.array([0.6, 0.4]) * 1440.0 * np.array([[0.006], [0.02]]) / 1.5
     assert errors.wheels.mean_abs_pct_of_gross == pytest.approx(100.0 * np.mean(off_kg) / gross_kg)
     assert errors.wheels.max_abs_pct_of_gross == pytest.approx(100.0 * np.max(off_kg) / gross_kg)
+
+
+def test_wheels_are_judged_by_unsprung_masses_that_calibration_found() -> None:
+    unstated = replace(ROLLING, unsprung_front_kg=None, unsprung_rear_kg=None)
+    found = Unsprung(Quantity(60.0, 6.0), Quantity(100.0, 8.0), 0.7)  # as VAN states them: the same figures
+    stated = [placed(0.05, 0.056), placed(-0.03, -0.05)]
+    rows = [replace(one, unsprung=found, estimate=weighed(one.estimate, unstated, found)) for one in stated]
+    judged_by_found = errors_of(rows, unstated).wheels
+    assert judged_by_found is not None
+    assert judged_by_found == errors_of(stated, ROLLING).wheels
+    assert errors_of([replace(one, estimate=weighed(one.estimate, unstated)) for one in rows], unstated).wheels is None
 
 
 def test_without_a_place_that_was_noted_nothing_sideways_is_judged() -> None:

@@ -12,7 +12,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle, cg_left_m
-from gateway.core.weights import weighed
+from gateway.core.weights import NOT_CALIBRATED, Unsprung, weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.records import F64, Why
@@ -39,7 +39,8 @@ class Comparison(NamedTuple):
 class Judged:
     """One batch of a known run: what was estimated, and what was true.
 
-    cg_left_m is where the sprung mass had its centre of gravity left of the centre line, NaN where nobody noted it.
+    cg_left_m is where the sprung mass had its centre of gravity left of the centre line, NaN where nobody noted it;
+    unsprung is what calibration found.
     """
 
     run: int
@@ -48,6 +49,7 @@ class Judged:
     front_share_pct: float
     estimate: Estimate
     cg_left_m: float = nan
+    unsprung: Unsprung = NOT_CALIBRATED
 
     def compared(self, target: Target) -> Comparison:
         """One of the two quantities, truth and estimate."""
@@ -64,7 +66,7 @@ class Judged:
     @property
     def carried(self) -> Carried:
         """The truth of the whole load beside the estimate."""
-        return Carried(self.payload_kg, self.front_share_pct, self.cg_left_m, self.estimate)
+        return Carried(self.payload_kg, self.front_share_pct, self.cg_left_m, self.estimate, self.unsprung)
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,8 +248,9 @@ def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: st
             run.name,
             run.payload_kg,
             run.front_share_pct,
-            weighed(estimate(batch, calibrated, estimator), calibrated.vehicle),
+            weighed(estimate(batch, calibrated, estimator), calibrated.vehicle, calibrated.unsprung),
             _noted_cg_left_m(run, calibrated.vehicle),
+            calibrated.unsprung,
         )
         for run in runs
         for batch in run.batches

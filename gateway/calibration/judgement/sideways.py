@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import Sideways, weights_of
+from gateway.core.weights import Sideways, Unsprung, weights_of
 from gateway.estimate import Estimate, Quantity
 from gateway.records import F64
 
@@ -67,15 +67,17 @@ class Carried:
     front_share_pct: float
     cg_left_m: float
     estimate: Estimate
+    unsprung: Unsprung
 
     def wheels_off_pct(self, vehicle: Vehicle) -> F64:
         """(4,) errors of the wheels' loads in percent of the gross weight; NaN where either is unknown.
 
-        How the axles divide a sideways moment no campaign says: the truth takes it as the estimate does.
+        How the axles divide a sideways moment no campaign says, nor some what is unsprung: the truth takes both as the
+        estimate does, so that their errors are in neither.
         """
         known = replace(Sideways.of(self.estimate), cg_left=Quantity(self.cg_left_m, 0.0))
         share = Quantity(self.front_share_pct, 0.0)
-        true = weights_of(vehicle, Quantity(self.payload_kg, 0.0), share, sideways=known)
+        true = weights_of(vehicle, Quantity(self.payload_kg, 0.0), share, sideways=known, unsprung=self.unsprung)
         told = self.estimate.weights
         off_kg = [getattr(told, wheel).kg - getattr(true, wheel).kg for wheel in WHEELS]
         return np.array(off_kg) / true.gross.kg * 100.0

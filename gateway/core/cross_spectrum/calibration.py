@@ -3,9 +3,13 @@
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from gateway.core.cross_spectrum.measured import Reading
-from gateway.core.cross_spectrum.model.parameters import Ground, mount_of
+from gateway.core.cross_spectrum.model.parameters import INDEX, Ground, mount_of
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
+from gateway.core.weights import Unsprung
+from gateway.estimate import Quantity
 from gateway.records import F64
 
 SCORE: Final = 6.0  # six standard deviations are no chance; a calibration that shows more of its own allows more
@@ -58,6 +62,19 @@ class CrossSpectrumCalibration:
         """The vehicle as stated, in the core's terms."""
         share = self.empty_front_share_pct / 100.0
         return Ground(self.empty_mass_kg, share, self.wheelbase_m, self.track_width_m)
+
+    @property
+    def unsprung(self) -> Unsprung:
+        """Masses below the springs, and how sure they are. Their logarithms were fitted: of first order in these."""
+        entries = [INDEX["unsprung_front_kg"], INDEX["unsprung_rear_kg"]]
+        front_kg, rear_kg = (float(kg) for kg in np.exp(self.parameters[entries]))
+        covariance = self.covariance[np.ix_(entries, entries)]
+        front_std, rear_std = (float(std) for std in np.sqrt(np.diag(covariance)))
+        return Unsprung(
+            Quantity(front_kg, front_kg * front_std),
+            Quantity(rear_kg, rear_kg * rear_std),
+            float(covariance[0, 1]) / (front_std * rear_std) if front_std * rear_std else 0.0,
+        )
 
     @property
     def reading(self) -> Reading:

@@ -24,7 +24,7 @@ from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of,
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_std
-from gateway.core.fusion import FRONT_SHARE_OWN_STD_PCT, PAYLOAD_OWN_STD_KG
+from gateway.core.fusion import CG_LEFT_OWN_STD_M, FRONT_SHARE_OWN_STD_PCT, PAYLOAD_OWN_STD_KG
 from gateway.estimate import Estimate, Quantity
 from gateway.records import F64, Batch, Why
 
@@ -120,6 +120,8 @@ def _judged(
         "delay_s": spectra.delay_mean_s,
         "delay_std_s": spectra.delay_std_s,
     }
+    if located.sideways is not None:
+        diagnostics[CG_LEFT_OWN_STD_M] = math.sqrt(located.sideways.own_variance)
     why = _disbelieved(located, payload_std_kg, reach, calibration)
     if why is not None:
         return replace(blank, rejected=(why,), diagnostics=diagnostics)

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import Place, Sideways, is_over_limit, place_of, weighed
+from gateway.core.weights import NOT_CALIBRATED, Place, Sideways, is_over_limit, place_of, weighed
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.records import iso_utc
 from gateway.web.live.board import Board
@@ -52,10 +52,11 @@ class Scales:
 
     def __init__(self, calibrated: CalibratedVehicle | None) -> None:
         self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
+        self._unsprung = NOT_CALIBRATED if calibrated is None else calibrated.unsprung
 
     def weigh(self, estimate: Estimate | None) -> Weights:
         """By this vehicle's figures now, whatever an estimate brought along; None: before the first."""
-        return weighed(estimate or _NONE, self.vehicle).weights
+        return weighed(estimate or _NONE, self.vehicle, self._unsprung).weights
 
     def place(self, estimate: Estimate | None) -> Place | None:
         """Where its payload lies; None where that cannot be told."""
@@ -103,6 +104,7 @@ def _figure(now: Weight, history_kg: Sequence[float]) -> WeightFigure:
         limit_kg=now.limit_kg,
         is_over_limit=is_over_limit(history_kg, now.limit_kg),
         lacks=now.lacks,
+        is_unsprung_estimated=now.is_unsprung_estimated,
     )
 
 

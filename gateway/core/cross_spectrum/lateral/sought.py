@@ -31,11 +31,13 @@ FREE: Final = [INDEX[name] for name in FREE_STD]
 class Sideways:
     """The centre of gravity's place left of the centre line, with its variance; not yet inflated.
 
-    moves_with_load (2,) is by how much it moves with payload (kg) and front share (0..1).
+    own_variance is the batch's own part of it. moves_with_load (2,) is by how much it moves with payload (kg) and front
+    share (0..1).
     """
 
     cg_left_m: float
     variance: float
+    own_variance: float
     moves_with_load: F64
     misfit: float
 
@@ -79,9 +81,11 @@ def told_sideways(rolling: Whittle, place: Place, point: Point, covariance: F64)
     moves = -found.covariance[-1] @ information[_free(there)]
     others = [i for i in range(n) if i not in FREE and i not in DRIFTING]
     left_open = float(moves[others] @ covariance[np.ix_(others, others)] @ moves[others])
+    own_variance = float(found.covariance[-1, -1])
     return Sideways(
         cg_left_m=place.cg_left_m,
-        variance=float(found.covariance[-1, -1]) + left_open,
+        variance=own_variance + left_open,
+        own_variance=own_variance,
         moves_with_load=moves[n : n + 2],
         misfit=rolling.misfit(there),
     )

@@ -1,0 +1,24 @@
+"""What a vehicle weighs on the road, as a whole and on each axle and wheel, and where its payload lies.
+
+weighed(estimate, vehicle, unsprung)    # as it leaves; ``unsprung`` is what calibration found
+"""
+
+from gateway.core.weights.limits import RELEASE_SHARE, is_over_limit
+from gateway.core.weights.on_the_road import weighed, weights_of
+from gateway.core.weights.place import Place, place_of
+from gateway.core.weights.sideways import NOWHERE, Sideways
+from gateway.core.weights.unsprung import NOT_CALIBRATED, Unsprung, unsprung_kg
+
+__all__ = [
+    "NOT_CALIBRATED",
+    "NOWHERE",
+    "RELEASE_SHARE",
+    "Place",
+    "Sideways",
+    "Unsprung",
+    "is_over_limit",
+    "place_of",
+    "unsprung_kg",
+    "weighed",
+    "weights_of",
+]
