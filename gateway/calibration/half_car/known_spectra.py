@@ -18,7 +18,7 @@ from gateway.records import F64
 
 BAND_HZ: Final = (1.1, 14.0)
 N_SEGMENT: Final = 256
-LEAST_MOMENT_STD_KGM: Final = 0.5
+LEAST_MOMENT_STD_KGM: Final = 0.5  # about the centre line, of an empty vehicle too: what lies in its pockets; chosen
 
 
 class KnownSpectra:

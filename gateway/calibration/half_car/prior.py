@@ -23,8 +23,8 @@ TYRE_NPM: Final = 400e3  # both tyres of an axle of a 1250 kg vehicle; scales wi
 MOUNT_NPM: Final = 500e3
 UNSPRUNG_SHARE: Final = 0.065  # of the empty sprung mass, an axle
 GYRATION_PER_WHEELBASE: Final = 0.46
-MOST_OFFSET_STD_M: Final = 0.1
-EMPTY_LEFT_STD_M: Final = 0.02  # driver, tank, sliding door
+MOST_OFFSET_STD_M: Final = 0.1  # of where the sensor sits sideways; a guess is worse than none
+EMPTY_LEFT_STD_M: Final = 0.02  # driver, tank, sliding door; chosen
 SLACK: Final = 0.03
 SLOPE_STD_PER_KN: Final = 0.05
 BEND_STD_PER_KN: Final = 0.1
@@ -64,6 +64,7 @@ _ROLL_STD: Final = {
     "twist_level": 0.5,
     "gyro_yaw_rad": 0.05,  # 3 degrees
 }
+"""Of model.usual_roll's figures; chosen, wide enough for cars and vans. Logarithms but for the last."""
 
 
 @dataclass(frozen=True, slots=True)

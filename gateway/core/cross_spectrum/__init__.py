@@ -1,9 +1,9 @@
 """The default estimator: both sensors' spectra together, phase included, held against a half-car.
 
 A batch and what known-load drives taught (``calibration``) come in; payload, front share and diagnostics go out
-(``estimator``). ``measured`` takes the spectra, ``expected`` says what the half-car would show, ``likelihood`` compares
-them, ``search`` finds the most probable load. Calibration fits the same model, and ``displayed`` draws it.
-docs/method.md derives it.
+(``estimator``). ``measured`` takes the spectra, ``model`` says what the half-car would show, ``likelihood`` compares
+them, ``located`` finds the most probable load, firm or soft (``packing``), and ``lateral``, with a roll rate, where it
+lies sideways. Calibration fits the same model, and ``displayed`` draws it. docs/method.md derives it.
 """
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration

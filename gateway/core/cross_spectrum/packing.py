@@ -15,7 +15,9 @@ from gateway.records import F64
 
 SOFT_MODE_HZ: Final = 10.5  # within a standard deviation of the search's: 7.8 to 14 Hz
 SOFT_COST: Final = 15.0
-"""Logarithm of how much less probable it is, counted as a batch's evidence is (likelihood.EVIDENCE_WEIGHT): e^-3."""
+"""Logarithm of how much less probable it is, counted as a batch's evidence is (likelihood.EVIDENCE_WEIGHT): e^-3.
+Chosen.
+"""
 
 DECISIVE: Final = 100.0
 """By so much it must explain a batch better before it is the answer. Loads that stood on soft mounts gained 436 and

@@ -18,21 +18,22 @@ from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.records import F64
 
 ROLL_BAND_HZ: Final = (1.1, 5.0)
-"""Where the body rolls on its springs; above it wheels, axles and seats do things that no model here knows."""
+"""Where the body rolls on its springs; above it wheels, axles and seats do things that no model here knows. Chosen."""
 
 CG_LEFT_STD_M: Final = 0.1  # of all that is sprung: a third of an empty mass 0.3 m off the centre line is 0.075
 FREE_STD: Final = {"twist_level": 0.3, "tracks_apart_m": 0.2, "payload_roll_gyration_m2": 0.5}
-"""What another road and another load have of their own, standard deviations of logarithms."""
+"""What another road and another load have of their own, standard deviations of logarithms. Chosen."""
 
 FREE: Final = [INDEX[name] for name in FREE_STD]
 
 
 @dataclass(frozen=True, slots=True)
 class Sideways:
-    """The centre of gravity's place left of the centre line, with its variance; not yet inflated.
+    """The centre of gravity's place left of the centre line (m), of all that is sprung, with its variance (m2); not yet
+    inflated, and under a load that is known.
 
-    own_variance is the batch's own part of it. moves_with_load (2,) is by how much it moves with payload (kg) and front
-    share (0..1).
+    own_variance is the batch's own part of it. moves_with_load (2,) is by how much it moves with payload (m/kg) and
+    front share (m per 0..1). misfit is of all three sensors (likelihood.Whittle.misfit), for people to look at.
     """
 
     cg_left_m: float

@@ -24,7 +24,9 @@ _STEP: Final = 1e-3
 def with_place(
     answer: Estimate, point: Point, sideways: Sideways, covariance: F64, calibration: CrossSpectrumCalibration
 ) -> Estimate:
-    """``answer`` with the centre of gravity's lateral place; ``covariance`` (2, 2) is of payload and front share."""
+    """``answer`` with the centre of gravity's lateral place; ``covariance`` (2, 2) is of payload (kg) and front share
+    (0..1), as wide as it is stated.
+    """
     with_load = covariance @ sideways.moves_with_load
     own = sideways.variance * calibration.cg_left_inflation**2
     std_m = math.sqrt(own + float(sideways.moves_with_load @ with_load))

@@ -19,11 +19,14 @@ from gateway.records import F64
 PAYLOAD_LEFT_PER_TRACK: Final = 1.0 / (3.0 * 3.0**0.5)
 """Standard deviation over the track's width: loads whose middle is evenly spread over its middle two thirds."""
 
-MOST_FEEDBACK: Final = 0.5
+MOST_FEEDBACK: Final = 0.5  # beyond, first order no longer tells; chosen, it doubles the standard deviation
 
 
 def sideways_covariance(whittle: Whittle, point: Point, covariance: F64, calibration: CrossSpectrumCalibration) -> F64:
     """(2, 2) of payload (kg) and front share (0..1), from a place across the vehicle that is not seen.
+
+    First order: load and share move by -C I_xy for each metre, with C the search's covariance and I_xy the information
+    between what it fitted and the place. By symmetry that is nothing for a sensor on the centre line.
 
     ``whittle`` is of two sensors, ``covariance`` (k, k) of what a search found at ``point``, without a roll in it.
     """

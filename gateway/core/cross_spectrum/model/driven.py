@@ -131,7 +131,11 @@ def along(apart_m: F64, model: SpectralModel, spectra: CrossSpectra) -> F64:
 
 
 def _twist(model: SpectralModel, spectra: CrossSpectra) -> F64 | None:
-    """(1 - c) / (1 + c) with c the coherence of left and right, times the level."""
+    """(..., b, m) power of half the tracks' difference over that of their mean: (1 - c) / (1 + c), times the level.
+
+    c is the coherence of left and right (:func:`along`); two tracks of one density S have mean and half difference of
+    S (1 + c) / 2 and S (1 - c) / 2, which do not correlate. The level is 1 on a road that is alike in all directions.
+    """
     if model.tracks_apart_m is None or model.twist_level is None:
         return None
     x = along(model.tracks_apart_m, model, spectra)

@@ -1,4 +1,4 @@
-"""The parameters of a vehicle as a vector, and the half-car they stand for.
+"""The parameters of a vehicle as a vector, and the half-car they stand for, or the car that rolls.
 
 Springs, dampers, masses and the like enter as logarithms, so that they stay positive and a prior's
 standard deviation is a share; the rest enters as it is. The vector also holds the slack: the share
@@ -143,7 +143,7 @@ def upright(theta: F64) -> F64:
 
 
 def value_of(theta: F64, name: str) -> F64:
-    """(..., 1) one parameter of theta (..., p) in its own unit."""
+    """(..., 1) one parameter of theta (..., p), in the unit that ends its name."""
     column: F64 = theta[..., INDEX[name], None]
     return np.exp(column) if is_positive(name) else column
 

@@ -3,6 +3,9 @@
 Wheels of an axle are alike, so that it moves in two ways that do not disturb each other: both wheels together, as the
 half-car has it, and one against the other, where the anti-roll bar is a further spring. A payload off the centre line
 couples them through its inertia. Left is positive, roll is positive with the left side up (ISO 8855).
+
+Newton's law for a rigid body on four wheels, written out in docs/method.md. Sideways movement of body and tyres, and
+roll centres, are left out: what they do to roll is in the free rates against roll, at frequencies where the body moves.
 """
 
 from dataclasses import dataclass, replace
