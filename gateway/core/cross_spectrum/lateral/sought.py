@@ -33,14 +33,13 @@ class Sideways:
     inflated, and under a load that is known.
 
     own_variance is the batch's own part of it. moves_with_load (2,) is by how much it moves with payload (m/kg) and
-    front share (m per 0..1). misfit is of all three sensors (likelihood.Whittle.misfit), for people to look at.
+    front share (m per 0..1).
     """
 
     cg_left_m: float
     variance: float
     own_variance: float
     moves_with_load: F64
-    misfit: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +87,6 @@ def told_sideways(rolling: Whittle, place: Place, point: Point, covariance: F64)
         variance=own_variance + left_open,
         own_variance=own_variance,
         moves_with_load=moves[n : n + 2],
-        misfit=rolling.misfit(there),
     )
 
 
