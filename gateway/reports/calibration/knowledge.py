@@ -71,7 +71,7 @@ def knowledge_chart(known: Sequence[Known]) -> Chart:
         "sensor (acceleration a, pitch rate g, roll rate r) that does not come through the modelled path.",
         "Identifiability: share of the prior standard deviation left over after calibration, parameter by parameter.",
         panels,
-        most_columns=3,
+        most_columns=2 if len(panels) == 4 else 3,
         row_height_px=560,
     )
 
