@@ -62,6 +62,11 @@ class Plan:
     identification_fraction: float = 0.667
     split: str | None = None
 
+    @property
+    def rolls(self) -> bool:
+        """Whether any road lifts the wheels of one side alone; the paper's has one profile under both."""
+        return not all(isinstance(planned.road, PaperRoad) for planned in self.drives)
+
 
 def ident(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
     """The paper's identification: 0 to the rated payload and 40 to 60 % wherever both are feasible, 50 km/h, IRI 4."""

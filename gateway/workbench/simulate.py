@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -37,6 +38,8 @@ TRUTH_COLUMNS: Final = (
     "log", "t_ns", "payload_kg", "front_share_pct", "front_axle_kg", "rear_axle_kg", "cg_left_m",
     "front_left_kg", "front_right_kg", "rear_left_kg", "rear_right_kg",
 )  # fmt: skip
+ROLL_RATE: Final = re.compile(r"^\[signals\.roll_rate\][^\n]*\n(?:[^\n]+\n)+", re.MULTILINE)
+NO_ROLL_RATE: Final = "# No roll rate: both wheels of an axle run over one profile, and nothing rolls.\n"
 SENSORS_OF_MAP: Final = {"reference": REFERENCE, "canmod_gps": CANMOD, "j1939": REFERENCE}
 
 
@@ -122,8 +125,8 @@ def write_campaign(
     if campaign.exists():
         raise ConfigurationError(f"{campaign}: there is a campaign already; name another directory or remove it")
     directory.mkdir(parents=True, exist_ok=True)
-    _copy_signal_map(bench.map_name, directory)
     plan = bench.plan()
+    _copy_signal_map(bench.map_name, directory, with_roll_rate=plan.rolls)
     logs = [f"{number:02d}_{planned.name}/can.log.gz" for number, planned in enumerate(plan.drives, 1)]
     write = partial(_write_drive, bench, plan, directory, logs)
     truths = []
@@ -197,9 +200,11 @@ def _write_truth(path: Path, drives: Sequence[Sequence[Sequence[str]]]) -> None:
         table.writerows(row for drive in drives for row in drive)
 
 
-def _copy_signal_map(map_name: str, directory: Path) -> None:
+def _copy_signal_map(map_name: str, directory: Path, *, with_roll_rate: bool) -> None:
     shipped = shipped_map(map_name)
-    copyfile(shipped, directory / "signals.toml")
+    text = shipped.read_text(encoding="utf-8")
+    text = text if with_roll_rate else ROLL_RATE.sub(NO_ROLL_RATE, text)
+    (directory / "signals.toml").write_text(text, encoding="utf-8")
     for database in load_toml(shipped, SignalMapFile, SignalMapError).dbc:
         copyfile(shipped.parent / database, directory / database)
 
