@@ -37,8 +37,8 @@ SAMPLE: Final = re.compile(
 IN_README: Final = (
     "Experiment, validation",
     "Other simulator, loads unseen",
-    "6 different vans, mixed, with roll rate",
-    "6 different vans, mixed, another day, with roll rate",
+    "12 different vans, mixed, with roll rate",
+    "12 different vans, mixed, another day, with roll rate",
 )
 INTRODUCTION: Final = """\
 # Errors in one table

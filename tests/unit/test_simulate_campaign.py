@@ -10,17 +10,18 @@ import pytest
 from support.patience import wait_until
 
 from gateway.bus.live import LiveSource
+from gateway.bus.signals import load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import cg_left_m, left_share_pct
 from gateway.errors import ConfigurationError
 from gateway.offline import split_runs
-from gateway.records import Why
+from gateway.records import Signal, Why
 from gateway.sim.vans import PAPER_VAN, VANS
 from gateway.sim.vehicle import front_share_pct, payload_kg
 from gateway.workbench import bench_of, stream, write_campaign
 from gateway.workbench.campaigns import PLANS, plan_of
-from gateway.workbench.simulate import BETWEEN_DRIVES_S, simulated_frames
+from gateway.workbench.simulate import BETWEEN_DRIVES_S, SENSORS_OF_MAP, simulated_frames
 
 
 @pytest.mark.parametrize("vehicle", list(VANS))
@@ -91,6 +92,15 @@ def test_a_simulated_campaign_reads_like_a_recorded_one(tmp_path: Path) -> None:
         assert [batch.rejected for batch in batches] == [(), (), (Why.TOO_SHORT,)]
         assert [batch.mean_speed_mps for batch in batches] == pytest.approx([50.0 / 3.6] * 3, abs=1.0)
         assert [batch.gravity_mps2 for batch in batches] == pytest.approx([9.8] * 3, abs=0.5)
+
+
+@pytest.mark.parametrize("map_name", SENSORS_OF_MAP)
+@pytest.mark.parametrize(("kind", "rolls"), [("test1", False), ("experiment", True)])
+def test_a_roll_rate_is_mapped_where_the_road_has_two_tracks(
+    tmp_path: Path, map_name: str, kind: str, rolls: bool
+) -> None:
+    campaign = load_campaign(write_campaign(bench_of(kind, map_name=map_name, longest_s=2.0), tmp_path))
+    assert (Signal.ROLL_RATE in load_signal_map(campaign.signals).signals) is rolls
 
 
 def test_the_truth_lies_beside_the_logs(tmp_path: Path) -> None:
