@@ -66,13 +66,13 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
     """The most probable load of ``spectra`` under a flat prior on payload and share.
 
     With a roll rate the load is first sought as if it lay on the centre line; then roll tells where it lies, and the
-    load is sought once more from there.
+    load is sought once more from there. Where the roll rate is lost, the sensor reads roll all the same: it is taken to
+    sit where calibration has it, with the load on the centre line.
     """
     if spectra.roll is None or not has_roll(calibration.parameters):
-        flat = replace(calibration, parameters=upright(calibration.parameters))
         whittle = Whittle(spectra.without_roll, calibration.ground)
-        peak = _best(whittle, flat)
-        located = _told(whittle, peak, flat, 0.0)
+        peak = _best(whittle, calibration)
+        located = _told(whittle, peak, calibration, 0.0)
         unseen = sideways_covariance(whittle, located.point, peak.found.covariance, calibration)
         return replace(located, unseen_covariance=located.unseen_covariance + unseen)
     whittle = Whittle(spectra.without_roll, calibration.ground)

@@ -11,7 +11,14 @@ import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
-from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, ROLL_PARAMETERS, has_roll, is_positive
+from gateway.core.cross_spectrum.model.parameters import (
+    INDEX,
+    PARAMETERS,
+    ROLL_PARAMETERS,
+    has_roll,
+    is_positive,
+    upright,
+)
 from gateway.core.cross_spectrum.model.usual_roll import TRACK_PER_WHEELBASE, usual_roll
 from gateway.core.cross_spectrum.sensor_change import weighed
 from gateway.records import F64
@@ -46,7 +53,7 @@ def sideways_covariance(whittle: Whittle, point: Point, covariance: F64, calibra
 
 
 def _rolling(theta: F64, calibration: CrossSpectrumCalibration) -> F64:
-    """theta (p,) with how the vehicle rolls: as calibrated, else as vehicles do; the sensor as far off as it may be."""
+    """theta (n,) with how the vehicle rolls: as calibrated, else as vehicles do; the sensor as far off as it may be."""
     left_m = float(np.hypot(calibration.sensor_left_m, calibration.sensor_left_std_m))
     if has_roll(calibration.parameters):
         roll = calibration.parameters[len(PARAMETERS) :]
@@ -54,7 +61,7 @@ def _rolling(theta: F64, calibration: CrossSpectrumCalibration) -> F64:
         width_m = calibration.track_width_m or TRACK_PER_WHEELBASE * calibration.wheelbase_m
         usual = usual_roll(calibration.empty_mass_kg, width_m)
         roll = np.array([usual.get(name, _SILENT if is_positive(name) else 0.0) for name in ROLL_PARAMETERS])
-    whole = np.r_[theta, roll]
+    whole = np.r_[upright(theta), roll]
     whole[INDEX["sensor_left_m"]] = left_m
     return np.asarray(whole, np.float64)
 
