@@ -1,0 +1,138 @@
+"""A load that rings on something soft, a firm one that must not be taken for it, and peaks that compete."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.half_car_road import CAR, VAN, batch_over_road, weighed
+
+from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.known_run import KnownRun
+from gateway.core.cross_spectrum import located
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.drift import DRIFTING
+from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT
+from gateway.core.cross_spectrum.packing import DECISIVE, SOFT_COST, Packing, packings
+from gateway.core.cross_spectrum.search import Found
+from gateway.estimate import Estimate, Quantity
+
+KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
+FIRM_HZ = CAR.payload_mode_hz
+
+
+@pytest.fixture(scope="module")
+def calibration() -> CrossSpectrumCalibration:
+    """Of loads that stood firmly."""
+    runs = [
+        KnownRun(i, f"run {i}", *load, tuple(batch_over_road(*load, seed=10 * i + k) for k in range(2)))
+        for i, load in enumerate(KNOWN)
+    ]
+    return calibrate_cross_spectrum(runs, VAN)
+
+
+def holds(quantity: Quantity, truth: float) -> bool:
+    return quantity.interval95[0] <= truth <= quantity.interval95[1]
+
+
+def ringing(
+    calibration: CrossSpectrumCalibration, load: tuple[float, float], mode_hz: float, damping: float, seed: int
+) -> Estimate:
+    soft = replace(CAR, payload_mode_hz=mode_hz, payload_damping_ratio=damping)
+    return weighed(batch_over_road(*load, seed=seed, car=soft), calibration)
+
+
+@pytest.mark.parametrize("load", [(250.0, 54.0), (400.0, 44.0)], ids=str)
+@pytest.mark.parametrize("damping", [0.06, 0.1, 0.3])
+def test_a_load_that_rings_at_9_hz_is_weighed(
+    calibration: CrossSpectrumCalibration, load: tuple[float, float], damping: float
+) -> None:
+    """With damping other than any calibration saw, too."""
+    found = ringing(calibration, load, 9.0, damping, seed=41)
+    assert found.counted, found.rejected
+    assert holds(found.payload, load[0])
+    assert holds(found.front_share, load[1])
+    assert found.diagnostics["payload_mode_hz"] == pytest.approx(9.0, rel=0.1)
+
+
+def test_it_would_not_be_if_loads_were_only_thought_to_stand_firmly(
+    calibration: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load = (400.0, 44.0)
+    monkeypatch.setattr(located, "packings", lambda parameters: packings(parameters)[:1] * 2)
+    found = ringing(calibration, load, 9.0, 0.1, seed=41)
+    assert not found.counted or not holds(found.payload, load[0])
+
+
+@pytest.mark.parametrize("load", [(0.0, 52.0), (60.0, 51.0), (250.0, 54.0), (400.0, 44.0)], ids=str)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_firm_load_is_not_taken_for_soft(
+    calibration: CrossSpectrumCalibration, load: tuple[float, float], seed: int
+) -> None:
+    found = weighed(batch_over_road(*load, seed=seed), calibration)
+    assert holds(found.payload, load[0])
+    assert found.diagnostics["payload_mode_hz"] > 0.6 * FIRM_HZ
+
+
+def test_a_real_cars_rattle_is_no_soft_load() -> None:
+    """What a soft packing gains must be far beyond what seats and people gain (51), and a prior cost beside it."""
+    firm, soft = packings(np.zeros(100))
+    assert firm.decisive == firm.cost == 0.0
+    assert soft.decisive == DECISIVE > 51.0
+    assert soft.cost == SOFT_COST > 0.0
+
+
+def peak(payload_kg: float, front_share: float, cost: float, packing: Packing) -> located._Peak:
+    x = np.r_[packing.drifting, payload_kg, front_share]
+    return located._Peak(Found(x, cost, np.eye(len(x))), packing)
+
+
+FIRM, SOFT = packings(np.zeros(100))
+
+
+def test_a_peak_alone_adds_nothing() -> None:
+    best = peak(200.0, 0.5, 10.0, FIRM)
+    np.testing.assert_array_equal(located._rivalry(best.found, [best]), np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize("behind", [0.0, 3.0, 20.0, 200.0])
+def test_a_second_peak_widens_by_how_probable_it_is(behind: float) -> None:
+    """The variance about the best of two points, the odds between them e^-(weight times cost)."""
+    best, rival = peak(200.0, 0.5, 10.0, FIRM), peak(260.0, 0.47, 10.0 + behind, FIRM)
+    odds = np.exp(-EVIDENCE_WEIGHT * behind)
+    away = np.array([60.0, -0.03])
+    expected = odds / (1.0 + odds) * np.outer(away, away)
+    np.testing.assert_allclose(located._rivalry(best.found, [best, rival]), expected, rtol=1e-12)
+
+
+def test_a_soft_rival_counts_for_less() -> None:
+    best = peak(200.0, 0.5, 10.0, FIRM)
+    firm, soft = (located._rivalry(best.found, [best, peak(260.0, 0.47, 10.0, one)]) for one in (FIRM, SOFT))
+    odds = np.exp(-EVIDENCE_WEIGHT * SOFT_COST)
+    assert soft[0, 0] == pytest.approx(firm[0, 0] * 2.0 * odds / (1.0 + odds))
+
+
+@pytest.mark.parametrize(("behind", "is_told"), [(0.0, True), (100.0, False)])
+def test_an_answer_of_two_peaks_is_wider(
+    calibration: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch, behind: float, is_told: bool
+) -> None:
+    """A peak put beside the found one, 25 kg away: as good, or far behind."""
+    batch = batch_over_road(200.0, 50.0, seed=3)
+    alone = weighed(batch, calibration)
+    rivalry = located._rivalry
+
+    def beside(found: Found, peaks: list[located._Peak]) -> object:
+        rival = found.x.copy()
+        rival[-2:] += 25.0, -0.004
+        return rivalry(found, [*peaks, peak_of(rival, found.cost + behind)])
+
+    def peak_of(x: np.ndarray, cost: float) -> located._Peak:
+        return located._Peak(Found(x, cost, np.eye(len(x))), Packing(x[: len(DRIFTING)]))
+
+    monkeypatch.setattr(located, "_rivalry", beside)
+    found = weighed(batch, calibration)
+    assert found.payload.number == alone.payload.number
+    if is_told:
+        assert found.payload.std > 1.2 * alone.payload.std
+        assert holds(found.payload, alone.payload.number + 15.0)
+    else:
+        assert found.payload.std == pytest.approx(alone.payload.std, rel=1e-3)
