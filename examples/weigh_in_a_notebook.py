@@ -24,6 +24,7 @@ estimates = gateway.estimate_arrays(
     t_s,
     vertical_acceleration_mps2=measured.accel_mps2[:, 2],
     pitch_rate_radps=measured.gyro_radps[:, 1],
+    roll_rate_radps=measured.gyro_radps[:, 0],  # as the calibration had one
     speed_mps=speed_mps,
     calibration=calibration,
 )

@@ -10,6 +10,7 @@ from support.half_car_road import CAR, VAN, batch_of, batch_over_road, weighed
 from gateway.calibration.half_car import calibrate_cross_spectrum, fit_cross_spectrum
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED
 from gateway.calibration.known_run import KnownRun
+from gateway.core.cross_spectrum import locate
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import (
     UNSEEN_ROUGHNESS_SCALE,
@@ -100,33 +101,46 @@ def test_more_driving_makes_it_surer(calibration: CrossSpectrumCalibration) -> N
     assert long.front_share.std < short.front_share.std
 
 
-def own_variances(found: Estimate) -> F64:
-    """Of payload (kg) and front share (%), without what a change of the vehicle adds: that is the same anywhere."""
+def own_variances(found: Estimate, batch: Batch, calibration: CrossSpectrumCalibration) -> F64:
+    """Of payload (kg) and front share (%), without what is the same at any speed and on any road.
+
+    That is what a change of the vehicle adds, and what other peaks and loads to one side do.
+    """
     drift = np.array([found.diagnostics["payload_drift_std_kg"], found.diagnostics["front_share_drift_std_pct"]])
-    return np.array([found.payload.std, found.front_share.std]) ** 2 - drift**2
+    spectra = cross_spectra_of([batch], calibration.reading)
+    assert spectra is not None
+    assert found.diagnostics["reach"] == 0.0
+    inflation = np.array([calibration.payload_inflation, 100.0 * calibration.front_share_inflation])
+    unseen = inflation**2 * np.diag(locate(spectra, calibration).unseen_covariance)
+    return np.array([found.payload.std, found.front_share.std]) ** 2 - drift**2 - unseen
 
 
 def test_an_unseen_speed_widens_the_interval(calibration: CrossSpectrumCalibration) -> None:
     """Twice the variance for a speed a factor of e^0.5 below the slowest of calibration."""
-    seen = weighed(batch_over_road(200.0, 50.0, seed=3), calibration)
+    batch = batch_over_road(200.0, 50.0, seed=3)
+    seen = weighed(batch, calibration)
     slowest_mps = seen.mean_speed_mps * np.exp(UNSEEN_SPEED_SCALE)
-    unseen = weighed(batch_over_road(200.0, 50.0, seed=3), replace(calibration, speed_seen_mps=(slowest_mps, 99.0)))
+    at_other_speeds = replace(calibration, speed_seen_mps=(slowest_mps, 99.0))
+    unseen = weighed(batch, at_other_speeds)
     assert unseen.payload.number == seen.payload.number
     roughness = roughness_ratio(calibration)
     factor = (2.0 + roughness) / (1.0 + roughness)
-    assert own_variances(unseen) == pytest.approx(factor * own_variances(seen), rel=1e-6)
+    own = own_variances(seen, batch, calibration)
+    assert own_variances(unseen, batch, at_other_speeds) == pytest.approx(factor * own, rel=1e-6)
 
 
 @pytest.mark.parametrize("rougher", [0.5, 2.0])
 def test_another_roughness_widens_the_interval(calibration: CrossSpectrumCalibration, rougher: float) -> None:
     """Friction is known on roads like those of calibration; far from them it is an extrapolation."""
-    seen = weighed(batch_over_road(200.0, 50.0, seed=3), calibration)
+    batch = batch_over_road(200.0, 50.0, seed=3)
+    seen = weighed(batch, calibration)
     on_other_roads = replace(calibration, acceleration_rms_mps2=calibration.acceleration_rms_mps2 / rougher)
-    unseen = weighed(batch_over_road(200.0, 50.0, seed=3), on_other_roads)
+    unseen = weighed(batch, on_other_roads)
     assert unseen.payload.number == seen.payload.number
     factor = (1.0 + roughness_ratio(on_other_roads)) / (1.0 + roughness_ratio(calibration))
     assert factor > 1.5
-    assert own_variances(unseen) == pytest.approx(factor * own_variances(seen), rel=1e-6)
+    own = own_variances(seen, batch, calibration)
+    assert own_variances(unseen, batch, on_other_roads) == pytest.approx(factor * own, rel=1e-6)
 
 
 def roughness_ratio(calibration: CrossSpectrumCalibration) -> float:

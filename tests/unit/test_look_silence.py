@@ -9,7 +9,7 @@ from support.bus_drive import bus_drive
 
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
-from gateway.calibration.inspection import row_facts
+from gateway.calibration.inspection import Severity, row_facts
 from gateway.calibration.inspection.rows import rate_findings
 from gateway.core.settings import BatchSettings
 from gateway.offline.batches import read_whole_log
@@ -57,11 +57,14 @@ def cut_short(frames: Frames) -> Frames:
 def test_a_silent_sensor_says_why(alter: Alter, words: str, tmp_path: Path) -> None:
     log = tmp_path / "drive.log"
     write_candump(alter(bus_drive(20.0, seed=3)), "can0", log)
-    why = why_silent(log, REFERENCE, Signal.PITCH_RATE)
-    assert why == words
+    silent = (Signal.PITCH_RATE, Signal.ROLL_RATE)  # both come in one message
+    why = {signal: why_silent(log, REFERENCE, signal) for signal in silent}
+    assert why == dict.fromkeys(silent, words)
     facts = row_facts(read_whole_log(log, REFERENCE)[0], REFERENCE.traits)
-    (finding,) = rate_findings(facts, BatchSettings(), {Signal.PITCH_RATE: why})
-    assert finding.text == f"pitch_rate has 0 samples in the whole run: {words}"
+    pitch, roll = rate_findings(facts, BatchSettings(), why)
+    assert pitch.text == f"pitch_rate has 0 samples in the whole run: {words}"
+    assert (pitch.severity, roll.severity) == (Severity.FAULT, Severity.WARNING)
+    assert roll.text == f"roll_rate has 0 samples in the whole run: {words}"
 
 
 @pytest.mark.parametrize(
