@@ -64,3 +64,18 @@ def test_errors_stay_small_and_intervals_true(
     } == {}
     if cg_left_m is not None:
         assert found["cg_left"]["mean_abs_m"] <= cg_left_m
+
+
+@pytest.mark.parametrize(
+    ("drives", "n_batches", "most_refused"), [("known_loads", 10, 1), ("sideways", 10, 1), ("mixed", 24, 6)]
+)
+def test_a_lost_roll_rate_leaves_true_intervals(
+    calibration: Path, drives: str, n_batches: int, most_refused: int
+) -> None:
+    """By the map without it: the sensor sits 0.3 m off the centre line, and reads roll whether it is told or not."""
+    campaign = recordings() / drives / "campaign.toml"
+    found: dict[str, Any] = json.loads(run("evaluate", campaign, "--calibration", calibration, "--json", *CROSS))
+    assert found["n_batches"] == n_batches
+    assert found["n_rejected"] <= most_refused
+    assert found["payload"]["coverage95"] >= 0.9
+    assert found["front_share"]["coverage95"] >= 0.9
