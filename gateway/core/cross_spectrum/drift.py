@@ -63,18 +63,22 @@ DRIFT_PRECISION: Final = np.linalg.inv(_believed_covariance())
 
 
 _OF_THE_VEHICLE: Final = np.array([name != "gyro_lag_s" for name in DRIFT_STD], dtype=float)  # a lag is the computer's
+_NATURAL_VAR: Final = np.maximum([NATURE_STD.get(name, 0.0) ** 2 for name in DRIFT_STD], _OWN_VAR)
+_NATURAL_PRECISION: Final = np.linalg.inv(_believed_covariance() + np.diag(_NATURAL_VAR - _OWN_VAR))
 MOST_TENSION: Final = float(chi2.ppf(1.0 - 1e-4, int(_OF_THE_VEHICLE.sum())))
-"""A vehicle that drifts as the search believes it to exceeds this once in ten thousand batches."""
+"""A vehicle that drifts as vehicles do exceeds this once in ten thousand batches."""
 
 
 def tension_of(off: F64) -> float:
     """How far the drifting parameters lie ``off`` (k,) their calibration: those of the vehicle, squared, chi-squared.
 
     A load unlike any that calibration saw, or a vehicle that is no longer the same, is fitted at the price of
-    parameters that no drift explains. The search holds them near the calibration, so that they lie nearer by right.
+    parameters that no drift explains. The measure is what is natural (NATURE_STD), not what the search believes:
+    dampers that another day changed by 5 % are no reason to refuse. The search holds them near the calibration, so that
+    they lie nearer by right.
     """
     off = off * _OF_THE_VEHICLE
-    return float(off @ DRIFT_PRECISION @ off)
+    return float(off @ _NATURAL_PRECISION @ off)
 
 
 def drift_covariance(found: F64, moves: F64) -> F64:
