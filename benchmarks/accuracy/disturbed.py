@@ -139,6 +139,7 @@ def _moved(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -> Ca
 
 
 _SENSOR_MOVED: Final = (Why.SENSOR_CHANGED, Why.MODEL_MISFIT)
+_UNSEEN: Final = (Why.TOO_UNCERTAIN, Why.MODEL_MISFIT)  # no half-car rolls, and no interval of use is wide enough
 _BEYOND: Final = (Why.OUT_OF_RANGE, Why.MODEL_MISFIT, Why.TOO_UNCERTAIN)
 
 UNDISTURBED: Final = Disturbance("as recorded", is_mended=True)
@@ -163,16 +164,18 @@ DISTURBANCES: Final[Mapping[str, Disturbance]] = MappingProxyType(
             Disturbance("sensor turned by 10 degrees", remount=_moved(yaw_deg=10.0), reasons=_SENSOR_MOVED),
             Disturbance("no roll rate", has_roll_rate=False),
             Disturbance("load sideways", is_sideways=True),
-            Disturbance("load sideways, no roll rate", is_sideways=True, has_roll_rate=False),
+            Disturbance("load sideways, no roll rate", is_sideways=True, has_roll_rate=False, reasons=_UNSEEN),
             Disturbance(
                 "load sideways, roll rate stuck half the time",
                 half_of_the_time(Signal.ROLL_RATE, stuck),
                 is_sideways=True,
+                reasons=_UNSEEN,
             ),
             Disturbance(
                 "load sideways, roll rate missing half the time",
                 half_of_the_time(Signal.ROLL_RATE, missing),
                 is_sideways=True,
+                reasons=_UNSEEN,
             ),
             Disturbance("load beyond the calibrated", is_overloaded=True, reasons=_BEYOND),
         )

@@ -35,6 +35,9 @@ MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
 # chosen, both; `benchmarks.accuracy sensitivity` tells what hangs on them
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
 UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
+MOST_LAG_CHANGE_S: Final = (
+    0.002  # beyond it, roll is taken out of the acceleration once more, at the lag that was found
+)
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
 
 
@@ -45,6 +48,10 @@ def by_cross_spectrum(batch: Batch, calibration: CrossSpectrumCalibration, blank
     if spectra is None or why is not None:
         return replace(blank, rejected=(why or Why.TOO_SHORT,))
     located = locate(spectra, calibration)
+    lag_s = float(located.point.theta[INDEX["gyro_lag_s"]])
+    if located.sideways is not None and abs(lag_s - calibration.parameters[INDEX["gyro_lag_s"]]) > MOST_LAG_CHANGE_S:
+        spectra = cross_spectra_of([batch], calibration.reading.with_gyro_late_by(lag_s)) or spectra
+        located = locate(spectra, calibration)
     inflation = _unseen_inflation(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
     by_gain = located.gain_moves * gain_std(batch.gravity_mps2, calibration.gravity_mps2)
     return _judged(blank, spectra, located, inflation, by_gain, calibration)
@@ -143,8 +150,9 @@ def _disbelieved(
         return Why.WRONG_SIGN
     if not located.misfit <= calibration.misfit_limit:
         return Why.MODEL_MISFIT
-    if located.scores.is_changed(calibration):
-        return Why.SENSOR_CHANGED if reach == 0.0 else Why.MODEL_MISFIT
+    is_moved = located.sideways is not None and located.sideways.is_mount_changed
+    if is_moved or located.scores.is_changed(calibration):
+        return Why.SENSOR_CHANGED if is_moved or reach == 0.0 else Why.MODEL_MISFIT
     if located.tension > MOST_TENSION:
         return Why.MODEL_MISFIT
     if not payload_std_kg <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:

@@ -41,6 +41,10 @@ class Reading:
     with_roll: bool = False
     mount: Mount | None = None
 
+    def with_gyro_late_by(self, lag_s: float) -> "Reading":
+        """The same with another lag of the gyro, where a mount is told."""
+        return replace(self, mount=replace(self.mount, gyro_lag_s=lag_s)) if self.mount else self
+
 
 @dataclass(frozen=True, slots=True)
 class RollSpectra:

@@ -24,6 +24,11 @@ CG_LEFT_STD_M: Final = 0.1  # of all that is sprung: a third of an empty mass 0.
 FREE_STD: Final = {"twist_level": 0.3, "tracks_apart_m": 0.2, "payload_roll_gyration_m2": 0.5}
 """What another road and another load have of their own, standard deviations of logarithms. Chosen."""
 
+MOST_MOUNT_CHANGE: Final = {"sensor_left_m": 0.1, "gyro_yaw_rad": 0.09}
+"""A sensor that sits elsewhere, or is turned by five degrees more, than when it was calibrated; roll tells to a few
+millimetres and tenths of a degree, but a load far to one side, on another road, may pass for a part of it.
+"""
+
 FREE: Final = [INDEX[name] for name in FREE_STD]
 
 
@@ -33,13 +38,14 @@ class Sideways:
     inflated, and under a load that is known.
 
     own_variance is the batch's own part of it. moves_with_load (2,) is by how much it moves with payload (m/kg) and
-    front share (m per 0..1).
+    front share (m per 0..1). is_mount_changed: the sensor is not where, or not turned as, it was calibrated.
     """
 
     cg_left_m: float
     variance: float
     own_variance: float
     moves_with_load: F64
+    is_mount_changed: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +83,8 @@ def sought_sideways(rolling: Whittle, point: Point) -> Place:
 def told_sideways(rolling: Whittle, place: Place, point: Point, covariance: F64) -> Sideways:
     """How sure the place is; ``covariance`` (n, n) is that of theta in calibration."""
     there, n, found = _at(point, place.found.x), len(point.theta), place.found
-    information = rolling.curvature(there, range(n + 3)).information
+    whole = rolling.curvature(there, range(n + 3))
+    information = whole.information
     moves = -found.covariance[-1] @ information[_free(there)]
     others = [i for i in range(n) if i not in FREE and i not in DRIFTING]
     left_open = float(moves[others] @ covariance[np.ix_(others, others)] @ moves[others])
@@ -87,7 +94,18 @@ def told_sideways(rolling: Whittle, place: Place, point: Point, covariance: F64)
         variance=own_variance + left_open,
         own_variance=own_variance,
         moves_with_load=moves[n : n + 2],
+        is_mount_changed=any(
+            abs(_off(INDEX[name], whole, found, _free(there))) > most for name, most in MOST_MOUNT_CHANGE.items()
+        ),
     )
+
+
+def _off(entry: int, whole: Curvature, found: Found, free: list[int]) -> float:
+    """How far off a parameter of the mount is, by one Newton step, all that was free moving along; 0 where untold."""
+    along = whole.information[entry, free] @ found.covariance
+    information = whole.information[entry, entry] - along @ whole.information[free, entry]
+    slope = whole.gradient[entry] - along @ whole.gradient[free]
+    return float(-slope / information) if information > 0.0 else 0.0
 
 
 def _at(point: Point, x: F64) -> Point:

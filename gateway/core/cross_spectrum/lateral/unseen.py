@@ -33,19 +33,23 @@ def sideways_covariance(whittle: Whittle, point: Point, covariance: F64, calibra
     """(2, 2) of payload (kg) and front share (0..1), from a place across the vehicle that is not seen.
 
     First order: load and share move by -C I_xy for each metre, with C the search's covariance and I_xy the information
-    between what it fitted and the place. By symmetry that is nothing for a sensor on the centre line.
+    between what it fitted and the place, on average over the load a standard deviation to either side. By symmetry that
+    is nothing for a sensor on the centre line.
 
     ``whittle`` is of two sensors, ``covariance`` (k, k) of what a search found at ``point``, without a roll in it.
     """
     theta = _rolling(point.theta, calibration)
-    rolling = Point(theta, point.payload_kg, point.front_share, 0.0)
     width_m = calibration.track_width_m or TRACK_PER_WHEELBASE * calibration.wheelbase_m
     there = Whittle(whittle.spectra, replace(calibration.ground, track_width_m=width_m))
-    fitted = weighed(rolling)
-    along = there.curvature(rolling, [*fitted, len(theta) + 2]).information[:-1, -1]
-    moves = -(covariance @ along)[-2:]
     payload_kg = max(point.payload_kg, 0.0)
     cg_left_std_m = payload_kg * PAYLOAD_LEFT_PER_TRACK * width_m / (calibration.empty_mass_kg + payload_kg)
+
+    def moves_at(cg_left_m: float) -> F64:
+        rolling = Point(theta, point.payload_kg, point.front_share, cg_left_m)
+        along: F64 = there.curvature(rolling, [*weighed(rolling), len(theta) + 2]).information[:-1, -1]
+        return -(covariance @ along)[-2:]
+
+    moves = 0.5 * (moves_at(-cg_left_std_m) + moves_at(cg_left_std_m))
     # the load that lies there is the true one: where the answer fell short of it, it is the larger
     feedback = min(abs(float(moves[0])) * cg_left_std_m / payload_kg, MOST_FEEDBACK) if payload_kg else 0.0
     widened: F64 = (cg_left_std_m / (1.0 - feedback)) ** 2 * np.outer(moves, moves)
