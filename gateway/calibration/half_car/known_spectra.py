@@ -52,9 +52,9 @@ class KnownSpectra:
 
     def at(self, theta: F64) -> Point:
         """The half-car's parameters theta (p,) with the run's load, where this was noted to lie."""
-        if not self.run.payload_left_m:
-            return Point.of(theta, self.run.load)
-        return self.placed(np.r_[theta, self._roll], 0.0) if len(self._roll) else Point.of(theta, self.run.load)
+        if self.run.payload_left_m and len(self._roll):
+            return self.placed(np.r_[theta, self._roll], 0.0)
+        return Point.of(theta, self.run.load)
 
     def placed(self, theta: F64, moment_off_kgm: float) -> Point:
         """All parameters theta (n,) of a vehicle that rolls, the payload's moment about the centre line so far off."""

@@ -22,7 +22,6 @@ from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.records import F64
 
 _N: Final = len(PARAMETERS)
-_EMPTY_LEFT: Final = INDEX["empty_left_m"] - _N
 
 
 def fit_roll(known: Sequence[KnownSpectra], upright: Found, prior: Prior, start: F64) -> Found:
@@ -53,19 +52,19 @@ def fit_roll(known: Sequence[KnownSpectra], upright: Found, prior: Prior, start:
 
     found = most_probable(np.r_[start, np.zeros(r)], mean, precision, cost, curvature, tolerance=0.05)
     theta = np.r_[upright.x, found.x[:m]]
-    moves = _moves(known, theta, found)
+    moves = _moves(seen, theta, found)
     own = found.covariance[:m, :m]
     beside = moves @ upright.covariance
     covariance = np.block([[upright.covariance, beside.T], [beside, own + beside @ moves.T]])
     return Found(theta, found.cost, covariance)
 
 
-def _moves(known: Sequence[KnownSpectra], theta: F64, found: Found) -> F64:
+def _moves(seen: Sequence[tuple[KnownSpectra, Whittle]], theta: F64, found: Found) -> F64:
     """(m, p) by how much the roll parameters move with each of the half-car's: -C I_rp."""
     m = len(theta) - _N
     across = np.zeros((len(found.x), _N))
-    for i, (one, off) in enumerate(zip(known, found.x[m:].tolist(), strict=True)):
-        part = _curvature(one, one.rolling, theta, off, range(len(theta)))
+    for i, ((one, rolling), off) in enumerate(zip(seen, found.x[m:].tolist(), strict=True)):
+        part = _curvature(one, rolling, theta, off, range(len(theta)))
         across[:m] += part.information[_N:-1, :_N]
         across[m + i] += part.information[-1, :_N]
     moves: F64 = -(found.covariance @ across)[:m]

@@ -72,6 +72,15 @@ class Curvature:
     gradient: F64
     information: F64
 
+    def towards(self, entry: int, free: list[int], covariance: F64, pull: F64) -> tuple[float, float]:
+        """Slope and information of one ``entry``, what is ``free`` moving along; ``pull`` is the slope of that.
+
+        ``covariance`` is of what is free, prior included (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948).
+        """
+        along = self.information[entry, free] @ covariance
+        information = self.information[entry, entry] - along @ self.information[free, entry]
+        return float(self.gradient[entry] - along @ pull), float(information)
+
 
 @dataclass(frozen=True, slots=True)
 class _Whitened:

@@ -69,13 +69,12 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
     load is sought once more from there. Where the roll rate is lost, the sensor reads roll all the same: it is taken to
     sit where calibration has it, with the load on the centre line.
     """
+    whittle = Whittle(spectra.without_roll, calibration.ground)
     if spectra.roll is None or not has_roll(calibration.parameters):
-        whittle = Whittle(spectra.without_roll, calibration.ground)
         peak = _best(whittle, calibration)
         located = _told(whittle, peak, calibration, 0.0)
         unseen = sideways_covariance(whittle, located.point, peak.found.covariance, calibration)
         return replace(located, unseen_covariance=located.unseen_covariance + unseen)
-    whittle = Whittle(spectra.without_roll, calibration.ground)
     rolling = Whittle(spectra.within(ROLL_BAND_HZ), calibration.ground)
     placed = replace(calibration, parameters=level(calibration.parameters))
     peak = _best(whittle, replace(calibration, parameters=upright(calibration.parameters)))

@@ -57,9 +57,7 @@ def scores_of(whole: Curvature, point: Point, covariance: F64, calibration: Cros
 
     def score(name: str) -> float:
         entry = INDEX[name]
-        along = whole.information[entry, FITTED] @ covariance
-        information = whole.information[entry, entry] - along @ whole.information[FITTED, entry]
-        slope = whole.gradient[entry] - along @ pull
+        slope, information = whole.towards(entry, FITTED, covariance, pull)
         if not information > 0.0:
             return 0.0
         return float(-slope / information / np.sqrt(1.0 / information + calibration.covariance[entry, entry]))

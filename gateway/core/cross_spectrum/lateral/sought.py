@@ -102,10 +102,8 @@ def told_sideways(rolling: Whittle, place: Place, point: Point, covariance: F64)
 
 def _off(entry: int, whole: Curvature, found: Found, free: list[int]) -> float:
     """How far off a parameter of the mount is, by one Newton step, all that was free moving along; 0 where untold."""
-    along = whole.information[entry, free] @ found.covariance
-    information = whole.information[entry, entry] - along @ whole.information[free, entry]
-    slope = whole.gradient[entry] - along @ whole.gradient[free]
-    return float(-slope / information) if information > 0.0 else 0.0
+    slope, information = whole.towards(entry, free, found.covariance, whole.gradient[free])
+    return -slope / information if information > 0.0 else 0.0
 
 
 def _at(point: Point, x: F64) -> Point:

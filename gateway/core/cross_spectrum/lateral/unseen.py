@@ -38,8 +38,8 @@ def sideways_covariance(whittle: Whittle, point: Point, covariance: F64, calibra
 
     ``whittle`` is of two sensors, ``covariance`` (k, k) of what a search found at ``point``, without a roll in it.
     """
-    theta = _rolling(point.theta, calibration)
     width_m = calibration.track_width_m or TRACK_PER_WHEELBASE * calibration.wheelbase_m
+    theta = _rolling(point.theta, calibration, width_m)
     there = Whittle(whittle.spectra, replace(calibration.ground, track_width_m=width_m))
     payload_kg = max(point.payload_kg, 0.0)
     cg_left_std_m = payload_kg * PAYLOAD_LEFT_PER_TRACK * width_m / (calibration.empty_mass_kg + payload_kg)
@@ -56,13 +56,12 @@ def sideways_covariance(whittle: Whittle, point: Point, covariance: F64, calibra
     return widened
 
 
-def _rolling(theta: F64, calibration: CrossSpectrumCalibration) -> F64:
+def _rolling(theta: F64, calibration: CrossSpectrumCalibration, width_m: float) -> F64:
     """theta (n,) with how the vehicle rolls: as calibrated, else as vehicles do; the sensor as far off as it may be."""
     left_m = float(np.hypot(calibration.sensor_left_m, calibration.sensor_left_std_m))
     if has_roll(calibration.parameters):
         roll = calibration.parameters[len(PARAMETERS) :]
     else:
-        width_m = calibration.track_width_m or TRACK_PER_WHEELBASE * calibration.wheelbase_m
         usual = usual_roll(calibration.empty_mass_kg, width_m)
         roll = np.array([usual.get(name, _SILENT if is_positive(name) else 0.0) for name in ROLL_PARAMETERS])
     whole = np.r_[upright(theta), roll]

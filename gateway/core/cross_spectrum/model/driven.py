@@ -18,6 +18,7 @@ from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.friction import at_levels, level_weights
 from gateway.core.cross_spectrum.model.half_car import frequency_response
 from gateway.core.cross_spectrum.model.parameters import (
+    NOISES,
     SLACK_KNOTS,
     Ground,
     half_car,
@@ -30,7 +31,6 @@ from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_
 from gateway.records import C128, F64
 
 SLACK_FLOOR: Final = 0.01
-_NOISES: Final = ("noise_acceleration_m2ps3", "noise_pitch_rate_rad2ps", "noise_roll_rate_rad2ps")
 
 Paths = tuple[C128, ...]
 """Responses (p, ..., m) of p sensors by front and rear axle, both tracks alike; then one against the other."""
@@ -83,7 +83,7 @@ def spectral_model(
     return SpectralModel(
         paths=responses(theta, load, ground, freq_hz, n_sensors),
         slack=np.stack([_slack(theta, knots, freq_hz) for knots in SLACK_KNOTS[:n_sensors]]),
-        noise=np.stack([value_of(theta, name) for name in _NOISES[:n_sensors]]),
+        noise=np.stack([value_of(theta, name) for name in NOISES[:n_sensors]]),
         track_offset_m=value_of(theta, "track_offset_m"),
         delay_scale=value_of(theta, "delay_scale"),
         rear_lag_s=value_of(theta, "rear_lag_s"),

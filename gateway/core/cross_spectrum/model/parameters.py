@@ -84,6 +84,8 @@ SLACK_KNOTS: Final = tuple(
     range(INDEX[names[0]], INDEX[names[-1]] + 1) for names in (_SLACK_ACCELERATION, _SLACK_PITCH_RATE, _SLACK_ROLL_RATE)
 )
 """By sensor: where its slack's knots stand in the vector."""
+NOISES: Final = ("noise_acceleration_m2ps3", "noise_pitch_rate_rad2ps", "noise_roll_rate_rad2ps")
+"""By sensor: what its own noise is called."""
 _OF_ROAD_AND_SENSORS: Final = ("slack_", "noise_", "track", "twist_", "delay_scale", "rear_lag_s")
 VEHICLE_PARAMETERS: Final = frozenset(i for name, i in INDEX.items() if not name.startswith(_OF_ROAD_AND_SENSORS))
 

@@ -22,6 +22,7 @@ from gateway.core.cross_spectrum.model.friction import level_weights
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix
 from gateway.core.cross_spectrum.model.parameters import (
     INDEX,
+    NOISES,
     SLACK_KNOTS,
     VEHICLE_PARAMETERS,
     Ground,
@@ -31,7 +32,6 @@ from gateway.records import C128, F64
 
 STEP: Final = 1e-5
 LOAD_STEPS: Final = (0.1, STEP, STEP)  # payload in kg, front share, lateral place of the centre of gravity in m
-_NOISES: Final = ("noise_acceleration_m2ps3", "noise_pitch_rate_rad2ps", "noise_roll_rate_rad2ps")
 
 
 def spectral_slopes(
@@ -182,6 +182,6 @@ def _with_noise(
     auto = slopes.auto + sensed[:, None] * grown
     for row, entry in enumerate(free):
         for sensor in range(len(auto)):
-            if entry == INDEX[_NOISES[sensor]]:
+            if entry == INDEX[NOISES[sensor]]:
                 auto[sensor, row] += sensed[sensor]
     return SpectralMatrix(auto, slopes.cross)
