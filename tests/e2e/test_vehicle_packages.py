@@ -6,7 +6,6 @@ Of these it imports neither plotly nor what plotly needs: its Debian package has
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +17,7 @@ import pytest
 from make_deb import UNIMPORTED
 from support.known_load_logs import write_known_loads
 from support.locks import pins
+from support.paper_van import PAPER_VAN, paper_van_config
 from support.patience import PATIENCE_S
 from support.ports import first_answer, free_port
 
@@ -28,7 +28,6 @@ for name in json.loads(os.environ["ABSENT"]):
 from gateway.cli import main
 main(sys.argv[1:])
 """
-PAPER_VAN = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 WINDOW = ("--window-s", "60")
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -88,22 +87,7 @@ def port() -> int:
 @pytest.fixture
 def config(tmp_path: Path, port: int) -> Path:
     """A configuration with the paper's van on a bus of the test's own."""
-    shutil.copy(PAPER_VAN, tmp_path / "vehicle.json")
-    path = tmp_path / "springscale.toml"
-    path.write_text(
-        f"""
-        signals = "springscale:reference"
-        calibration = "vehicle.json"
-        [bus]
-        interface = "virtual"
-        channel = "{tmp_path.name}"
-        [web]
-        port = {port}
-        [store]
-        directory = "state"
-        """
-    )
-    return path
+    return paper_van_config(tmp_path, port)
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,13 @@
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from support.paper_van import paper_van_config
 from support.patience import PATIENCE_S
 from support.ports import first_answer, free_port
 
@@ -23,22 +23,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def config(tmp_path: Path) -> Path:
-    shutil.copy(ROOT / "gateway/demo/paper_van.json", tmp_path / "vehicle.json")
-    path = tmp_path / "springscale.toml"
-    path.write_text(
-        f"""
-        signals = "springscale:reference"
-        calibration = "vehicle.json"
-        [bus]
-        interface = "virtual"
-        channel = "{tmp_path.name}"
-        [web]
-        port = {free_port()}
-        [store]
-        directory = "state"
-        """
-    )
-    return path
+    return paper_van_config(tmp_path, free_port())
 
 
 def test_a_pipeline_that_does_not_end_is_left_behind_without_an_abort(config: Path) -> None:

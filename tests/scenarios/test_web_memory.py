@@ -2,7 +2,6 @@
 
 import asyncio
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ import numpy as np
 import pytest
 from support.bus_drive import bus_drive
 from support.estimates import make_estimate
+from support.paper_van import paper_van_config
 from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
 from support.process import TESTS
@@ -42,24 +42,7 @@ ASKED = {
 
 @pytest.fixture
 def config(tmp_path: Path) -> Path:
-    shutil.copy(TESTS.parent / "gateway" / "demo" / "paper_van.json", tmp_path / "vehicle.json")
-    path = tmp_path / "springscale.toml"
-    path.write_text(
-        f"""
-        signals = "springscale:reference"
-        calibration = "vehicle.json"
-        [bus]
-        interface = "virtual"
-        channel = "{tmp_path.name}"
-        [batch]
-        window_s = 20.0
-        [web]
-        port = {free_port()}
-        [store]
-        directory = "state"
-        """
-    )
-    return path
+    return paper_van_config(tmp_path, free_port(), "[batch]\nwindow_s = 20.0")
 
 
 def fill(directory: Path) -> str:
