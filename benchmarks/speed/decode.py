@@ -27,7 +27,7 @@ from isal import igzip
 from gateway.bus.frames import merge_frames
 from gateway.bus.logs import motion_of_log
 from gateway.bus.logs.candump_write import append_candump
-from gateway.bus.logs.line_blocks import open_maybe_gzip
+from gateway.bus.logs.packed import open_log_file
 from gateway.bus.signals import load_signal_map, shipped_map
 from gateway.records import EXTENDED_ID, Frames
 
@@ -114,7 +114,7 @@ def run_inflate(path: Path) -> dict[str, Any]:
     seconds = []
     for _ in range(REPEATS):
         begun = time.perf_counter()
-        with open_maybe_gzip(path) as file:
+        with open_log_file(path) as file:
             n_lines = sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
         seconds.append(time.perf_counter() - begun)
     return {"frames": n_lines, "seconds": min(seconds)}

@@ -117,7 +117,9 @@ class VehicleTable(_Table):
 class RunTable(_Table):
     """[[runs]]: one drive with a known load."""
 
-    log: Path = Field(description="its log: candump text, .asc, .blf, .trc or .csv, each also as .gz")
+    log: Path = Field(
+        description="its log: candump text, .asc, .blf, .mf4, .trc or .csv, each also as .gz, .zst or .xz"
+    )
     payload_kg: Kilograms = Field(description="what is aboard besides the empty vehicle: L; 0 for an empty run")
     payload_position_m: Metres | None = Field(
         None, description="its centre of gravity behind the front axle: d; a loaded run needs it or `front_share_pct`"

@@ -1,8 +1,9 @@
-"""One suite over every way in: the same frames as .log, .log.gz, .asc, .blf, .trc, .csv, .db or on a bus."""
+"""One suite over every way in: the same frames as .log, .log.zst, .asc, .blf, .trc, .csv, .db or on a bus."""
 
 import gzip
 import importlib.util
 import itertools
+import lzma
 import os
 import sqlite3
 import time
@@ -19,6 +20,7 @@ from gateway.bus.frames import join, merge_frames
 from gateway.bus.live import LiveSource
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
+from gateway.bus.logs.packed import zstd
 from gateway.bus.messages import message_of
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.sink import BusSink, replay
@@ -28,6 +30,7 @@ from gateway.records import EXTENDED_ID, Frames, Motion, Signal, joined
 START_NS = 1_760_146_908_000_000_000
 CHANNELS = itertools.count()
 TEXT_FORMATS = (".asc", ".csv", ".trc")
+PACK = {".gz": gzip.compress, ".zst": zstd.compress, ".xz": lzma.compress}
 WRITERS = {".asc": can.ASCWriter, ".blf": can.BLFWriter, ".trc": can.TRCWriter, ".csv": can.CSVWriter}
 
 
@@ -86,18 +89,19 @@ def write_log(frames, path):
     if suffix in (".log", ".log.gz"):
         write_candump(frames, "can0", path)
         return
+    if path.suffix in PACK:
+        write_log(frames, path.with_suffix(""))
+        path.write_bytes(PACK[path.suffix](path.with_suffix("").read_bytes()))
+        return
     if suffix == ".db":
         write_database(frames, path)
         return
-    plain = path.with_suffix("") if path.suffix == ".gz" else path
-    with WRITERS[plain.suffix](plain) as writer:
+    with WRITERS[path.suffix](path) as writer:
         for row in range(len(frames)):
             message = message_of(frames, row)
             message.channel = 0
             message.timestamp = float(message.timestamp)
             writer.on_message_received(message)
-    if plain != path:
-        path.write_bytes(gzip.compress(plain.read_bytes()))
 
 
 def write_database(frames, path):
@@ -125,7 +129,9 @@ def assert_same(motion: Motion, truth: Motion, *, stamp_tolerance_ns: int = 0) -
     assert np.abs(motion.t_ns - truth.t_ns).max() <= stamp_tolerance_ns
 
 
-@pytest.mark.parametrize("suffix", [".log", ".log.gz", ".asc", ".asc.gz", ".blf", ".blf.gz", ".csv", ".csv.gz", ".db"])
+@pytest.mark.parametrize(
+    "suffix", [*(kind + packing for kind in (".log", ".asc", ".blf", ".csv") for packing in ("", *PACK)), ".db"]
+)
 def test_every_log_format_gives_the_same_motion(suffix, tmp_path, drive, truth, signal_map):
     path = tmp_path / f"drive{suffix}"
     write_log(drive, path)

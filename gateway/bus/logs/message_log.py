@@ -11,7 +11,7 @@ import can
 from can.io.generic import MessageReader
 
 from gateway.bus.frames import LAST_SECOND
-from gateway.bus.logs.line_blocks import open_maybe_gzip
+from gateway.bus.logs.packed import open_log_file
 from gateway.bus.logs.report import LogReject, LogReport
 from gateway.bus.messages import frames_of, message_id
 from gateway.bus.signals import IdFilter
@@ -131,7 +131,7 @@ class _ResumableLines:
 def _text_messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.Message]:
     """Messages of a text log; a reader that trips over a line is begun anew behind it."""
     make_reader, header = _TEXT_READERS[suffix]
-    with open_maybe_gzip(path) as stream:
+    with open_log_file(path) as stream:
         text = io.TextIOWrapper(stream, encoding="utf-8", errors="replace")
         lines = _ResumableLines(text)
         reader = make_reader(cast(TextIO, lines))
@@ -150,7 +150,7 @@ def _text_messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.M
 
 def _messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.Message]:
     try:
-        with open_maybe_gzip(path) as stream, _binary_reader(path, suffix, stream) as reader:
+        with open_log_file(path) as stream, _binary_reader(path, suffix, stream) as reader:
             yield from reader
             if _is_cut(path, reader):
                 report.ended_early = "the file is cut off: shorter than its header says"

@@ -6,6 +6,7 @@ from typing import Final
 
 from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.message_log import MESSAGE_SUFFIXES, read_message_log
+from gateway.bus.logs.packed import PACKED_SUFFIXES, unpacked_suffix
 from gateway.bus.logs.report import LogReport
 from gateway.bus.signals import CAN_FD_BYTES, Decoder, IdFilter, SignalMap
 from gateway.errors import LogUnreadableError
@@ -18,8 +19,8 @@ CANDUMP_SUFFIXES: Final = (".log", ".txt", ".candump", "")
 def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames], LogReport]:
     """The map's frames of a log in order of arrival, and a report that fills while they are read.
 
-    candump text (.log, .txt, .candump, gzip or not) goes through the fast reader, .asc .blf .mf4 .trc
-    .csv .db through python-can's. Raises LogUnreadableError where the file is missing or of an unknown kind.
+    candump text (.log, .txt, .candump) goes through the fast reader, .asc .blf .mf4 .trc .csv .db through
+    python-can's; each may be packed. Raises LogUnreadableError where the file is missing or of an unknown kind.
     """
     return _open(Path(path), signal_map.filters, signal_map.channel, signal_map.payload_width)
 
@@ -33,15 +34,16 @@ def _open(
     path: Path, filters: Sequence[IdFilter], channel: str | None, width: int
 ) -> tuple[Iterator[Frames], LogReport]:
     report = LogReport(path)
-    suffix = log_suffix(path)
+    suffix = unpacked_suffix(path)
     _require_file(path)
     if suffix in CANDUMP_SUFFIXES:
         return read_candump(path, filters, channel, width=width, report=report), report
     if suffix in MESSAGE_SUFFIXES:
         return read_message_log(path, suffix, filters, channel, width, report), report
     known = " ".join((*CANDUMP_SUFFIXES[:-1], *MESSAGE_SUFFIXES))
+    packed = ", ".join(PACKED_SUFFIXES)
     raise LogUnreadableError(
-        f"{path}: cannot tell the kind of log from {suffix!r}; known are {known}, and each with .gz"
+        f"{path}: cannot tell the kind of log from {suffix!r}; known are {known}, and each with {packed}"
     )
 
 
@@ -50,12 +52,6 @@ def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Mot
     chunks, report = open_log(path, signal_map)
     decoder = Decoder(signal_map)
     return map(decoder.decode, chunks), report, decoder
-
-
-def log_suffix(path: Path) -> str:
-    """Lower-case suffix of the log's kind, without ``.gz``."""
-    name = path.with_suffix("") if path.suffix.lower() == ".gz" else path
-    return name.suffix.lower()
 
 
 def _require_file(path: Path) -> None:

@@ -1,0 +1,146 @@
+"""A log file as it was before it was packed: gzip, zstd and xz are inflated on the way, known by their first bytes."""
+
+import io
+import lzma
+import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, Final, Protocol, cast
+
+from isal import igzip_lib
+
+from gateway.errors import LogUnreadableError
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
+PACKED_BYTES: Final = 1 << 18
+INFLATED_BYTES: Final = 1 << 17  # at most this much before a damage is lost
+BUFFER_BYTES: Final = 2 << 20
+PACKED_SUFFIXES: Final = (".gz", ".zst", ".xz")
+
+
+class Inflater(Protocol):
+    """One member of a packed stream, as the standard library's decompressors read it."""
+
+    @property
+    def eof(self) -> bool:
+        """Whether the member is over."""
+
+    @property
+    def needs_input(self) -> bool:
+        """Whether nothing more comes without more packed bytes."""
+
+    @property
+    def unused_data(self) -> bytes:
+        """What followed the member."""
+
+    def decompress(self, data: bytes, max_length: int = -1) -> bytes:
+        """At most ``max_length`` bytes more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Packing:
+    """One way to pack: how its members begin, what inflates one, what that raises."""
+
+    name: str
+    magics: tuple[bytes, ...]
+    new_inflater: Callable[[], Inflater]
+    fault: type[Exception]
+
+    def begins(self, content: bytes) -> bool:
+        """Whether ``content`` is the beginning of a member."""
+        return content.startswith(self.magics)
+
+
+_ZSTD_SKIPPABLE: Final = tuple(bytes([0x50 + i]) + b"\x2a\x4d\x18" for i in range(16))  # RFC 8878, 3.1.2
+PACKINGS: Final = (
+    Packing(
+        "gzip",
+        (b"\x1f\x8b",),
+        lambda: igzip_lib.IgzipDecompressor(flag=igzip_lib.DECOMP_GZIP),
+        cast(type[Exception], igzip_lib.error),
+    ),
+    Packing("zstd", (b"\x28\xb5\x2f\xfd", *_ZSTD_SKIPPABLE), zstd.ZstdDecompressor, zstd.ZstdError),
+    Packing("xz", (b"\xfd7zXZ\0",), lambda: lzma.LZMADecompressor(format=lzma.FORMAT_XZ), lzma.LZMAError),
+)
+_LONGEST_MAGIC: Final = max(len(magic) for packing in PACKINGS for magic in packing.magics)
+
+
+class InflatedStream(io.RawIOBase):
+    """A packed file inflated, all its members. Unlike a GzipFile it gives all there is before a damage, then raises.
+
+    Raises EOFError where the stream is cut, OSError where it is damaged.
+    """
+
+    def __init__(self, file: BinaryIO, packing: Packing) -> None:
+        self._file = file
+        self._packing = packing
+        self._inflater = packing.new_inflater()
+        self._packed = b""
+
+    def readable(self) -> bool:
+        """A stream to read from."""
+        return True
+
+    def readinto(self, buffer: "WriteableBuffer") -> int:
+        """Inflate into ``buffer``; bytes written, 0 at the end."""
+        room = memoryview(buffer).cast("B")
+        while True:
+            if self._inflater.eof and not self._next_member():
+                return 0
+            if self._inflater.needs_input and not self._packed:
+                self._packed = self._file.read(PACKED_BYTES)
+                if not self._packed:
+                    raise EOFError(f"the {self._packing.name} stream is cut off")
+            try:
+                text = self._inflater.decompress(self._packed, min(len(room), INFLATED_BYTES))
+            except self._packing.fault as fault:
+                raise OSError(f"the {self._packing.name} stream is damaged: {fault}") from None
+            self._packed = b""
+            if text:
+                room[: len(text)] = text
+                return len(text)
+
+    def close(self) -> None:
+        """Close the file below as well."""
+        self._file.close()
+        super().close()
+
+    def _next_member(self) -> bool:
+        """Whether another member follows; zeros and what is none after the last one are padding."""
+        self._packed = self._inflater.unused_data
+        if len(self._packed) < _LONGEST_MAGIC:
+            self._packed += self._file.read(PACKED_BYTES)
+        if not self._packing.begins(self._packed):
+            return False
+        self._inflater = self._packing.new_inflater()
+        return True
+
+
+def open_log_file(path: Path) -> AbstractContextManager[BinaryIO]:
+    """Open for reading, inflating where the content is packed whatever the file is called."""
+    try:
+        file = path.open("rb")
+    except OSError as fault:
+        raise LogUnreadableError(f"{path}: cannot be read: {fault.strerror or fault}") from None
+    packing = packing_of(file.peek(_LONGEST_MAGIC))
+    return file if packing is None else io.BufferedReader(InflatedStream(file, packing), BUFFER_BYTES)
+
+
+def packing_of(content: bytes) -> Packing | None:
+    """How a file that begins so is packed, None where it is not."""
+    return next((packing for packing in PACKINGS if packing.begins(content)), None)
+
+
+def unpacked_suffix(path: Path) -> str:
+    """Lower-case suffix of a file's kind, without that of its packing."""
+    name = path.with_suffix("") if path.suffix.lower() in PACKED_SUFFIXES else path
+    return name.suffix.lower()
