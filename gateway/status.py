@@ -30,6 +30,7 @@ SENTENCES: Final[dict[State, str]] = {
     State.STALE: "No new estimate for a while: the shown one is old.",
     State.READER_FAULT: "The bus cannot be read: see the last fault.",
 }
+OTHERS_ONLY: Final = "The bus is awake (identifiers heard: {}), but none that is mapped."
 
 
 SILENT_AFTER_S: Final = 5.0
@@ -51,6 +52,9 @@ class BusStatus(_Told):
     n_inbox_dropped: int = Field(0, description="frames the pipeline did not take in time")
     n_kernel_dropped: int | None = Field(None, description="frames the kernel dropped; null where it does not tell")
     last_frame_age_s: float | None = None
+    n_identifiers: int | None = Field(
+        None, description="how many are on the bus, looked for while a sensor is silent; null where nobody looked"
+    )
     last_fault: str | None = None
 
 
@@ -69,6 +73,10 @@ class SignalHealth(_Told):
     rate_hz: float | None = None
     last_age_s: float | None = None
     rejected_share: float | None = Field(None, description="share of its frames that gave no sample")
+    similar: tuple[str, ...] = Field(
+        (),
+        description="while it is silent: unmapped identifiers on the bus that are like its message's",
+    )
 
     @property
     def is_silent(self) -> bool:
@@ -156,10 +164,10 @@ class Status(_Told):
 
     def sentence(self) -> str:
         """The state in words, with what is wrong beside it."""
-        said = [SENTENCES[self.state]]
-        if self.state is State.SENSOR_FAULT and (
-            silent := [f"{s.signal.replace('_', ' ')}{self._why_silent(s.signal)}" for s in self.signals if s.is_silent]
-        ):
+        is_awake = self.state is State.WAITING_FOR_BUS and self.bus.n_identifiers
+        said = [OTHERS_ONLY.format(self.bus.n_identifiers) if is_awake else SENTENCES[self.state]]
+        silent = [f"{s.signal.replace('_', ' ')}{self._why_silent(s)}" for s in self.signals if s.is_silent]
+        if silent and (is_awake or self.state is State.SENSOR_FAULT):
             said.append(f"Silent: {', '.join(silent)}.")
         if self.state is State.READER_FAULT and self.bus.last_fault:
             said.append(f"Last fault: {self.bus.last_fault}.")
@@ -172,11 +180,14 @@ class Status(_Told):
         said += [f"{warning[:1].upper()}{warning[1:]}." for warning in self.warnings]
         return " ".join(said)
 
-    def _why_silent(self, signal: str) -> str:
-        """No frame of its message, or frames and never a valid sample; empty where it was heard before."""
-        counts = {row.reason: row.n for row in self.decode if row.signal == signal}
+    def _why_silent(self, silent: SignalHealth) -> str:
+        """No frame of its message and what is like it, or frames and never a valid sample; empty: heard before."""
+        counts = {row.reason: row.n for row in self.decode if row.signal == silent.signal}
         n_refused = sum(n for reason, n in counts.items() if reason != "ok")
+        similar = f"similar on the bus: {'; '.join(silent.similar)}" if silent.similar else ""
         if not counts or counts.get("ok"):
-            return ""
-        reasons = " and ".join(reason.replace("_", " ") for reason, n in counts.items() if n and reason != "ok")
-        return f" ({n_refused} frames came, all {reasons})" if n_refused else " (no frame of its message)"
+            return f" ({similar})" if similar else ""
+        if n_refused:
+            reasons = " and ".join(reason.replace("_", " ") for reason, n in counts.items() if n and reason != "ok")
+            return f" ({n_refused} frames came, all {reasons})"
+        return f" (no frame of its message{similar and '; ' + similar})"

@@ -43,7 +43,15 @@ def service() -> str:
     sheet.text(
         first + half + 10, BUS_Y + 50, "frames, stamped by the kernel", ink="soft", style="small", anchor="start"
     )
-    _thread(sheet, first, THREADS_Y, "can-receiver", "listens, never sends;", "opens a lost channel", "again")
+    _thread(
+        sheet,
+        first,
+        THREADS_Y,
+        "can-receiver",
+        "listens, never sends; beside",
+        "it can-around, while a",
+        "sensor is silent",
+    )
     _queue(sheet, first + THREAD[0], THREADS_Y + 48, second, "inbox: bounded,", "drops are counted")
     _thread(sheet, second, THREADS_Y, "pipeline", "decodes, cuts batches,", "estimates")
     _queue(sheet, second + THREAD[0], THREADS_Y + 48, third, "held rows: bounded,", "losses are counted")

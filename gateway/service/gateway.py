@@ -10,7 +10,7 @@ from functools import partial
 
 import uvicorn
 
-from gateway.bus.live import OpenReceiver
+from gateway.bus.live import OpenReceiver, around_of
 from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError, StoreError
@@ -24,6 +24,7 @@ from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.setup import Setup
+from gateway.status import State
 from gateway.uplink import uplink_settings
 from gateway.web import (
     Board,
@@ -89,6 +90,7 @@ class Gateway:
         self.board = Board(stale_after_s=settings.web.stale_after_s)
         self._restore_board(setup.calibration.id if setup.calibration else None)
         self.source = source_of(settings.bus, setup, open_receiver)
+        self.around = around_of(settings.bus.interface, settings.bus.channel, settings.bus.options)
         flow = setup.flow(settings.batch.for_core(is_live=True))
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board, log_batch)
@@ -101,6 +103,7 @@ class Gateway:
             self.store,
             self.board,
             self.uplink,
+            around=self.around,
             warnings=lambda: tuple(
                 fault
                 for fault in (token_file.fault, self.tare.fault, self._reload.fault, self.pipeline.roll_rate_fault)
@@ -212,11 +215,19 @@ class Gateway:
                 self._notifier.send(WATCHDOG="1")
             now = self.status()
             log_state(now)
+            self._look_around(now.state)
             if (told := now.sentence()) != sentence:
                 sentence = told
                 self._notifier.send(STATUS=told)
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._stopping.wait(), SUPERVISE_S)
+
+    def _look_around(self, state: State) -> None:
+        """A sensor that is not heard may speak under another identifier, which the bus's filters keep out."""
+        if state in (State.WAITING_FOR_BUS, State.SENSOR_FAULT):
+            self.around.look()
+        else:
+            self.around.forget()
 
     def _dead_part(self, serving: asyncio.Task[None]) -> str | None:
         """Which part died, and of what; None while all live."""
@@ -236,6 +247,7 @@ class Gateway:
         """Bus first, then what it fed; every accepted estimate reaches the disk."""
         self._notifier.send(STOPPING="1", STATUS="Stopping.")
         self.source.stop()
+        self.around.stop()
         self.pipeline.stop()
         if self.uplink is not None:
             self.uplink.stop()

@@ -4,7 +4,8 @@ import time
 from collections.abc import Callable
 from importlib.metadata import version
 
-from gateway.bus.live import LiveSource, SourceState
+from gateway.bus.live import Around, LiveSource, SourceState
+from gateway.bus.similar import similar_to
 from gateway.config import Settings
 from gateway.records import Signal
 from gateway.service.pipeline import Pipeline
@@ -32,6 +33,7 @@ class StatusReport:
         board: Board,
         uplink: Uplink | None = None,
         *,
+        around: Around,
         warnings: Callable[[], tuple[str, ...]] = tuple,
     ) -> None:
         self._settings = settings
@@ -41,6 +43,7 @@ class StatusReport:
         self._store = store
         self._board = board
         self._uplink = uplink
+        self._around = around
         self._warnings = warnings
         self._version = version("springscale")  # read once: it is a file, and a status must not want one
         self._started = time.monotonic()
@@ -122,6 +125,7 @@ class StatusReport:
             n_inbox_dropped=counts.dropped_inbox,
             n_kernel_dropped=counts.dropped_kernel,
             last_frame_age_s=min(ages, default=None),
+            n_identifiers=len(self._around.heard) or None,
             last_fault=self._source.reason,
         )
 
@@ -145,6 +149,17 @@ class StatusReport:
                     rate_hz=self._pipeline.watch.rate_hz.get(signal),
                     last_age_s=self._age_s(signal),
                     rejected_share=n_rejected / total if total else None,
+                    similar=self._similar(signal),
                 )
             )
         return tuple(health)
+
+    def _similar(self, signal: Signal) -> tuple[str, ...]:
+        """What was heard around that is like a silent signal's message."""
+        age_s = self._age_s(signal)
+        heard = self._around.heard
+        if not heard or (age_s is not None and age_s < SENSOR_LOST_S):
+            return ()
+        signal_map = self._setup.signal_map
+        message = next(m for m in signal_map.messages if any(mapped.signal is signal for mapped in m.signals))
+        return similar_to(message, signal_map, heard)

@@ -12,6 +12,7 @@ import sys
 import threading
 from pathlib import Path
 
+import can
 import httpx
 import pytest
 from support.bus_drive import bus_drive
@@ -81,6 +82,34 @@ def run_with_log(config: Path, log: Path, speed: float | str) -> list[str]:
         return list(store.reader().estimates().items)
     finally:
         store.close()
+
+
+def test_a_sensor_under_another_identifier_is_named_by_the_status(config: Path) -> None:
+    """The filters of the bus keep it out: the service looks around, and says what is there instead."""
+    settings = load_settings(config)
+    told: list[str] = []
+
+    def on_started(gateway: Gateway) -> None:
+        loop = asyncio.get_running_loop()
+
+        def others() -> None:
+            with can.Bus(interface="virtual", channel=settings.bus.channel) as bus:
+                strange = can.Message(arbitration_id=0x123, is_extended_id=False, data=bytes(8))
+
+                def is_told() -> bool:
+                    bus.send(strange)
+                    told[:] = [gateway.status().sentence()]
+                    return "similar" in told[0]
+
+                wait_until(is_told)
+            loop.call_soon_threadsafe(gateway.request_stop)
+
+        threading.Thread(target=others, daemon=True).start()
+
+    Gateway(settings, setup_of(settings), on_started=on_started).run()
+    assert told[0].startswith("The bus is awake (identifiers heard: 1), but none that is mapped.")
+    assert "vertical acceleration (no frame of its message; similar on the bus: 123, " in told[0]
+    assert "8 bytes" in told[0]
 
 
 @pytest.mark.parametrize("speed", [40.0, "max"])

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from gateway.bus.live import SourceState
+from gateway.bus.live import Around, SourceState
 from gateway.records import Signal
 from gateway.service.status import SENSOR_LOST_S, StatusReport
 from gateway.status import State
@@ -36,6 +36,7 @@ def report(
         "pipeline": SimpleNamespace(watch=SimpleNamespace(last_heard=heard), flow=SimpleNamespace(scheduler=scheduler)),
         "store": None,
         "board": SimpleNamespace(age_s=lambda: estimate_age_s, is_stale=lambda: is_stale),
+        "around": Around(None),
     }
     told = StatusReport(**cast(Any, parts))
     told._started = now - 60.0  # instead of waiting for a minute

@@ -74,6 +74,17 @@ def test_a_silent_bus_is_no_fault_and_feeds_the_watchdog(vehicle: Vehicle) -> No
     assert vehicle.pid() == pid
 
 
+def test_a_sensor_set_to_another_identifier_is_named(vehicle: Vehicle) -> None:
+    """The kernel's filters keep it out: the service looks past them while nothing comes."""
+    vehicle.run("systemd-run --quiet --collect --unit stranger cangen vcan0 -g 10 -I 122 -L 8")
+    try:
+        vehicle.restart()
+        vehicle.wait_until(lambda status: "similar on the bus: 122, " in status["state_in_words"])
+        assert vehicle.status()["bus"]["n_identifiers"] == 1
+    finally:
+        vehicle.run("systemctl stop stranger")
+
+
 def test_bus_off_is_told_and_passes(vehicle: Vehicle, drive: str, recovered: Recovered) -> None:
     vehicle.machine.write("/root/odd_frames.py", (GUEST / "odd_frames.py").read_bytes())
     vehicle.run("python3 /root/odd_frames.py 1 bus_off")

@@ -4,9 +4,9 @@ A log and databases come in; identifiers with their rates, the shipped signal ma
 gravity and a first signal map of one's own go out. Nothing is taken for granted but what the databases say.
 """
 
+from gateway.bus.heard import Heard
 from gateway.offline.look.draft import write_draft
 from gateway.offline.look.fits import Fit
-from gateway.offline.look.heard import Heard
 from gateway.offline.look.look import Look, look
 from gateway.offline.look.readings import Described
 from gateway.offline.look.roles import Found

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.frames import merge_frames
+from gateway.bus.heard import Heard
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map, shipped_map, shipped_maps
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2
-from gateway.offline.look.heard import Heard
 from gateway.records import Signal
 from gateway.units import STANDARD_GRAVITY_MPS2
 

@@ -1,91 +1,21 @@
-"""Who speaks in a log: every identifier of every channel, how often, and how long its frames are."""
+"""Who speaks in a log: every identifier of every channel."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
-from gateway.bus.frames import join, take
+from gateway.bus.heard import Heard, counted, heard_on
 from gateway.bus.logs import LogReport, open_whole_log
-from gateway.bus.signals import CAN_FD_BYTES, id_name
-from gateway.records import EXTENDED_ID, Frames
-from gateway.units import NS_PER_S
 
-KEPT_FRAMES: Final = 100_000  # of one identifier: a quarter of an hour at 100 Hz; counts and rates know them all
 NO_CHANNEL: Final = "None"  # how python-can's readers name the channel of a log that keeps none
-
-
-@dataclass(frozen=True, slots=True)
-class Heard:
-    """One identifier of one channel: its frames in all, the usual number of bytes, and the first of its frames."""
-
-    channel: str | None
-    can_id: int
-    n_frames: int
-    duration_s: float
-    frames: Frames
-
-    @property
-    def rate_hz(self) -> float:
-        """Frames a second, from the first to the last."""
-        return (self.n_frames - 1) / self.duration_s if self.duration_s > 0.0 else 0.0
-
-    @property
-    def lengths(self) -> tuple[int, ...]:
-        """Every number of bytes that occurs, the usual one first."""
-        lengths, n_times = np.unique(self.frames.length, return_counts=True)
-        return tuple(int(length) for length in lengths[np.argsort(-n_times, kind="stable")])
-
-    @property
-    def name(self) -> str:
-        """The identifier as candump writes it: three digits, or eight where it has 29 bits."""
-        return id_name(self.can_id)
-
-
-@dataclass(slots=True)
-class _Count:
-    """What was heard of one identifier so far."""
-
-    n: int = 0
-    first_ns: int = 0
-    last_ns: int = 0
-    n_kept: int = 0
-    kept: list[Frames] = field(default_factory=list)
-
-    def add(self, frames: Frames) -> None:
-        """Further frames of it."""
-        self.first_ns = int(frames.t_ns.min()) if not self.n else min(self.first_ns, int(frames.t_ns.min()))
-        self.last_ns = max(self.last_ns, int(frames.t_ns.max()))
-        self.n += len(frames)
-        if self.n_kept < KEPT_FRAMES:
-            self.kept.append(frames)
-            self.n_kept += len(frames)
 
 
 def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
     """Every identifier in order of channel and number. Raises LogUnreadableError where nothing can be read."""
     chunks, report = open_whole_log(log)
-    of_all = _counted(chunks)
+    of_all = counted(chunks)
     report.require_frames()
     channels = sorted(report.channels - {NO_CHANNEL})
     if len(channels) < 2:
-        return _heard(channels[0] if channels else None, of_all), report
-    by_channel = [_heard(channel, _counted(open_whole_log(log, channel)[0])) for channel in channels]
+        return heard_on(channels[0] if channels else None, of_all), report
+    by_channel = [heard_on(channel, counted(open_whole_log(log, channel)[0])) for channel in channels]
     return tuple(one for heard in by_channel for one in heard), report
-
-
-def _counted(chunks: Iterator[Frames]) -> dict[int, _Count]:
-    counts: dict[int, _Count] = {}
-    for frames in chunks:
-        for can_id in np.unique(frames.can_id):
-            counts.setdefault(int(can_id), _Count()).add(take(frames, frames.can_id == can_id))
-    return counts
-
-
-def _heard(channel: str | None, counts: dict[int, _Count]) -> tuple[Heard, ...]:
-    return tuple(
-        Heard(channel, can_id, count.n, (count.last_ns - count.first_ns) / NS_PER_S, join(count.kept, CAN_FD_BYTES))
-        for can_id, count in sorted(counts.items(), key=lambda item: (item[0] & EXTENDED_ID, item[0]))
-    )

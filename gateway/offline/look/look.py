@@ -4,13 +4,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gateway.bus.heard import Heard
 from gateway.bus.logs import LogReport
 from gateway.bus.signals import shipped_databases
 from gateway.core.batch import RATE_MIN_SHARE
 from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
 from gateway.offline.look.fits import Fit, fits_of
-from gateway.offline.look.heard import Heard, heard_in
+from gateway.offline.look.heard import heard_in
 from gateway.offline.look.readings import Described, Reading, databases_of, described, readings_of
 from gateway.offline.look.roles import Found, roles_of, tilt_deg
 from gateway.records import Signal

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.frames import take
+from gateway.bus.heard import Heard
 from gateway.bus.signals import Coding, DatabaseMessage, DatabaseSignal, is_j1939_code, j1939_filter, load_messages
 from gateway.errors import SignalMapError
-from gateway.offline.look.heard import Heard
 from gateway.records import EXTENDED_ID, F64
 from gateway.units import NS_PER_S, TO_SI
 

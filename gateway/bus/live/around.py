@@ -1,0 +1,81 @@
+"""Who else speaks on the bus while a mapped message is missing: every identifier, for two seconds, now and then.
+
+The service listens through filters, so it never hears a sensor that was set to another identifier. A channel that one
+program alone may open, such as a serial adapter, is left alone.
+"""
+
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import closing
+from typing import Any, Final
+
+import can
+
+from gateway.bus.heard import Heard, counted, heard_on
+from gateway.bus.live.python_can import open_python_can
+from gateway.bus.live.socketcan import open_socketcan
+from gateway.bus.live.source import OpenReceiver
+from gateway.bus.signals import CAN_FD_BYTES, IdFilter
+from gateway.errors import BusError
+from gateway.records import EXTENDED_ID
+
+LOOK_S: Final = 2.0
+EVERY_S: Final = 60.0
+POLL_S: Final = 0.1
+EVERY_IDENTIFIER: Final = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))
+
+
+class Around:
+    """Looks around in a thread of its own, for as long as a look takes; never sends."""
+
+    def __init__(self, open_receiver: OpenReceiver | None) -> None:
+        """``open_receiver`` opens the channel once more, unfiltered; None where that would disturb the first."""
+        self._open = open_receiver
+        self._heard: tuple[Heard, ...] = ()
+        self._begun_s = -EVERY_S
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def heard(self) -> tuple[Heard, ...]:
+        """Every identifier of the last look; none before the first."""
+        return self._heard
+
+    def look(self) -> None:
+        """Begin to look around, unless a look is under way or was just taken."""
+        if self._open is None or time.monotonic() - self._begun_s < EVERY_S or self._stopping.is_set():
+            return
+        self._begun_s = time.monotonic()
+        self._thread = threading.Thread(target=self._run, args=(self._open,), name="can-around", daemon=True)
+        self._thread.start()
+
+    def forget(self) -> None:
+        """What was heard is no longer of interest; the next silence is looked into at once."""
+        self._heard, self._begun_s = (), -EVERY_S
+
+    def stop(self) -> None:
+        """End a look that is under way."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self, open_receiver: OpenReceiver) -> None:
+        bursts = []
+        until_s = time.monotonic() + LOOK_S
+        try:
+            with closing(open_receiver()) as receiver:
+                while time.monotonic() < until_s and not self._stopping.is_set():
+                    bursts.append(receiver.receive(POLL_S).frames)
+        except (OSError, can.CanError, BusError):
+            pass  # the source tells what is the matter with the channel
+        self._heard = heard_on(None, counted(frames for frames in bursts if len(frames)))
+
+
+def around_of(interface: str, channel: str, options: Mapping[str, Any]) -> Around:
+    """For channels that several may listen to: the kernel's, and the in-process one."""
+    if interface == "socketcan":
+        return Around(lambda: open_socketcan(channel, EVERY_IDENTIFIER, CAN_FD_BYTES))
+    if interface == "virtual":
+        return Around(lambda: open_python_can(interface, channel, EVERY_IDENTIFIER, CAN_FD_BYTES, options))
+    return Around(None)
