@@ -48,9 +48,9 @@ def service() -> str:
         first,
         THREADS_Y,
         "can-receiver",
-        "listens, never sends; beside",
-        "it can-around, while a",
-        "sensor is silent",
+        "listens, never sends;",
+        "can-around beside it",
+        "while a sensor is silent",
     )
     _queue(sheet, first + THREAD[0], THREADS_Y + 48, second, "inbox: bounded,", "drops are counted")
     _thread(sheet, second, THREADS_Y, "pipeline", "decodes, cuts batches,", "estimates")
