@@ -49,6 +49,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_findings.py --check
 	$(BIN)/python docs/make_calibration_schema.py --check
 	$(BIN)/python docs/make_readme_table.py --check
+	$(BIN)/python docs/make_scale.py --check
 	$(BIN)/python docs/make_site.py
 	$(BIN)/python docs/make_drawings.py --check
 	$(BIN)/python deploy/dist/audit_locks.py --advisory
@@ -115,6 +116,7 @@ docs: .venv/.development
 	$(BIN)/python docs/make_calibration_schema.py
 	$(BIN)/python docs/make_tutorial.py
 	$(BIN)/python docs/make_readme_table.py
+	$(BIN)/python docs/make_scale.py
 	$(BIN)/python docs/make_drawings.py
 
 # The documents as a site, in build/site.
