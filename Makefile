@@ -44,6 +44,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_signal_map.py --check
 	$(BIN)/python docs/make_campaign.py --check
 	$(BIN)/python docs/make_estimate.py --check
+	$(BIN)/python docs/make_archive.py --check
 	$(BIN)/python docs/make_faults.py --check
 	$(BIN)/python docs/make_reasons.py --check
 	$(BIN)/python docs/make_findings.py --check
@@ -110,6 +111,7 @@ docs: .venv/.development
 	$(BIN)/python docs/make_signal_map.py
 	$(BIN)/python docs/make_campaign.py
 	$(BIN)/python docs/make_estimate.py
+	$(BIN)/python docs/make_archive.py
 	$(BIN)/python docs/make_faults.py
 	$(BIN)/python docs/make_reasons.py
 	$(BIN)/python docs/make_findings.py

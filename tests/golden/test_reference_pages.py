@@ -6,6 +6,7 @@ import tomllib
 from dataclasses import fields
 from pathlib import Path
 
+import make_archive
 import make_campaign
 import make_estimate
 import make_signal_map
@@ -38,6 +39,7 @@ def test_the_pages_are_made_from_the_code() -> None:
     assert make_signal_map.signal_map_page() == SIGNAL_MAP, "run `make docs`"
     assert make_campaign.campaign_page() == CAMPAIGN, "run `make docs`"
     assert make_estimate.estimate_page() == ESTIMATE, "run `make docs`"
+    assert make_archive.archive_page() == make_archive.PAGE.read_text(encoding="utf-8"), "run `make docs`"
 
 
 @pytest.mark.parametrize("table", [SignalMapFile, SignalEntry, CampaignTable, VehicleTable, RunTable])

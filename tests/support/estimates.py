@@ -1,10 +1,11 @@
 """Estimates to store, publish and ask for."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from gateway.estimate import Estimate, Quantity
+from gateway.estimate import Correction, Epoch, Estimate, Quantity, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Spectra, Why, json_line
 from gateway.units import NS_PER_S
@@ -29,6 +30,21 @@ def make_estimate(n: int, *rejected: Why, with_spectra: bool = False, is_provisi
         is_provisional=is_provisional,
         spectra=Spectra(*(np.linspace(0.1 * k, 1.0, 4) for k in range(5))) if with_spectra else None,
         vehicle_id="van-17",
+    )
+
+
+def with_everything(n: int) -> Estimate:
+    """The n-th batch with an epoch, a tare, weights, a place to the side, and what its estimator says of its own."""
+    found = make_estimate(n)
+    return replace(
+        found,
+        epoch=Epoch(Quantity(101.0 / 3.0, 4.0), Quantity(50.2, 0.1), 3, Quantity(0.01, 0.003)),
+        tare=Correction("sha256:cd", Quantity(12.4, 1.0), Quantity(0.1, 0.2), found.payload, found.front_share),
+        weights=Weights(gross=Weight(1711.3, 6.1, 2000.0, None), front_axle=Weight(1006.1, 5.4, 1000.0, None)),
+        cg_left=Quantity.normal(0.021, 0.004),
+        shares={"gap": 0.01, "too_slow": 1.0 / 3.0},
+        diagnostics={"damper_front_ratio": 1.03, "tension": float("nan")},
+        vin="WF0XXXTTGXJK12345",
     )
 
 

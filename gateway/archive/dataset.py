@@ -1,0 +1,155 @@
+"""The table that re-reading an archive makes: one row a batch, as `springscale estimate --json` prints it, and of whom.
+
+Every column is of the JSON object of an estimate (gateway.estimate_json), rounded as there, or tells where the row is
+from. A change of columns raises ``SCHEMA_VERSION``; columns are added at the end, none goes or changes its kind.
+"""
+
+import io
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING, Any, Final
+
+from gateway.archive.places import MISSING, Place
+from gateway.archive.receipts import Slot
+from gateway.errors import ConfigurationError
+from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, REASONS, WEIGHTS, EstimateField, Kind
+from gateway.estimate_json.kinds import COUNT, INTERVAL, TEXT, WHOLE
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+SCHEMA_VERSION: Final = 1
+
+DIAGNOSTICS: Final = (
+    "reach",
+    "misfit",
+    "n_segments",
+    "amplitude_ratio",
+    "damper_front_ratio",
+    "damper_rear_ratio",
+    "delay_scale",
+    "payload_drift_std_kg",
+    "front_share_drift_std_pct",
+    "payload_own_std_kg",
+    "front_share_own_std_pct",
+    "tension",
+    "sensor_position_score",
+    "sensor_noise_score",
+    "payload_mode_hz",
+    "payload_damping_ratio",
+    "delay_s",
+    "delay_std_s",
+    "cg_left_own_std_m",
+)
+"""What an estimator says of its own, as docs/estimate.md explains it: a column each, null where it says nothing."""
+
+PROVENANCE: Final[Mapping[str, str]] = {
+    "log": "in which the batch ended: its path in the archive",
+    "log_sha256": "hash of that file as it lies there",
+    "signals_id": "hash of the signal map, its databases resolved",
+    "software": "the version of springscale and the hash of the code that weighs",
+    "job": "hash of everything that the row follows from; also the name of its file and receipt",
+}
+"""Columns that no estimate has; `calibration_id` and `tare_id` are among the estimate's own."""
+
+OVER_LIMIT: Final = "over_limit"
+_LEFT_OUT: Final = frozenset({"spectra", "provisional"})  # large; and never true of a whole batch
+
+
+def columns() -> dict[str, str]:
+    """Name and kind of every column, in order: text, whole, number, instant, texts, numbers by name."""
+    found: dict[str, str] = {}
+    for one in FIELDS:
+        if one.name not in _LEFT_OUT:
+            found |= _columns_of(one)
+    return found | dict.fromkeys(PROVENANCE, "text")
+
+
+def row_of(record: Mapping[str, Any]) -> dict[str, Any]:
+    """The JSON object of an estimate as a row, without its provenance; None where unknown."""
+    row: dict[str, Any] = {}
+    for one in FIELDS:
+        if one.name not in _LEFT_OUT:
+            row |= _cells_of(one, record.get(one.name))
+    return row
+
+
+def parquet_of(rows: Sequence[Mapping[str, Any]]) -> bytes:
+    """Rows as one Parquet file: the same rows, the same bytes, whoever writes them."""
+    pa = _pyarrow()
+    import pyarrow.parquet as pq  # noqa: PLC0415 - an extra; _pyarrow() has told if it is missing
+
+    table = pa.Table.from_pylist([dict(row) for row in rows], schema=schema())
+    sink = io.BytesIO()
+    pq.write_table(table, sink, compression="zstd")
+    return sink.getvalue()
+
+
+def rows_of(dataset: Place, slot: Slot, wanted: Sequence[str] | None = None) -> list[dict[str, Any]]:
+    """The rows that one receipt vouches for, of these columns or of all; instants are aware datetimes, UTC."""
+    _pyarrow()
+    import pyarrow.parquet as pq  # noqa: PLC0415 - an extra; _pyarrow() has told if it is missing
+
+    table = pq.read_table(io.BytesIO(dataset.read(slot.table)), columns=None if wanted is None else list(wanted))
+    rows: list[dict[str, Any]] = table.to_pylist()
+    return rows
+
+
+def schema() -> "pa.Schema":
+    """The table's schema in Arrow's terms; its version is in the metadata."""
+    pa = _pyarrow()
+    kinds = {
+        "text": pa.string(),
+        "whole": pa.int64(),
+        "number": pa.float64(),
+        "instant": pa.timestamp("us", tz="UTC"),
+        "texts": pa.list_(pa.string()),
+        "numbers by name": pa.map_(pa.string(), pa.float64()),
+    }
+    fields = [pa.field(name, kinds[kind]) for name, kind in columns().items()]
+    return pa.schema(fields, metadata={"springscale_schema": str(SCHEMA_VERSION)})
+
+
+def _columns_of(one: EstimateField) -> dict[str, str]:
+    if one.name == "diagnostics":
+        return dict.fromkeys(DIAGNOSTICS, "number")
+    if one.kind is WEIGHTS:
+        return dict.fromkeys(one.columns, "number") | {OVER_LIMIT: "texts"}
+    return dict.fromkeys(one.columns or (one.name,), _kind_name(one.kind))
+
+
+def _kind_name(kind: Kind) -> str:
+    named = ((TEXT, "text"), (WHOLE, "whole"), (COUNT, "whole"), (INSTANT, "instant"), (REASONS, "texts"))
+    return next((name for of, name in named if kind is of), "numbers by name" if kind is BY_NAME else "number")
+
+
+def _cells_of(one: EstimateField, told: Any) -> dict[str, Any]:
+    names = _columns_of(one)
+    return dict.fromkeys(names) if told is None else dict(zip(names, _cells(one, told), strict=True))
+
+
+def _cells(one: EstimateField, told: Any) -> Sequence[Any]:
+    if one.name == "diagnostics":
+        return [told.get(name) for name in DIAGNOSTICS]
+    if one.kind is WEIGHTS:
+        return [*one.kind.cells(told), [place for place, weight in told.items() if weight["is_over_limit"]]]
+    if one.kind is INTERVAL:
+        return list(told)
+    return [_cell(one.kind, told)]
+
+
+def _cell(kind: Kind, told: Any) -> Any:
+    if kind is INSTANT:
+        return datetime.fromisoformat(told)
+    if kind is COUNT:
+        return int(told)
+    return list(told.items()) if kind is BY_NAME else told
+
+
+def _pyarrow() -> Any:
+    """The library, loaded when a table is made: a vehicle lacks it."""
+    try:
+        import pyarrow  # noqa: PLC0415 - an extra, see above
+    except ModuleNotFoundError:
+        raise ConfigurationError(MISSING) from None
+    return pyarrow

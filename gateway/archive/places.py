@@ -1,0 +1,193 @@
+"""Folders that may be anywhere: on this computer or in an object store (s3://, gs://, az://), by obstore alone.
+
+place = place_of("s3://fleet/logs")
+place.create("a/b.json", b"...")      # False where it is already there: the store decides, not we
+"""
+
+import functools
+import hashlib
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import unquote, urlsplit
+
+from gateway.errors import ConfigurationError, SpringscaleError
+
+if TYPE_CHECKING:
+    from obstore.store import ObjectStore
+
+SCHEMES: Final = ("file", "s3", "gs", "az")
+MISSING: Final = (
+    "reading and writing archives needs packages that a vehicle does not: pip install 'springscale[archive]'"
+)
+CHUNK_BYTES: Final = 8 << 20  # of a large object, held at a time
+_URL: Final = re.compile(r"^[a-z][a-z0-9]+://")
+
+
+class PlaceError(SpringscaleError):
+    """A folder or store cannot be read or written now; what was not done can be tried again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """A file below a place. ``stamp`` changes whenever its content does, as far as the place can tell."""
+
+    path: str
+    size: int
+    stamp: str
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A folder by its URL. It holds no connection: each process makes its own, and keeps it."""
+
+    url: str
+
+    def __str__(self) -> str:
+        local = self.local("")
+        return self.url if local is None else str(local)
+
+    def at(self, path: str) -> "Place":
+        """A folder inside it."""
+        return Place(f"{self.url}/{path.strip('/')}") if path.strip("/") else self
+
+    def local(self, path: str) -> Path | None:
+        """Where a file of it lies on this computer; None where it does not."""
+        parts = urlsplit(self.url)
+        return Path(unquote(parts.path)) / path if parts.scheme == "file" else None
+
+    def items(self, below: str = "") -> list[Item]:
+        """Every file below a folder of it, in order of path; none where the folder is not there."""
+        obs, here = _obstore(), self.local("")
+        if here is not None and not here.is_dir():
+            return []
+        with self._faults(below):
+            found = [one for page in obs.list(self._store(), below.strip("/") or None) for one in page]
+        return sorted((_item(one) for one in found), key=lambda item: item.path)
+
+    def read(self, path: str) -> bytes:
+        """What a small file holds. Raises FileNotFoundError, else PlaceError."""
+        here = self.local(path)
+        if here is not None and not here.is_file():
+            raise FileNotFoundError(f"{here}: no such file")
+        with self._faults(path):
+            return bytes(_obstore().get(self._store(), path).bytes())
+
+    def create(self, path: str, content: bytes) -> bool:
+        """Write a file that is not there yet, whole or not at all; False where there is one, which then stays."""
+        obs = _obstore()
+        with self._faults(path):
+            try:
+                obs.put(self._store(), path, content, mode="create", use_multipart=False)
+            except obs.exceptions.AlreadyExistsError:
+                return False
+        return True
+
+    def replace(self, path: str, content: bytes) -> None:
+        """Write a file, whole or not at all, whatever is there."""
+        with self._faults(path):
+            _obstore().put(self._store(), path, content, use_multipart=False)
+
+    def remove(self, path: str) -> None:
+        """Remove a file; one that is not there is no fault."""
+        with self._faults(path):
+            try:
+                _obstore().delete(self._store(), path)
+            except FileNotFoundError:
+                return
+
+    @contextmanager
+    def fetched(self, path: str) -> "Iterator[Fetched]":
+        """A file of any size on this computer's disk for as long as the block lasts, and its hash.
+
+        A local one stays where it is; another comes in chunks. Raises FileNotFoundError, else PlaceError.
+        """
+        here = self.local(path)
+        if here is not None:
+            yield Fetched(here, _sha256_of(here))
+            return
+        with tempfile.TemporaryDirectory(prefix="springscale-") as folder:
+            copy = Path(folder) / path.rpartition("/")[2]  # its suffixes tell what it is
+            digest = hashlib.sha256()
+            with self._faults(path), copy.open("wb") as file:
+                for chunk in _obstore().get(self._store(), path).stream(min_chunk_size=CHUNK_BYTES):
+                    digest.update(chunk)
+                    file.write(chunk)
+            yield Fetched(copy, digest.hexdigest())
+
+    def _store(self) -> "ObjectStore":
+        return _store_of(self.url)
+
+    @contextmanager
+    def _faults(self, path: str) -> Iterator[None]:
+        """Turns what the library raises into one line that names the place."""
+        obs = _obstore()
+        where = f"{self}/{path}".rstrip("/")
+        try:
+            yield
+        except FileNotFoundError:
+            raise FileNotFoundError(f"{where}: no such file") from None
+        except (obs.exceptions.BaseError, OSError) as fault:
+            raise PlaceError(f"{where}: {_first_words(fault)}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Fetched:
+    """A file on this computer's disk and the sha256 of what it holds."""
+
+    path: Path
+    sha256: str
+
+
+def place_of(named: str | Path) -> Place:
+    """The place that a person means: a URL or a folder's path. Raises ConfigurationError for another scheme."""
+    text = str(named)
+    if not _URL.match(text):
+        return Place(Path(text).absolute().as_uri())
+    scheme = urlsplit(text).scheme
+    if scheme not in SCHEMES:
+        raise ConfigurationError(f"{text}: {scheme}:// is not read here; there are {', '.join(SCHEMES)}, and paths")
+    return Place(text.rstrip("/"))
+
+
+def _obstore() -> Any:
+    """The library, loaded when something is read: a vehicle lacks it."""
+    try:
+        import obstore  # noqa: PLC0415 - an extra, see above
+    except ModuleNotFoundError:
+        raise ConfigurationError(MISSING) from None
+    return obstore
+
+
+@functools.lru_cache(maxsize=64)
+def _store_of(url: str) -> "ObjectStore":
+    """One connection a process and place. Credentials come from the environment, as the clouds' own tools read it."""
+    from obstore.store import LocalStore, from_url  # noqa: PLC0415 - an extra; _obstore() has told if it is missing
+
+    parts = urlsplit(url)
+    if parts.scheme == "file":
+        return LocalStore(unquote(parts.path), mkdir=True)
+    return from_url(url)
+
+
+def _item(meta: Any) -> Item:
+    return Item(meta["path"], meta["size"], meta["e_tag"] or meta["last_modified"].isoformat())
+
+
+def _sha256_of(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except FileNotFoundError:
+        raise FileNotFoundError(f"{path}: no such file") from None
+    except OSError as fault:
+        raise PlaceError(f"{path}: cannot be read: {fault.strerror or fault}") from None
+
+
+def _first_words(fault: BaseException) -> str:
+    """The first line of the library's account, without the debug dump that follows it."""
+    return str(fault).strip().partition("\n")[0][:400]
