@@ -124,6 +124,13 @@ class StoreSection(Section):
     max_size_mb: float = Field(512.0, ge=4.0, le=1e9, description="the oldest records are removed beyond this size")
 
 
+class KeepSection(Section):
+    """What is kept of the batches themselves, for calibrations to come: no log is asked of anybody."""
+
+    batches: int = Field(256, ge=0, le=100_000, description="batches kept at most, the newest (0: none)")
+    size_mb: float = Field(128.0, ge=1.0, le=100_000.0, description="disk space they may take; the oldest give way")
+
+
 class UplinkSection(Section):
     """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that nobody can ask."""
 
@@ -200,6 +207,7 @@ class Settings(BaseSettings):
     batch: BatchSection = BatchSection()
     web: WebSection = WebSection()
     store: StoreSection = StoreSection()
+    keep: KeepSection = KeepSection()
     uplink: UplinkSection = UplinkSection()
     trust: TrustSection = TrustSection()
     log: LogSection = LogSection()

@@ -41,6 +41,10 @@ class CalibrationImpossibleError(SpringscaleError):
     """The known-load drives do not carry enough to calibrate from."""
 
 
+class KeptBatchError(SpringscaleError):
+    """A kept batch is damaged, or written by nobody we know."""
+
+
 class LogUnreadableError(SpringscaleError):
     """A log holds no frame that can be read."""
 

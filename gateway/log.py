@@ -65,6 +65,7 @@ class Event(StrEnum):
     UPLINK_LOST = "uplink lost"
     UPLINK_NOT_REACHED = "uplink not reached"
     UPLINK_REFUSED = "uplink refused an estimate"
+    BATCH_NOT_KEPT = "batch not kept"
     TARE_SET = "tare set"
     TARE_UNDONE = "tare undone"
     TARE_DROPPED = "tare dropped"

@@ -80,4 +80,5 @@ def service() -> str:
     sheet.text(first + 20, bottom + 56, "MQTT", ink="soft", style="small")
     _file(sheet, second - 30, bottom + 10, "tare.json", "owned by main")
     _file(sheet, second + 110, bottom + 10, "tokens.json", "springscale token")
+    _file(sheet, third + 110, bottom + 10, "batches/", "owned by batch-keeper")
     return sheet.svg()

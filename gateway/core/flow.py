@@ -1,6 +1,6 @@
 """Rows in, estimates out: the one path that the live service and the offline tools share."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from gateway.core.batch import Traits
@@ -24,11 +24,15 @@ class Identity:
     vin: str | None = None
 
 
+OnBatch = Callable[[Batch, Estimate, Motion], None]
+
+
 class Flow:
     """Scheduler and estimator in a row. Feed it decoded rows in order of arrival.
 
     ``tare`` may be set from any thread and counts from the next batch on; ``weighed`` is the last load
-    epoch with a counted batch, in raw numbers: what a tare is made from.
+    epoch with a counted batch, in raw numbers: what a tare is made from. ``on_batch`` hears of every batch
+    before its estimate leaves: with it, and with the rows it was made of.
     """
 
     def __init__(
@@ -49,6 +53,7 @@ class Flow:
         self._is_epoch_over = False
         self.tare = tare
         self.weighed: Weighed | None = None
+        self.on_batch: OnBatch = lambda batch, found, rows: None
 
     @property
     def load_may_have_changed(self) -> bool:
@@ -67,6 +72,12 @@ class Flow:
         return map(self._estimate, self.scheduler.flush())
 
     def _estimate(self, batch: Batch) -> Estimate:
+        rows = self.scheduler.take_rows()
+        shown = self._answer(batch)
+        self.on_batch(batch, shown, rows)
+        return shown
+
+    def _answer(self, batch: Batch) -> Estimate:
         found = estimate(batch, self._calibrated, self._estimator)
         found = replace(found, vehicle_id=self._identity.vehicle_id, vin=self._identity.vin)
         if batch.is_provisional:

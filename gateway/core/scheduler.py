@@ -45,11 +45,19 @@ class Scheduler:
         self._still_since_ns: int = _MOVING
         self.is_parked = False
         self.n_late_rows = 0
+        self._rows_of_last: Motion | None = None
 
     @property
     def drive_start_ns(self) -> int | None:
         """Of the drive that is under way; None between drives. Safe from any thread."""
         return None if self._newest_ns is None else self._drive_start_ns
+
+    def take_rows(self) -> Motion:
+        """Those that the batch yielded last was made of, and maybe some beyond its window; given once."""
+        rows, self._rows_of_last = self._rows_of_last, None
+        if rows is None:
+            raise ValueError("no batch was yielded since rows were last taken")
+        return rows
 
     def feed(self, motion: Motion) -> Iterator[Batch]:
         """Take rows in order of arrival; yield the batches that end with them."""
@@ -194,6 +202,7 @@ class Scheduler:
 
     def _build(self, t_end_ns: int, ended_by: Why | None = None, *, is_provisional: bool = False) -> Batch:
         self._rows, self._loose = [joined([*self._rows, *self._loose])], []
+        self._rows_of_last = self._rows[0]
         window = Window(self._window_start_ns, t_end_ns, self._drive_start_ns, ended_by, is_provisional)
         return build_batch(self._rows[0], window, self._settings, self._traits)
 

@@ -18,7 +18,7 @@ from gateway.log import Event, log_event
 from gateway.service.changes import BatchLog, StateLog
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
-from gateway.service.parts import source_of, store_of, uplink_of
+from gateway.service.parts import keeper_of, source_of, store_of, uplink_of
 from gateway.service.pipeline import Pipeline
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
@@ -92,6 +92,8 @@ class Gateway:
         self.source = source_of(settings.bus, setup, open_receiver)
         self.around = around_of(settings.bus.interface, settings.bus.channel, settings.bus.options)
         flow = setup.flow(settings.batch.for_core(is_live=True))
+        self.keeper = keeper_of(settings.keep, settings.store, setup)
+        flow.on_batch = self.keeper.keep
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board, log_batch)
         self.uplink = uplink_of(forwarding, setup, self.store)
@@ -106,7 +108,13 @@ class Gateway:
             around=self.around,
             warnings=lambda: tuple(
                 fault
-                for fault in (token_file.fault, self.tare.fault, self._reload.fault, self.pipeline.roll_rate_fault)
+                for fault in (
+                    token_file.fault,
+                    self.tare.fault,
+                    self._reload.fault,
+                    self.pipeline.roll_rate_fault,
+                    self.keeper.fault,
+                )
                 if fault
             ),
         )
@@ -173,6 +181,7 @@ class Gateway:
         loop.add_signal_handler(signal.SIGHUP, self._reload_told)
         bus = self._settings.bus
         log_event(Event.STARTED, version=self.status().version, interface=bus.interface, channel=bus.channel)
+        self.keeper.start()
         self.source.start()
         self.pipeline.start()
         if self.uplink is not None:
@@ -249,6 +258,7 @@ class Gateway:
         self.source.stop()
         self.around.stop()
         self.pipeline.stop()
+        self.keeper.stop()
         if self.uplink is not None:
             self.uplink.stop()
         self.board.close()

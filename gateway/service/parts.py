@@ -3,7 +3,10 @@
 from importlib.metadata import version
 
 from gateway.bus.live import LiveSource, OpenReceiver
-from gateway.config import BusSection, StoreSection
+from gateway.calibration.kept import Shelf, ShelfLimits
+from gateway.calibration.kept.shelf import FOLDER
+from gateway.config import BusSection, KeepSection, StoreSection
+from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings
@@ -38,6 +41,11 @@ def store_of(wanted: StoreSection, forwarding: UplinkSettings | None) -> Store:
         undelivered_to=None if forwarding is None else _queue_name(forwarding),
     )
     return Store.open(wanted.directory, keep)
+
+
+def keeper_of(wanted: KeepSection, store: StoreSection, setup: Setup) -> BatchKeeper:
+    limits = ShelfLimits(wanted.batches, round(wanted.size_mb * BYTES_PER_MB))
+    return BatchKeeper(Shelf(store.directory / FOLDER, limits), setup.signal_map)
 
 
 def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:

@@ -1,5 +1,6 @@
 """What a signal map says, resolved: which frames carry our signals, where their bits lie, what makes them valid."""
 
+import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -109,6 +110,12 @@ class SignalMap:
     def traits(self) -> Mapping[Signal, SensorTraits]:
         """Latency, valid range and resolution of every mapped signal."""
         return MappingProxyType({m.signal: m.traits for message in self.messages for m in message.signals})
+
+    @cached_property
+    def id(self) -> str:
+        """Another one where any of our signals is read otherwise."""
+        read = repr((self.j1939, [(message.id_filter, message.signals) for message in self.messages]))
+        return hashlib.sha256(read.encode()).hexdigest()[:16]
 
     @cached_property
     def filters(self) -> tuple[IdFilter, ...]:

@@ -1,0 +1,106 @@
+"""Kept batches of a known load as a calibration takes them: the same inspection and the same fit as from logs."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.calibration.calibrate import Outcome, calibrate_inspected
+from gateway.calibration.campaign import Campaign
+from gateway.calibration.inspection import (
+    Finding,
+    Inspection,
+    LogFacts,
+    RowFacts,
+    SplitRun,
+    inspect_campaign,
+    offset_findings,
+    unmapped_roll_findings,
+)
+from gateway.calibration.inspection.rows import Stream
+from gateway.calibration.kept.batch_file import KeptBatch
+from gateway.calibration.known_run import KnownRun
+from gateway.core.settings import BatchSettings
+from gateway.records import Signal
+
+ESTIMATORS: Final = ("cross_spectrum",)  # the ratio index needs many loads
+
+
+@dataclass(frozen=True, slots=True)
+class KnownDrive:
+    """Kept batches, at least one, that were driven with one known load: a run of a campaign without a log."""
+
+    number: int
+    name: str
+    payload_kg: float
+    front_share_pct: float
+    batches: tuple[KeptBatch, ...]
+    payload_left_m: float | None = None
+
+
+def split_run_of(drive: KnownDrive) -> SplitRun:
+    """All of it identifies: whether a calibration is true is asked of loads that it has not seen."""
+    batches = tuple(kept.batch for kept in drive.batches)
+    run = KnownRun(
+        drive.number, drive.name, drive.payload_kg, drive.front_share_pct, batches, payload_left_m=drive.payload_left_m
+    )
+    nothing = KnownRun(drive.number, drive.name, drive.payload_kg, drive.front_share_pct, ())
+    facts = joined_facts([kept.facts for kept in drive.batches])
+    ids = hashlib.sha256("\n".join(kept.id for kept in drive.batches).encode()).hexdigest()
+    span_ns = (min(batch.t_start_ns for batch in batches), max(batch.t_end_ns for batch in batches))
+    return SplitRun(run, nothing, facts, log=LogFacts(sha256=ids, duration_s=facts.duration_s, span_ns=span_ns))
+
+
+def inspect_kept(campaign: Campaign, drives: Sequence[KnownDrive], settings: BatchSettings) -> Inspection:
+    """What is wrong with each of the drives, if anything; ``campaign`` says of which vehicle they are."""
+    split = tuple(map(split_run_of, drives))
+    verdicts, findings = inspect_campaign(split, campaign.vehicle, settings)
+    return Inspection(split, verdicts, (*findings, *_sideways_findings(campaign, split)))
+
+
+def calibrate_kept(
+    campaign: Campaign, drives: Sequence[KnownDrive], settings: BatchSettings, *, command: str = ""
+) -> Outcome:
+    """Inspects the drives and fits those without a fault. Raises as :func:`calibrate_inspected` does."""
+    inspection = inspect_kept(campaign, drives, settings)
+    return calibrate_inspected(campaign, inspection, estimators=ESTIMATORS, command=command)
+
+
+def joined_facts(parts: Sequence[RowFacts]) -> RowFacts:
+    """Of several stretches (at least one) as of one drive; a quantile of the whole is taken from those of its parts."""
+    signals = dict.fromkeys(signal for part in parts for signal in part.streams)
+    streams = {
+        signal: _joined_stream([part.streams[signal] for part in parts if signal in part.streams]) for signal in signals
+    }
+    return RowFacts(sum(part.duration_s for part in parts), streams)
+
+
+def _joined_stream(streams: Sequence[Stream]) -> Stream:
+    """The law of total variance for the scatter; the widest range, so that nothing is narrower than it was."""
+    spoke = [stream for stream in streams if stream.n >= 2]
+    if len(spoke) < 2:
+        return spoke[0] if spoke else streams[0]
+    n = np.array([stream.n for stream in spoke], float)
+    means = np.array([stream.mean for stream in spoke])
+    mean = float(np.average(means, weights=n))
+    variances = np.array([stream.std for stream in spoke]) ** 2 + (means - mean) ** 2
+    return Stream(
+        n=int(n.sum()),
+        rate_hz=float(np.average([stream.rate_hz for stream in spoke], weights=n)),
+        jitter_share=float(np.average([stream.jitter_share for stream in spoke], weights=n)),
+        mean=mean,
+        std=float(np.sqrt(np.average(variances, weights=n))),
+        low=min(stream.low for stream in spoke),
+        middle=float(np.average([stream.middle for stream in spoke], weights=n)),
+        high=max(stream.high for stream in spoke),
+        resolution=spoke[0].resolution,
+    )
+
+
+def _sideways_findings(campaign: Campaign, split: Sequence[SplitRun]) -> Iterator[Finding]:
+    """What would tell where loads lie to the side, and is not there."""
+    if not any(Signal.ROLL_RATE in run.facts.streams for run in split):
+        yield from unmapped_roll_findings(None)
+    yield from offset_findings(campaign.vehicle)

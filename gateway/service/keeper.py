@@ -1,0 +1,85 @@
+"""The thread that keeps batches for calibrations to come: the pipeline hands over, and never waits for the disk."""
+
+import logging
+import queue
+import threading
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.bus.signals import SignalMap
+from gateway.calibration.kept import Shelf, kept_batch_of
+from gateway.estimate import Estimate
+from gateway.log import Event, log_event
+from gateway.records import Batch, Motion
+
+MOST_WAITING: Final = 4  # each with its rows, some megabytes; one comes in minutes
+STOP_WITHIN_S: Final = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Handed:
+    batch_id: str
+    batch: Batch
+    rows: Motion
+
+
+class BatchKeeper:
+    """Puts every batch that any estimator could use on ``shelf``. ``fault`` says what the disk refused last, if so."""
+
+    def __init__(self, shelf: Shelf, signal_map: SignalMap) -> None:
+        self.shelf = shelf
+        self.fault: str | None = None
+        self.n_lost = 0  # batches that should have been kept and were not
+        self._signal_map = signal_map
+        self._waiting: queue.Queue[_Handed | None] = queue.Queue(MOST_WAITING)
+        self._thread = threading.Thread(target=self._run, name="batch-keeper", daemon=True)
+
+    def start(self) -> None:
+        """Begin to keep."""
+        self._thread.start()
+
+    def keep(self, batch: Batch, found: Estimate, rows: Motion) -> None:
+        """Take a batch over, from the pipeline's thread; one too many is lost and counted."""
+        if batch.is_provisional or batch.rejected:
+            return
+        try:
+            self._waiting.put_nowait(_Handed(found.id, batch, rows))
+        except queue.Full:
+            self._lose(f"{MOST_WAITING} batches wait for the disk already")
+
+    def flush(self) -> None:
+        """Wait until all that was handed over is kept or lost."""
+        self._waiting.join()
+
+    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
+        """Keep what waits, then end."""
+        try:
+            self._waiting.put(None, timeout=timeout_s)
+        except queue.Full:
+            return
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        while True:
+            handed = self._waiting.get()
+            try:
+                if handed is None:
+                    return
+                self._put(handed)
+            finally:
+                self._waiting.task_done()
+
+    def _put(self, handed: _Handed) -> None:
+        signal_map = self._signal_map
+        try:
+            self.shelf.add(kept_batch_of(handed.batch_id, signal_map.id, handed.batch, handed.rows, signal_map.traits))
+        except OSError as refusal:
+            self._lose(str(refusal))
+        else:
+            self.fault = None
+
+    def _lose(self, why: str) -> None:
+        self.n_lost += 1
+        if self.fault is None:  # once until it works again
+            log_event(Event.BATCH_NOT_KEPT, level=logging.WARNING, fault=why)
+        self.fault = f"batches cannot be kept for calibrations to come: {why}; weighing goes on"
