@@ -131,6 +131,19 @@ class KeepSection(Section):
     size_mb: float = Field(128.0, ge=1.0, le=100_000.0, description="disk space they may take; the oldest give way")
 
 
+class RecordSection(Section):
+    """The ring log: the mapped frames themselves, kept on disk as long as there is room."""
+
+    enabled: bool = Field(False, description="whether frames are recorded")
+    directory: Path | None = Field(None, description="folder of the segments [default: `record` in that of the store]")
+    max_size_mb: float = Field(1024.0, ge=16.0, le=1e9, description="the oldest segments are removed beyond this size")
+    max_daily_mb: float = Field(512.0, gt=0.0, le=1e9, description="no more than this is written in a day (UTC)")
+    free_mb: float = Field(256.0, ge=0.0, le=1e9, description="with less room left on the disk nothing is recorded")
+    block_s: float = Field(
+        120.0, ge=1.0, le=3600.0, description="frames are written together so often; a power cut costs as much"
+    )
+
+
 class UplinkSection(Section):
     """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that nobody can ask."""
 
@@ -208,6 +221,7 @@ class Settings(BaseSettings):
     web: WebSection = WebSection()
     store: StoreSection = StoreSection()
     keep: KeepSection = KeepSection()
+    record: RecordSection = RecordSection()
     uplink: UplinkSection = UplinkSection()
     trust: TrustSection = TrustSection()
     log: LogSection = LogSection()
@@ -245,6 +259,8 @@ def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:
     changed: dict[str, Any] = {
         "store": settings.store.model_copy(update={"directory": folder / settings.store.directory})
     }
+    if settings.record.directory is not None:
+        changed["record"] = settings.record.model_copy(update={"directory": folder / settings.record.directory})
     tls = {key: getattr(settings.web, key) for key in ("tls_certificate", "tls_key", "tls_client_ca")}
     changed["web"] = settings.web.model_copy(update={key: folder / path for key, path in tls.items() if path})
     files = settings.uplink.model_dump(include={"ca", "certificate", "key", "password_file"}, exclude_none=True)

@@ -134,6 +134,20 @@ class UplinkStatus:
     last_fault: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class RecordStatus:
+    """How the ring log goes; counts begin at the start of the service."""
+
+    n_frames_written: int = 0
+    n_frames_held: Annotated[int, Field(description="frames that wait in memory for the next block")] = 0
+    n_frames_dropped: Annotated[int, Field(description="frames lost to a disk that refused or a day's limit")] = 0
+    n_bytes_written: int = 0
+    n_bytes_today: Annotated[int, Field(description="bytes written since midnight UTC")] = 0
+    size_bytes: Annotated[int, Field(description="of all segments")] = 0
+    n_segments: int = 0
+    last_fault: Annotated[str | None, Field(description="why nothing is recorded; null while it is")] = None
+
+
 class Status(_Told):
     """The service as it is now; counts begin at its start."""
 
@@ -152,6 +166,7 @@ class Status(_Told):
     batches: BatchCounts = BatchCounts()
     store: StoreStatus = StoreStatus()
     uplink: UplinkStatus | None = Field(None, description="null where no broker is configured")
+    record: RecordStatus | None = Field(None, description="the ring log; null where it is off")
     is_ready: bool = Field(True, description="whether estimates can come: what /health/ready tells")
     not_ready_reason: str | None = None
     warnings: tuple[str, ...] = Field(

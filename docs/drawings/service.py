@@ -56,6 +56,11 @@ def service() -> str:
     _thread(sheet, second, THREADS_Y, "pipeline", "decodes, cuts batches,", "estimates")
     _queue(sheet, second + THREAD[0], THREADS_Y + 48, third, "held rows: bounded,", "losses are counted")
     _thread(sheet, third, THREADS_Y, "store-writer", "writes; keeps rows while", "the disk refuses")
+    _thread(sheet, third, BUS_Y - 32, "ring-log", "only where it is enabled;", "a block in two minutes")
+    sheet.line([(second + half, THREADS_Y), (second + half, BUS_Y + 16)], "blue")
+    sheet.arrow([(second + half, BUS_Y + 16), (third, BUS_Y + 16)], "blue")
+    sheet.text(second + half + 10, BUS_Y + 6, "frames: bounded, counted", ink="soft", style="small", anchor="start")
+    _file(sheet, third + THREAD[0] + 4, BUS_Y - 10, "record/", "segments")
     below = THREADS_Y + THREAD[1]
     lower = FILES_Y - 70
     _thread(sheet, second, lower, "main", "web server, watchdog,", "reload, start and stop")

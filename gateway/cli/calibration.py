@@ -18,7 +18,7 @@ from gateway.calibration.file import (
     load_calibration,
 )
 from gateway.calibration.file.check import Verdict
-from gateway.cli.calibration_tare import tare_commands
+from gateway.cli.asked.tare import tare_commands
 from gateway.cli.options import FILE, as_json
 from gateway.cli.text.axle_weights import vehicle_block
 from gateway.cli.text.calibration import calibration_text

@@ -18,7 +18,7 @@ from gateway.log import Event, log_event
 from gateway.service.changes import BatchLog, StateLog
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
-from gateway.service.parts import keeper_of, source_of, store_of, uplink_of
+from gateway.service.parts import keeper_of, ring_log_of, source_of, store_of, uplink_of
 from gateway.service.pipeline import Pipeline
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
@@ -76,7 +76,7 @@ class Gateway:
         """
         self._settings = settings
         self._on_started = on_started
-        token_file = TokenFile(settings.store.directory / "tokens.json")
+        self._tokens = token_file = TokenFile(settings.store.directory / "tokens.json")
         refuse_open_address(settings.web.host, has_tokens=token_file.are_in_use())
         forwarding = uplink_settings(settings.uplink, settings.vehicle)
         self.store = store_of(settings.store, forwarding)
@@ -95,7 +95,16 @@ class Gateway:
         self.keeper = keeper_of(settings.keep, settings.store, setup)
         flow.on_batch = self.keeper.keep
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
-        self.pipeline = Pipeline(self.source.inbox, Decoder(setup.signal_map), flow, self.store, self.board, log_batch)
+        self.ring_log = ring_log_of(settings, setup)
+        self.pipeline = Pipeline(
+            self.source.inbox,
+            Decoder(setup.signal_map),
+            flow,
+            self.store,
+            self.board,
+            log_batch,
+            self.ring_log.put if self.ring_log else lambda frames: None,
+        )
         self.uplink = uplink_of(forwarding, setup, self.store)
         self.status = StatusReport(
             settings,
@@ -105,18 +114,9 @@ class Gateway:
             self.store,
             self.board,
             self.uplink,
+            self.ring_log,
             around=self.around,
-            warnings=lambda: tuple(
-                fault
-                for fault in (
-                    token_file.fault,
-                    self.tare.fault,
-                    self._reload.fault,
-                    self.pipeline.roll_rate_fault,
-                    self.keeper.fault,
-                )
-                if fault
-            ),
+            warnings=self._warnings,
         )
         self.tare = TareDesk(
             settings.store.directory,
@@ -133,6 +133,7 @@ class Gateway:
             tokens=token_file,
             tare=self.tare,
             known_loads=known_loads,
+            record=self.ring_log,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = _Server(web)
@@ -140,6 +141,18 @@ class Gateway:
         self._notifier = Notifier()
         self._stopping = asyncio.Event()
         self._failure: str | None = None
+
+    def _warnings(self) -> tuple[str, ...]:
+        """What is broken beside the weighing, as people read it."""
+        faults = (
+            self._tokens.fault,
+            self.tare.fault,
+            self._reload.fault,
+            self.pipeline.roll_rate_fault,
+            self.keeper.fault,
+            self.ring_log.fault if self.ring_log else None,
+        )
+        return tuple(fault for fault in faults if fault)
 
     def _restore_board(self, calibration_id: str | None) -> None:
         """Show what was known before; a disk that refuses even to be read is no reason not to start."""
@@ -182,6 +195,8 @@ class Gateway:
         bus = self._settings.bus
         log_event(Event.STARTED, version=self.status().version, interface=bus.interface, channel=bus.channel)
         self.keeper.start()
+        if self.ring_log is not None:
+            self.ring_log.start()
         self.source.start()
         self.pipeline.start()
         if self.uplink is not None:
@@ -259,6 +274,8 @@ class Gateway:
         self.around.stop()
         self.pipeline.stop()
         self.keeper.stop()
+        if self.ring_log is not None:
+            self.ring_log.stop()
         if self.uplink is not None:
             self.uplink.stop()
         self.board.close()

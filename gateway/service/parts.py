@@ -3,9 +3,10 @@
 from importlib.metadata import version
 
 from gateway.bus.live import LiveSource, OpenReceiver
+from gateway.bus.ring import RingLimits, RingLog
 from gateway.calibration.kept import Shelf, ShelfLimits
 from gateway.calibration.kept.shelf import FOLDER
-from gateway.config import BusSection, KeepSection, StoreSection
+from gateway.config import BusSection, KeepSection, Settings, StoreSection
 from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
 from gateway.store import Retention, Store
@@ -58,3 +59,18 @@ def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | No
         silence_s=wanted.silence_s,
         open_receiver=open_receiver,
     )
+
+
+def ring_log_of(settings: Settings, setup: Setup) -> RingLog | None:
+    """None where nothing is to be recorded. Frames get the channel that the signal map reads them from."""
+    wanted = settings.record
+    if not wanted.enabled:
+        return None
+    limits = RingLimits(
+        max_bytes=round(wanted.max_size_mb * BYTES_PER_MB),
+        max_daily_bytes=round(wanted.max_daily_mb * BYTES_PER_MB),
+        free_bytes=round(wanted.free_mb * BYTES_PER_MB),
+        block_s=wanted.block_s,
+    )
+    directory = wanted.directory or settings.store.directory / "record"
+    return RingLog(directory, setup.signal_map.channel or settings.bus.channel, limits)

@@ -19,7 +19,7 @@ from gateway.core.tare import Weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
-from gateway.records import Motion, Signal
+from gateway.records import Frames, Motion, Signal
 from gateway.store import Store
 from gateway.units import NS_PER_S
 from gateway.web import Board, boot_clock_s
@@ -71,8 +71,9 @@ class Pipeline:
         store: Store,
         board: Board,
         on_batch: Callable[[Estimate], None] = lambda found: None,
+        on_frames: Callable[[Frames], None] = lambda frames: None,
     ) -> None:
-        """``on_batch`` hears of every estimate once it is stored and shown."""
+        """``on_batch`` hears of every estimate once it is stored and shown, ``on_frames`` of all that is decoded."""
         self.decoder = decoder
         self.flow = flow
         self.watch = SignalWatch(decoder.signals)
@@ -87,6 +88,7 @@ class Pipeline:
         self._store = store
         self._board = board
         self._on_batch = on_batch
+        self._on_frames = on_frames
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="pipeline", daemon=True)
 
@@ -128,6 +130,7 @@ class Pipeline:
         self.progress += 1
         if frames is None:
             return False
+        self._on_frames(frames)
         motion = self.decoder.decode(frames)
         if len(motion):
             self.watch.saw(motion)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from importlib.metadata import version
 
 from gateway.bus.live import Around, LiveSource, SourceState
+from gateway.bus.ring import RingLog
 from gateway.bus.similar import similar_to
 from gateway.config import Settings
 from gateway.records import Signal
@@ -32,6 +33,7 @@ class StatusReport:
         store: Store,
         board: Board,
         uplink: Uplink | None = None,
+        ring_log: RingLog | None = None,
         *,
         around: Around,
         warnings: Callable[[], tuple[str, ...]] = tuple,
@@ -44,6 +46,7 @@ class StatusReport:
         self._board = board
         self._uplink = uplink
         self._around = around
+        self._ring_log = ring_log
         self._warnings = warnings
         self._version = version("springscale")  # read once: it is a file, and a status must not want one
         self._started = time.monotonic()
@@ -72,6 +75,7 @@ class StatusReport:
             ),
             store=self._store.health(),
             uplink=self._uplink.report() if self._uplink else None,
+            record=self._ring_log.status() if self._ring_log else None,
             is_ready=not_ready is None,
             not_ready_reason=not_ready,
             warnings=self._warnings(),

@@ -26,7 +26,9 @@ from gateway.web.live import Board, LatestFirst
 from gateway.web.reader import Reader
 from gateway.web.routes import (
     KNOWN_LOADS_PATH,
+    FrameLog,
     KnownLoads,
+    NoFrameLog,
     NoTareDesk,
     Scales,
     TareDesk,
@@ -37,6 +39,7 @@ from gateway.web.routes import (
     known_loads_router,
     metrics_registry,
     reasons_router,
+    record_router,
     rfms_router,
     spectra_router,
     tare_router,
@@ -61,6 +64,7 @@ def create_app(
     tokens: TokenFile | None = None,
     tare: TareDesk | None = None,
     known_loads: KnownLoads | None = None,
+    record: FrameLog | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the
@@ -97,6 +101,7 @@ def create_app(
     app.include_router(spectra_router(board, calibrated))
     app.include_router(tare_router(tare or NoTareDesk()))
     app.include_router(export_router(reader))
+    app.include_router(record_router(record or NoFrameLog()))
     app.include_router(weights_router(board, scales))
     app.include_router(j1939_router(board, scales))
     app.include_router(vss_router(board, scales))

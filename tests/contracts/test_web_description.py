@@ -38,6 +38,8 @@ PATHS = [
     "/api/v1/weights/j1939",
     "/api/v1/vss",
     "/api/v1/calibration/tare",
+    "/api/v1/record",
+    "/api/v1/record/{name}",
     "/rfms/vehicles",
     "/rfms/vehiclestatuses",
     "/health/live",
@@ -91,7 +93,7 @@ def test_no_path_escapes(schema: BaseSchema) -> None:
 # OpenAPI cannot say that two parameters exclude one another, as rFMS has it.
 EXCLUDED = {"GET /rfms/vehiclestatuses": [positive_data_acceptance]}
 LABELS = [*(f"GET {path}" for path in PATHS), *CHANGES]
-WITHOUT_PARAMETERS = ("latest", "status", "reasons", "vehicle", "vss", "live", "ready", "metrics")
+WITHOUT_PARAMETERS = ("latest", "status", "reasons", "vehicle", "vss", "live", "ready", "metrics", "record")
 WITHOUT_PARAMETERS += ("GET /api/v1/calibration/tare",)
 WITH_PARAMETERS = [label for label in LABELS if not label.endswith(WITHOUT_PARAMETERS)]
 

@@ -1,29 +1,21 @@
 """Re-zeroing a real service: bus, pipeline, web and command line together, through a restart."""
 
-import asyncio
 import json
-import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 from support.bus_drive import START_NS, white_noise
 from support.calibrated import calibration_file
 from support.log import fields_of, names
-from support.patience import wait_until
 from support.ports import first_answer
+from support.running_service import Running, configuration, counted, estimated, events, serve, stored
 
 from gateway.bus.logs import write_candump
-from gateway.bus.sink import replay
 from gateway.cli import springscale
-from gateway.config import load_settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event
-from gateway.service.gateway import Gateway
-from gateway.setup import setup_of
-from gateway.store import Store
 
 HOUR_NS = 3_600 * 10**9
 
@@ -31,108 +23,12 @@ HOUR_NS = 3_600 * 10**9
 @pytest.fixture
 def config(tmp_path: Path) -> Path:
     """A vehicle that weighs 12 kg and 51 % whatever it carries, on a bus of the test's own."""
-    (tmp_path / "vehicle.json").write_text(calibration_file(payload_kg=12.0, front_share_pct=51.0).to_json())
-    path = tmp_path / "springscale.toml"
-    path.write_text(
-        f"""
-        signals = "springscale:reference"
-        calibration = "vehicle.json"
-        estimator = "ratio_index"
-        [vehicle]
-        id = "van-17"
-        [bus]
-        interface = "virtual"
-        channel = "{tmp_path.name}"
-        [batch]
-        window_s = 20.0
-        provisional_every_s = 0.0
-        [web]
-        port = 0
-        [store]
-        directory = "state"
-        """
-    )
-    return path
+    return configuration(tmp_path, calibration_file(payload_kg=12.0, front_share_pct=51.0).to_json())
 
 
-class Running:
-    """A running service as the test's other thread meets it."""
-
-    def __init__(self, gateway: Gateway, channel: str) -> None:
-        self.gateway = gateway
-        self._channel = channel
-
-    def play(self, log: Path) -> None:
-        """Send a log; return when all of it was worked through."""
-        before = self.gateway.source.counts().frames
-        sent = replay(log, "virtual", self._channel, speed="max").frames
-        gateway = self.gateway
-        is_through = wait_until(lambda: gateway.source.counts().frames >= before + sent and gateway.has_caught_up)
-        assert is_through, f"{log} was not worked through"
-
-    def tare(self, *arguments: str) -> Result:
-        """springscale calibration tare ... against this service."""
-        return CliRunner().invoke(springscale, ["calibration", "tare", *arguments, "--url", self.gateway.url])
-
-    def told(self, *arguments: str) -> dict[str, Any]:
-        found = self.tare(*arguments, "--json")
-        assert found.exit_code == 0, (found.output, found.exception)
-        state: dict[str, Any] = json.loads(found.stdout)
-        return state
-
-
-def serve(config: Path, meet: Callable[[Running], None]) -> None:
-    """Run the service while ``meet`` does its part in another thread; what fails there fails here."""
-    settings = load_settings(config)
-    failures: list[BaseException] = []
-
-    def on_started(gateway: Gateway) -> None:
-        loop = asyncio.get_running_loop()
-
-        def part() -> None:
-            try:
-                meet(Running(gateway, settings.bus.channel))
-            except BaseException as failure:  # noqa: BLE001 - raised again in the test's own thread
-                failures.append(failure)
-            loop.call_soon_threadsafe(gateway.request_stop)
-
-        threading.Thread(target=part, daemon=True).start()
-
-    Gateway(settings, setup_of(settings), on_started=on_started).run()
-    if failures:
-        raise failures[0]
-
-
-def stored(config: Path) -> list[str]:
-    store = Store.open(load_settings(config).store.directory)
-    try:
-        return list(store.reader().estimates().items)
-    finally:
-        store.close()
-
-
-def events(config: Path) -> list[str]:
-    """What happened to the service, newest first."""
-    store = Store.open(load_settings(config).store.directory)
-    try:
-        return [event.kind for event in store.reader().events()]
-    finally:
-        store.close()
-
-
-def counted(texts: list[str]) -> list[str]:
-    return [text for text in texts if not json.loads(text)["rejected"]]
-
-
-def estimated(config: Path, *logs: Path, options: tuple[str, ...] = ()) -> list[str]:
-    """Each log by itself: of several at once, every line would also say of which it is."""
-    lines: list[str] = []
-    for log in logs:
-        arguments = ["estimate", str(log), "--config", str(config), "--json", *options]
-        found = CliRunner().invoke(springscale, arguments, catch_exceptions=False)
-        assert found.exit_code == 0, found.output
-        lines += found.stdout.splitlines()
-    return lines
+def told(service: Running, *arguments: str) -> dict[str, Any]:
+    """springscale calibration tare ... --json"""
+    return service.told("calibration", "tare", *arguments)
 
 
 @pytest.fixture
@@ -148,21 +44,21 @@ def test_a_tare_counts_from_the_next_batch_survives_a_restart_and_is_undone(conf
     made: dict[str, Any] = {}
 
     def first_run(service: Running) -> None:
-        refused = service.tare("set", "--empty")
+        refused = service.ask("calibration", "tare", "set", "--empty")
         assert isinstance(refused.exception, SpringscaleError)
         assert "no_counted_batch" in str(refused.exception)
         service.play(logs[0])
-        offer = service.told("show")["offer"]
+        offer = told(service, "show")["offer"]
         assert (offer["zero"]["payload_kg"], offer["zero"]["n_batches"]) == (12.0, 2)
-        made.update(service.told("set", "--empty", "--note", "yard"))
-        assert "+12.0" in service.tare("show").output
+        made.update(told(service, "set", "--empty", "--note", "yard"))
+        assert "+12.0" in service.ask("calibration", "tare", "show").output
         assert first_answer(f"{service.gateway.url}/api/v1/status").json()["tare_id"] == made["id"]
         service.play(logs[1])
 
     def second_run(service: Running) -> None:
-        assert service.told("show")["active"] == made
+        assert told(service, "show")["active"] == made
         service.play(logs[2])
-        undone = service.told("undo", "--factory")
+        undone = told(service, "undo", "--factory")
         assert undone["active"] is None
         assert undone["history"][0]["ended"]["why"] == "back_to_factory"
 
@@ -191,7 +87,7 @@ def test_a_tare_counts_from_the_next_batch_survives_a_restart_and_is_undone(conf
 def test_a_copied_tare_file_gives_the_same_numbers_elsewhere(config: Path, logs: list[Path], tmp_path: Path) -> None:
     def meet(service: Running) -> None:
         service.play(logs[0])
-        service.told("set", "--empty")
+        told(service, "set", "--empty")
 
     serve(config, meet)
     here = estimated(config, logs[1])
@@ -210,7 +106,7 @@ def test_a_copied_tare_file_gives_the_same_numbers_elsewhere(config: Path, logs:
 def test_check_config_looks_at_the_tare_too(config: Path, logs: list[Path], tmp_path: Path) -> None:
     def meet(service: Running) -> None:
         service.play(logs[0])
-        service.told("set", "--empty")
+        told(service, "set", "--empty")
 
     serve(config, meet)
     good = CliRunner().invoke(springscale, ["check-config", str(config), "--json"], catch_exceptions=False)
@@ -230,7 +126,7 @@ def test_a_drive_that_has_begun_since_is_refused(config: Path, logs: list[Path],
     def meet(service: Running) -> None:
         service.play(logs[0])
         service.play(short)
-        refused = service.tare("set", "--empty")
+        refused = service.ask("calibration", "tare", "set", "--empty")
         assert isinstance(refused.exception, SpringscaleError)
         assert "load_may_have_changed" in str(refused.exception)
 
@@ -246,7 +142,7 @@ def test_the_log_tells_of_another_calibration_and_of_the_tare_that_ends_with_it(
 
     def meet(service: Running) -> None:
         service.play(logs[0])
-        service.told("set", "--empty")
+        told(service, "set", "--empty")
 
     serve(config, meet)
     assert Event.CALIBRATION_CHANGED not in names(caplog)

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from gateway.calibration.tare_file import MOST_ENTRIES
-from gateway.cli.calibration_tare import CLEAR_STDS
+from gateway.cli.asked.tare import CLEAR_STDS
 from gateway.core.tare import MOST_FRONT_SHARE_PCT, MOST_PAYLOAD_SHARE, MOST_STD_SHARE, Refusal
 
 PAGE = (Path(__file__).parents[2] / "docs" / "calibration.md").read_text(encoding="utf-8")

@@ -8,7 +8,9 @@ import pytest
 
 from gateway.bus import sink
 from gateway.bus.live import source
-from gateway.cli import calibration_tare, main
+from gateway.bus.ring import RingLog
+from gateway.cli import main
+from gateway.cli.asked import service as asked_service
 from gateway.service.pipeline import Pipeline
 from gateway.store import Store, StoreReader
 from gateway.uplink import Uplink, link
@@ -18,12 +20,12 @@ from support.patience import PATIENCE_S
 CONSTANTS = (
     (source, "START_WAIT_S"),
     (sink, "SEND_TIMEOUT_S"),
-    (calibration_tare, "TIMEOUT_S"),
+    (asked_service, "TIMEOUT_S"),
     (link, "CONNECT_TIMEOUT_S"),
     (connection, "REQUEST_S"),
     (connection, "LINGER_S"),
 )
-ONLY_DEFAULT = (source.LiveSource.stop, Pipeline.stop, Uplink.stop, Store.close, StoreReader.__init__)
+ONLY_DEFAULT = (source.LiveSource.stop, Pipeline.stop, RingLog.stop, Uplink.stop, Store.close, StoreReader.__init__)
 
 
 def unhurry(patch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,8 @@ from gateway.web.door.tokens import Scope, TokenFile
 # Nothing of the vehicle is in these: the pages' own files, the API's description, and whether the process lives.
 PUBLIC: Final = ("/assets/", "/swagger/")
 PUBLIC_PATHS: Final = frozenset({"/", "/docs", "/openapi.json", "/health/live"})
+# Raw frames may hold where the vehicle was: to look at them is more than to read a weight.
+RECORD_PATH: Final = "/api/v1/record"
 _SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _FORWARDED: Final = frozenset(
     {b"forwarded", b"via", b"x-forwarded-for", b"x-forwarded-host", b"x-forwarded-proto", b"x-real-ip"}
@@ -72,7 +74,8 @@ class Guard:
         shown = _header(scope, b"authorization")
         kind, _, text = (shown or "").partition(" ")
         token = tokens.verify(text.strip()) if kind.lower() == "bearer" else None
-        wanted = Scope.READ if scope["method"] in _SAFE_METHODS else Scope.OPERATE
+        is_reading = scope["method"] in _SAFE_METHODS and not f"{scope['path']}/".startswith(f"{RECORD_PATH}/")
+        wanted = Scope.READ if is_reading else Scope.OPERATE
         if token is not None:
             scope.setdefault("state", {})["token_name"] = token.name
             return None if token.scope.allows(wanted) else _forbidden(scope, wanted)

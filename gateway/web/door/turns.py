@@ -14,7 +14,7 @@ STREAMS_PER_CLIENT: Final = 32
 WAIT_S: Final = 5.0  # for a turn
 PIECE_BYTES: Final = 16_384
 
-_HISTORY: Final = ("/api/v1/estimates", "/api/v1/export", "/rfms/")
+_HISTORY: Final = ("/api/v1/estimates", "/api/v1/export", "/api/v1/record", "/rfms/")
 _STREAM: Final = "/api/v1/stream"
 _LOOK_S: Final = 0.05
 

@@ -11,6 +11,7 @@ from gateway.web.routes.j1939 import j1939_router
 from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoad, KnownLoads, known_loads_router
 from gateway.web.routes.metrics import metrics_registry
 from gateway.web.routes.reasons import reasons_router
+from gateway.web.routes.record import FrameLog, NoFrameLog, record_router
 from gateway.web.routes.rfms import rfms_router
 from gateway.web.routes.spectra import spectra_router
 from gateway.web.routes.tare import NoTareDesk, TareDesk, tare_router
@@ -20,9 +21,11 @@ from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest, weig
 
 __all__ = [
     "KNOWN_LOADS_PATH",
+    "FrameLog",
     "KnownLoad",
     "KnownLoads",
     "LatestWeights",
+    "NoFrameLog",
     "NoTareDesk",
     "Scales",
     "TareDesk",
@@ -33,6 +36,7 @@ __all__ = [
     "known_loads_router",
     "metrics_registry",
     "reasons_router",
+    "record_router",
     "rfms_router",
     "spectra_router",
     "tare_router",

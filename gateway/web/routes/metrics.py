@@ -9,7 +9,7 @@ from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from gateway.estimate import PLACES
-from gateway.status import State, Status, UplinkStatus
+from gateway.status import RecordStatus, State, Status, UplinkStatus
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 
@@ -34,6 +34,8 @@ class StatusCollector:
         yield from _signals(now)
         yield from _batches(now)
         yield from _store(now)
+        if now.record is not None:
+            yield from _record(now.record)
         if now.uplink is not None:
             yield from _uplink(now.uplink)
         yield from _web(self._board, self._responses)
@@ -134,6 +136,18 @@ def _store(now: Status) -> Iterator[Metric]:
             "duplicate": store.n_duplicates,
             "pruned": store.n_pruned,
         },
+    )
+
+
+def _record(record: RecordStatus) -> Iterator[Metric]:
+    yield _gauge("springscale_record_refused", "1 while frames cannot be recorded.", float(bool(record.last_fault)))
+    yield _gauge("springscale_record_size_bytes", "Size of the ring log.", record.size_bytes)
+    yield _counter("springscale_record_written_bytes_total", "Bytes written to it.", record.n_bytes_written)
+    yield _labelled(
+        "springscale_record_frames_total",
+        "Frames by what became of them.",
+        "outcome",
+        {"written": record.n_frames_written, "dropped": record.n_frames_dropped},
     )
 
 

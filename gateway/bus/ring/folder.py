@@ -1,0 +1,178 @@
+"""The ring on disk: segments in one directory, the oldest let go when a new block needs its room."""
+
+import errno
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from gateway.bus.ring.block import BlockHead
+from gateway.bus.ring.segment import Segment, create_segment, mended_segment, name_of, names_in, open_segment
+from gateway.log import Event, log_event
+
+SEGMENT_S: Final = 3600.0
+SEGMENT_SHARE: Final = 1 / 8  # of the ring at most in one segment, and so in one removal
+SECONDS_PER_DAY: Final = 86_400
+
+
+@dataclass(frozen=True, slots=True)
+class RingLimits:
+    """What the ring may take: bytes on disk and bytes written a day; ``free_bytes`` it leaves to everybody else.
+
+    ``block_s`` of frames are written at a time, and lost where the power is cut.
+    """
+
+    max_bytes: int
+    max_daily_bytes: int
+    free_bytes: int
+    block_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Growing:
+    """The newest segment, still written to."""
+
+    name: str
+    file: BinaryIO
+    since_s: float
+
+
+class RingFolder:
+    """One directory. Written by one thread; ``segments`` and ``open`` may be called from any."""
+
+    def __init__(self, directory: Path, limits: RingLimits, clock_s: Callable[[], float]) -> None:
+        self.directory = directory
+        self._limits = limits
+        self._clock_s = clock_s
+        self._segments: tuple[Segment, ...] | None = None  # replaced, never changed; None: to be read (again)
+        self._growing: _Growing | None = None
+        self._day: int | None = None
+        self.n_bytes_today = 0
+
+    def segments(self) -> tuple[Segment, ...]:
+        """What lies there, oldest first, as far as whole blocks reach."""
+        return self._segments or ()
+
+    def open(self, name: str) -> tuple[BinaryIO, int] | None:
+        """A segment to read from and how many of its bytes are whole blocks; None where there is none of that name.
+
+        It can be read to its end though the ring lets it go meanwhile. Raises OSError where the disk refuses.
+        """
+        segment = next((one for one in self.segments() if one.name == name), None)
+        if segment is None:
+            return None
+        with self._opened() as folder:
+            try:
+                return open_segment(folder, segment.name), segment.n_bytes
+            except FileNotFoundError:  # let go just now
+                return None
+
+    def read(self) -> None:
+        """Look at what lies there, once: what a cut left unfinished is cut off, this day's bytes are counted.
+
+        Raises OSError.
+        """
+        self.directory.mkdir(parents=True, exist_ok=True, mode=0o750)
+        if self._segments is None:
+            with self._opened() as folder:
+                self._segments = self._found(folder)
+
+    def is_over_day(self, n_bytes: int) -> bool:
+        """Whether so many bytes more are too many for this day."""
+        today = int(self._clock_s() // SECONDS_PER_DAY)
+        if today != self._day:
+            self._day, self.n_bytes_today = today, 0
+        return self.n_bytes_today + n_bytes > self._limits.max_daily_bytes
+
+    def append(self, block: bytes, head: BlockHead) -> None:
+        """One more block, on disk when this returns. Raises OSError; then the next call begins with a new segment."""
+        try:
+            self.read()
+            with self._opened() as folder:
+                self._require_room(folder, len(block))
+                self._let_go(folder, self._limits.max_bytes - len(block))
+                growing = self._to_grow(folder, len(block), head.first_ns)
+                self.n_bytes_today += len(block)
+                _write_all(growing.file, block)
+                os.fdatasync(growing.file.fileno())
+        except OSError:
+            self.close()
+            self._segments = None
+            raise
+        *older, newest = self._segments or ()
+        self._segments = (*older, newest.with_block(head))
+
+    def close(self) -> None:
+        """Write no further into the segment that grows."""
+        if self._growing is not None:
+            with suppress(OSError):
+                self._growing.file.close()
+            self._growing = None
+
+    def _found(self, folder: int) -> tuple[Segment, ...]:
+        names = names_in(folder)
+        if self._day is None:
+            self._day = int(self._clock_s() // SECONDS_PER_DAY)
+            self.n_bytes_today = sum(_size_if_of_day(folder, name, self._day) for name in names)
+        found = []
+        for name in names:
+            segment, n_cut = mended_segment(folder, name, is_newest=name == names[-1])
+            if n_cut:
+                log_event(Event.RECORD_MENDED, segment=name, n_bytes_cut=n_cut)
+            if segment.n_blocks:
+                found.append(segment)
+            else:
+                os.unlink(name, dir_fd=folder)
+        return tuple(found)
+
+    def _require_room(self, folder: int, n_bytes: int) -> None:
+        room = os.statvfs(folder)
+        if room.f_bavail * room.f_frsize < self._limits.free_bytes + n_bytes:
+            raise OSError(errno.ENOSPC, "less room is left on the disk than [record] free_mb")
+
+    def _let_go(self, folder: int, most_bytes: int) -> None:
+        """Remove the oldest until no more than so many bytes lie there."""
+        while (kept := self.segments()) and sum(segment.n_bytes for segment in kept) > most_bytes:
+            if self._growing is not None and kept[0].name == self._growing.name:
+                self.close()
+            with suppress(FileNotFoundError):
+                os.unlink(kept[0].name, dir_fd=folder)
+            self._segments = kept[1:]
+
+    def _to_grow(self, folder: int, n_bytes: int, first_ns: int) -> _Growing:
+        """The newest segment while it is young and small, else a new one."""
+        kept = self.segments()
+        if self._growing is not None:
+            is_young = time.monotonic() - self._growing.since_s < SEGMENT_S
+            if is_young and kept[-1].n_bytes + n_bytes <= SEGMENT_SHARE * self._limits.max_bytes:
+                return self._growing
+            self.close()
+        name = name_of(1 + (kept[-1].number if kept else 0), first_ns)
+        self._growing = _Growing(name, create_segment(folder, name), time.monotonic())
+        self._segments = (*kept, Segment(name))
+        os.fsync(folder)  # the new name, too, outlives a power cut
+        return self._growing
+
+    @contextmanager
+    def _opened(self) -> Iterator[int]:
+        folder = os.open(self.directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            yield folder
+        finally:
+            os.close(folder)
+
+
+def _write_all(file: BinaryIO, block: bytes) -> None:
+    """A raw file may take less than it is given. Raises OSError."""
+    rest = memoryview(block)
+    while rest:
+        rest = rest[file.write(rest) :]
+
+
+def _size_if_of_day(folder: int, name: str, day: int) -> int:
+    """Bytes of a segment that was last written on this day, 0 for others."""
+    status = os.stat(name, dir_fd=folder, follow_symlinks=False)
+    return status.st_size if status.st_mtime // SECONDS_PER_DAY == day else 0

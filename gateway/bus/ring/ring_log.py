@@ -1,0 +1,171 @@
+"""The thread that owns the ring: gathers frames for minutes and writes them as one block."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from gateway.bus.frames import join
+from gateway.bus.ring.block import head_of, packed_block
+from gateway.bus.ring.folder import RingFolder, RingLimits
+from gateway.bus.ring.segment import Segment
+from gateway.log import Event, log_event
+from gateway.records import Frames
+from gateway.status import RecordStatus
+
+BLOCK_FRAMES: Final = 131_072  # are written though the time of a block is not over
+HELD_FRAMES: Final = 2 * BLOCK_FRAMES  # wait at most while the disk refuses: some MB of memory
+RETRY_S: Final = 30.0
+STOP_WITHIN_S: Final = 5.0
+
+
+class RingLog:
+    """Frames handed over by one thread, written by its own, listed and opened from any."""
+
+    def __init__(
+        self,
+        directory: Path,
+        channel: str,
+        limits: RingLimits,
+        *,
+        clock_s: Callable[[], float] = time.time,
+        retry_s: float = RETRY_S,
+    ) -> None:
+        """``channel`` is the name the frames get in the log, as far as a candump line can hold it."""
+        self._folder = RingFolder(directory, limits, clock_s)
+        self._channel = "".join("_" if char.isspace() or not char.isprintable() else char for char in channel) or "can"
+        self._block_s = limits.block_s
+        self._retry_s = retry_s
+        self._changed = threading.Condition()
+        self._held: list[Frames] = []
+        self._n_held = 0
+        self._held_since_s = 0.0
+        self._is_stopping = False
+        self._n_written = self._n_dropped = self._n_bytes = 0
+        self._fault: str | None = None
+        self._thread = threading.Thread(target=self._run, name="ring-log", daemon=True)
+
+    def start(self) -> None:
+        """Begin to write."""
+        self._thread.start()
+
+    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
+        """Write what is held, if the disk takes it, and end."""
+        with self._changed:
+            self._is_stopping = True
+            self._changed.notify_all()
+        self._thread.join(timeout_s)
+
+    def put(self, frames: Frames) -> None:
+        """Take frames to be written; what finds no room is counted. Never waits for the disk."""
+        if not len(frames):
+            return
+        with self._changed:
+            if self._n_held + len(frames) > HELD_FRAMES:
+                self._n_dropped += len(frames)
+                return
+            if not self._held:
+                self._held_since_s = time.monotonic()
+            self._held.append(frames)
+            self._n_held += len(frames)
+            if self._n_held >= BLOCK_FRAMES or len(self._held) == 1:
+                self._changed.notify_all()
+
+    def segments(self) -> tuple[Segment, ...]:
+        """What can be fetched, oldest first."""
+        return tuple(segment for segment in self._folder.segments() if segment.n_blocks)
+
+    def open(self, name: str) -> tuple[BinaryIO, int] | None:
+        """As ``RingFolder.open``."""
+        return self._folder.open(name)
+
+    def status(self) -> RecordStatus:
+        """How it goes; from any thread."""
+        segments = self.segments()
+        return RecordStatus(
+            n_frames_written=self._n_written,
+            n_frames_held=self._n_held,
+            n_frames_dropped=self._n_dropped,
+            n_bytes_written=self._n_bytes,
+            n_bytes_today=self._folder.n_bytes_today,
+            size_bytes=sum(segment.n_bytes for segment in segments),
+            n_segments=len(segments),
+            last_fault=self._fault,
+        )
+
+    @property
+    def fault(self) -> str | None:
+        """Why frames are not being recorded, for people; None while they are."""
+        if self._fault is None:
+            return None
+        return f"frames are not being recorded ({self._fault}); {self._n_dropped} are lost so far, weighing goes on"
+
+    def _run(self) -> None:
+        try:
+            self._look()
+            while self._wait_for_block():
+                self._write_held()
+            self._folder.close()
+        except Exception as failure:  # noqa: BLE001 - whatever ends the recording must not end the weighing
+            self._tell(f"the recorder died: {failure!r}")
+
+    def _look(self) -> None:
+        """What lies there from earlier runs can be fetched before the first block is due."""
+        try:
+            self._folder.read()
+        except OSError as refusal:
+            self._tell(self._told(refusal))
+
+    def _wait_for_block(self) -> bool:
+        """Until a block is due or it is time to stop; False where nothing is left to do."""
+        with self._changed:
+            while not self._is_stopping and self._n_held < BLOCK_FRAMES:
+                left_s = self._held_since_s + self._block_s - time.monotonic() if self._held else None
+                if left_s is not None and left_s <= 0.0:
+                    break
+                self._changed.wait(left_s)
+            return bool(self._held)
+
+    def _write_held(self) -> None:
+        """Bring a block to disk; where that is refused it stays held, and the next try waits a while."""
+        with self._changed:
+            parts = list(self._held)
+        frames = join(parts, parts[0].payload.shape[1])
+        try:
+            is_written = self._write(frames)
+        except OSError as refusal:
+            self._tell(self._told(refusal))
+            with self._changed:
+                if not self._is_stopping:
+                    self._changed.wait_for(lambda: self._is_stopping, self._retry_s)
+                    return
+            is_written = False
+        with self._changed:
+            del self._held[: len(parts)]
+            self._n_held -= len(frames)
+            self._held_since_s = time.monotonic()
+            self._n_written += len(frames) if is_written else 0
+            self._n_dropped += 0 if is_written else len(frames)
+
+    def _write(self, frames: Frames) -> bool:
+        """False where the day has had its bytes. Raises OSError."""
+        block = packed_block(frames, self._channel)
+        if self._folder.is_over_day(len(block)):
+            self._tell("the day's bytes are used up: [record] max_daily_mb")
+            return False
+        self._folder.append(block, head_of(block))
+        self._n_bytes += len(block)
+        if self._fault is not None:
+            log_event(Event.RECORD_RECOVERED, n_frames_dropped=self._n_dropped)
+            self._fault = None
+        return True
+
+    def _told(self, refusal: OSError) -> str:
+        return f"{self._folder.directory}: {refusal.strerror or refusal}"
+
+    def _tell(self, fault: str) -> None:
+        if fault != self._fault:
+            log_event(Event.RECORD_REFUSED, level=logging.WARNING, fault=fault)
+        self._fault = fault

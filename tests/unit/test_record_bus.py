@@ -1,0 +1,52 @@
+"""springscale record bus: a channel into a log, without a service."""
+
+import threading
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from support.bus_drive import START_NS, white_noise
+from support.patience import wait_until
+
+from gateway.bus.live import LiveSource
+from gateway.bus.logs.open import open_log
+from gateway.bus.ring.to_file import record_to_file
+from gateway.bus.signals import load_signal_map
+from gateway.bus.sink import BusSink
+from gateway.cli import springscale
+from gateway.errors import SpringscaleError
+
+SIGNAL_MAP = load_signal_map("springscale:reference")
+DRIVE = white_noise(20.0, START_NS, seed=1)
+
+
+def test_every_mapped_frame_is_in_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.bus.ring.to_file.BLOCK_FRAMES", 1000)
+    source, stop = LiveSource("virtual", tmp_path.name, SIGNAL_MAP, silence_s=0.05), threading.Event()
+
+    def play() -> None:
+        assert wait_until(lambda: source.state == "bus_silent")  # it is open, then
+        with BusSink("virtual", tmp_path.name) as sink:
+            sink.send(DRIVE)
+        wait_until(lambda: source.counts().frames == len(DRIVE))
+        stop.set()
+
+    player = threading.Thread(target=play)
+    player.start()
+    heard: list[int] = []
+    path = tmp_path / "drive.log.gz"
+    assert record_to_file(source, "can0", path, stop, on_frames=heard.append) == len(DRIVE)
+    player.join()
+    chunks, report = open_log(path, SIGNAL_MAP)
+    assert sum(map(len, chunks)) == len(DRIVE) == heard[-1]
+    assert report.ended_early is None
+
+
+@pytest.mark.parametrize(("name", "why"), [("taken.log.gz", "File exists"), ("fresh.log.gz", "no mapped frame came")])
+def test_what_cannot_be_recorded_is_told(tmp_path: Path, name: str, why: str) -> None:
+    (tmp_path / "taken.log.gz").write_text("mine")
+    arguments = ["record", "bus", str(tmp_path / name), "--signals", "springscale:reference", "--for-s", "0.3"]
+    found = CliRunner().invoke(springscale, [*arguments, "--interface", "virtual", "--channel", tmp_path.name])
+    assert isinstance(found.exception, SpringscaleError)
+    assert why in str(found.exception)
+    assert (tmp_path / "taken.log.gz").read_text() == "mine"
