@@ -3,3 +3,26 @@
 ``live`` receives from interfaces, ``logs`` reads and writes recordings, ``signals`` turns payloads into samples;
 ``frames`` are columns, ``sink`` sends them to a bus again. python-can and cantools are known here alone.
 """
+
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, cast
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@contextmanager
+def _without(module: str) -> "Iterator[None]":
+    """Nobody finds ``module`` meanwhile, unless it is there already."""
+    modules = cast(dict[str, Any], sys.modules)
+    is_absent = modules.setdefault(module, None) is None
+    yield
+    if is_absent:
+        del modules[module]
+
+
+# python-can imports asammdf, and with it pandas, wherever these are installed: seconds of every start, for a reader of
+# .mf4 that is not used here (logs.mf4 is).
+with _without("asammdf"):
+    import can  # noqa: F401 # here before anybody else imports it

@@ -1,11 +1,11 @@
-"""One suite over every way in: the same frames as .log, .log.zst, .asc, .blf, .trc, .csv, .db or on a bus."""
+"""One suite over every way in: the same frames as .log, .log.zst, .asc, .blf, .mf4, .trc, .csv, .db or on a bus."""
 
 import gzip
-import importlib.util
 import itertools
 import lzma
 import os
 import sqlite3
+import sys
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -18,7 +18,7 @@ from support.patience import PATIENCE_S
 
 from gateway.bus.frames import join, merge_frames
 from gateway.bus.live import LiveSource
-from gateway.bus.logs import write_candump
+from gateway.bus.logs import mf4, write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.logs.packed import zstd
 from gateway.bus.messages import message_of
@@ -135,6 +135,19 @@ def assert_same(motion: Motion, truth: Motion, *, stamp_tolerance_ns: int = 0) -
 def test_every_log_format_gives_the_same_motion(suffix, tmp_path, drive, truth, signal_map):
     path = tmp_path / f"drive{suffix}"
     write_log(drive, path)
+    motion, report = read(path, signal_map)
+    assert_same(motion, truth)
+    assert (report.frames, report.wanted, report.n_rejected, report.ended_early) == (len(drive), len(truth), 0, None)
+
+
+@pytest.mark.parametrize("suffix", [".mf4", ".mf4.zst"])
+def test_a_measurement_file_gives_the_same_motion(suffix, tmp_path, drive, truth, signal_map):
+    files = pytest.importorskip("support.mf4", reason="asammdf is not installed")
+    path = tmp_path / "drive.mf4"
+    files.write_mf4(path, START_NS, [files.can_group(drive, START_NS)], compression=2)
+    if suffix != path.suffix:
+        path = tmp_path / f"drive{suffix}"
+        path.write_bytes(zstd.compress((tmp_path / "drive.mf4").read_bytes()))
     motion, report = read(path, signal_map)
     assert_same(motion, truth)
     assert (report.frames, report.wanted, report.n_rejected, report.ended_early) == (len(drive), len(truth), 0, None)
@@ -265,9 +278,9 @@ def reference_with_channel(channel):
     return f'channel = "{channel}"\n' + path.read_text().replace("springscale_reference.dbc", shown)
 
 
-def test_mf4_without_its_library_says_what_to_install(tmp_path, signal_map):
-    if importlib.util.find_spec("asammdf"):
-        pytest.skip("asammdf is installed here: .mf4 can be read")
+def test_mf4_without_its_library_says_what_to_install(tmp_path, signal_map, monkeypatch):
+    monkeypatch.setitem(sys.modules, "asammdf", None)
+    mf4._asammdf.cache_clear()
     (tmp_path / "a.mf4").write_bytes(b"MDF     4.10    ")
-    with pytest.raises(LogUnreadableError, match=r'pip install "python-can\[mf4\]"'):
+    with pytest.raises(LogUnreadableError, match=r'pip install "springscale\[mdf\]"'):
         read(tmp_path / "a.mf4", signal_map)

@@ -1,20 +1,20 @@
-"""Logs in every format python-can reads (.asc .blf .mf4 .trc .csv .db), as columns of the wanted frames."""
+"""Logs that python-can reads message by message (.asc .trc .csv .db), as columns of the wanted frames."""
 
 import io
-import re
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO, Final, TextIO, cast
+from typing import Final, TextIO, cast
 
 import can
 from can.io.generic import MessageReader
 
 from gateway.bus.frames import LAST_SECOND
-from gateway.bus.logs.packed import open_log_file
+from gateway.bus.logs.packed import open_log_file, unpacked_path
 from gateway.bus.logs.report import LogReject, LogReport
+from gateway.bus.logs.selection import Selection, is_same_channel
 from gateway.bus.messages import frames_of, message_id
-from gateway.bus.signals import IdFilter
 from gateway.errors import LogUnreadableError
 from gateway.records import Frames
 
@@ -26,45 +26,28 @@ _TEXT_READERS: Final[Mapping[str, tuple[Callable[[TextIO], MessageReader], tuple
     ".csv": (can.CSVReader, ("timestamp,arbitration_id,extended,remote,error,dlc,data\n",)),
     ".trc": (can.TRCReader, ()),
 }
-_BINARY_READERS: Final[Mapping[str, Callable[[Any], MessageReader]]] = {
-    ".blf": can.BLFReader,
-    ".mf4": can.MF4Reader,
-}
-MESSAGE_SUFFIXES: Final = (*_TEXT_READERS, *_BINARY_READERS, ".db")
+MESSAGE_SUFFIXES: Final = (*_TEXT_READERS, ".db")
 
 
-def read_message_log(
-    path: Path, suffix: str, filters: Sequence[IdFilter], channel: str | None, width: int, report: LogReport
-) -> Iterator[Frames]:
-    """Frames that pass one of ``filters``, of ``channel`` or of all, in order of arrival, in chunks.
+def read_message_log(path: Path, suffix: str, selection: Selection, width: int) -> Iterator[Frames]:
+    """The selected frames in order of arrival, in chunks.
 
-    Stamps are good to the microsecond, absolute where the format is (.asc in this machine's local time,
-    as its writers mean it). A text line that cannot be read is rejected and passed over; damaged binary
-    logs end with what was readable, and ``report.ended_early`` says why. Raises LogUnreadableError where
-    not even the beginning can be read.
+    Stamps are good to the microsecond, absolute where the format is (.asc in this machine's local time, as its writers
+    mean it). A text line that cannot be read is rejected and passed over; a damaged database ends with what was
+    readable, and the report says why. Raises LogUnreadableError where not even the beginning can be read.
     """
-    messages = _text_messages(path, suffix, report) if suffix in _TEXT_READERS else _messages(path, suffix, report)
-    ours = _ours(messages, filters, channel, report)
-    chunk: list[can.Message] = []
-    for message in ours:
-        chunk.append(message)
-        if len(chunk) == CHUNK_FRAMES:
-            yield _hand_on(chunk, width, report)
-            chunk = []
-    if chunk:
-        yield _hand_on(chunk, width, report)
+    report = selection.report
+    messages = _messages(path, report) if suffix == ".db" else _text_messages(path, suffix, report)
+    ours = _ours(messages, selection)
+    while chunk := list(islice(ours, CHUNK_FRAMES)):
+        frames = frames_of(chunk, width)
+        report.hand_on(frames.t_ns)
+        yield frames
 
 
-def _hand_on(chunk: list[can.Message], width: int, report: LogReport) -> Frames:
-    frames = frames_of(chunk, width)
-    report.hand_on(frames.t_ns)
-    return frames
-
-
-def _ours(
-    messages: Iterator[can.Message], filters: Sequence[IdFilter], channel: str | None, report: LogReport
-) -> Iterator[can.Message]:
+def _ours(messages: Iterator[can.Message], selection: Selection) -> Iterator[can.Message]:
     """Data messages of our identifiers and channel; the others are counted."""
+    report = selection.report
     is_mapped: dict[int, bool] = {}
     for message in messages:
         if message.is_error_frame:
@@ -73,30 +56,18 @@ def _ours(
         report.frames += 1
         can_id = message_id(message)
         if can_id not in is_mapped:
-            is_mapped[can_id] = any(can_id & f.mask == f.can_id for f in filters)
+            is_mapped[can_id] = any(can_id & f.mask == f.can_id for f in selection.filters)
         if not is_mapped[can_id]:
             continue
         report.channels.add(str(message.channel))
         if message.is_remote_frame:
             report.remote_frames += 1
-        elif not is_same_channel(message.channel, channel):
+        elif not is_same_channel(message.channel, selection.channel):
             report.other_channel += 1
         elif not abs(message.timestamp) <= LAST_SECOND:
             report.reject(LogReject.BAD_TIME)
         else:
             yield message
-
-
-def is_same_channel(recorded: object, wanted: str | None) -> bool:
-    """Whether a recorded channel is the wanted one.
-
-    A number, as python-can counts channels, matches a name that ends in it (1 and "can1"). A format that
-    keeps no channel (.csv, .db) matches every name.
-    """
-    if wanted is None or recorded is None or str(recorded) == wanted:
-        return True
-    digits = re.search(r"\d+$", wanted)
-    return isinstance(recorded, int) and digits is not None and int(digits[0]) == recorded
 
 
 class _ResumableLines:
@@ -148,31 +119,15 @@ def _text_messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.M
                 report.lines = lines.number
 
 
-def _messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.Message]:
+def _messages(path: Path, report: LogReport) -> Iterator[can.Message]:
+    """Messages of a database."""
     try:
-        with open_log_file(path) as stream, _binary_reader(path, suffix, stream) as reader:
+        with unpacked_path(path) as unpacked, can.SqliteReader(unpacked) as reader:
             yield from reader
-            if _is_cut(path, reader):
-                report.ended_early = "the file is cut off: shorter than its header says"
-    except NotImplementedError:
-        raise LogUnreadableError(f'{path}: reading {suffix} needs asammdf: pip install "python-can[mf4]"') from None
     except LogUnreadableError:
         raise
-    except Exception as fault:  # noqa: BLE001 # each format's library has errors of its own for a damaged file
+    except Exception as fault:  # noqa: BLE001 # SQLite and python-can each have errors of their own for a damaged file
+        told = str(fault) or type(fault).__name__
         if report.frames == 0:
-            raise LogUnreadableError(f"{path}: cannot be read as {suffix}: {_told(fault)}") from None
-        report.ended_early = f"the file is damaged: {_told(fault)}"
-
-
-def _binary_reader(path: Path, suffix: str, stream: BinaryIO) -> MessageReader:
-    return can.SqliteReader(path) if suffix == ".db" else _BINARY_READERS[suffix](stream)
-
-
-def _is_cut(path: Path, reader: MessageReader) -> bool:
-    """Whether an (uncompressed) .blf is shorter than it says; python-can ends such a file without a word."""
-    is_plain = path.suffix.lower() == ".blf"
-    return is_plain and isinstance(reader, can.BLFReader) and path.stat().st_size < reader.file_size
-
-
-def _told(fault: Exception) -> str:
-    return str(fault) or type(fault).__name__
+            raise LogUnreadableError(f"{path}: cannot be read as .db: {told}") from None
+        report.ended_early = f"the file is damaged: {told}"

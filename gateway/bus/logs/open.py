@@ -4,23 +4,28 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
+from gateway.bus.logs.blf import read_blf
 from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.message_log import MESSAGE_SUFFIXES, read_message_log
+from gateway.bus.logs.mf4 import read_mf4
 from gateway.bus.logs.packed import PACKED_SUFFIXES, unpacked_suffix
 from gateway.bus.logs.report import LogReport
+from gateway.bus.logs.selection import Selection
 from gateway.bus.signals import CAN_FD_BYTES, Decoder, IdFilter, SignalMap
 from gateway.errors import LogUnreadableError
 from gateway.records import EXTENDED_ID, Frames, Motion
 
 EVERY_FRAME: Final = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))
 CANDUMP_SUFFIXES: Final = (".log", ".txt", ".candump", "")
+BULK_READERS: Final = {".blf": read_blf, ".mf4": read_mf4}
 
 
 def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames], LogReport]:
     """The map's frames of a log in order of arrival, and a report that fills while they are read.
 
-    candump text (.log, .txt, .candump) goes through the fast reader, .asc .blf .mf4 .trc .csv .db through
-    python-can's; each may be packed. Raises LogUnreadableError where the file is missing or of an unknown kind.
+    candump text (.log, .txt, .candump), .blf and .mf4 go through readers that take thousands of frames at once,
+    .asc .trc .csv .db through python-can's; each may be packed. Raises LogUnreadableError where the file is missing
+    or of an unknown kind.
     """
     return _open(Path(path), signal_map.filters, signal_map.channel, signal_map.payload_width)
 
@@ -38,9 +43,12 @@ def _open(
     _require_file(path)
     if suffix in CANDUMP_SUFFIXES:
         return read_candump(path, filters, channel, width=width, report=report), report
+    selection = Selection(filters, channel, report)
     if suffix in MESSAGE_SUFFIXES:
-        return read_message_log(path, suffix, filters, channel, width, report), report
-    known = " ".join((*CANDUMP_SUFFIXES[:-1], *MESSAGE_SUFFIXES))
+        return read_message_log(path, suffix, selection, width), report
+    if suffix in BULK_READERS:
+        return BULK_READERS[suffix](path, selection, width), report
+    known = " ".join((*CANDUMP_SUFFIXES[:-1], *MESSAGE_SUFFIXES, *BULK_READERS))
     packed = ", ".join(PACKED_SUFFIXES)
     raise LogUnreadableError(
         f"{path}: cannot tell the kind of log from {suffix!r}; known are {known}, and each with {packed}"

@@ -2,9 +2,11 @@
 
 import io
 import lzma
+import shutil
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Final, Protocol, cast
@@ -133,6 +135,22 @@ def open_log_file(path: Path) -> AbstractContextManager[BinaryIO]:
         raise LogUnreadableError(f"{path}: cannot be read: {fault.strerror or fault}") from None
     packing = packing_of(file.peek(_LONGEST_MAGIC))
     return file if packing is None else io.BufferedReader(InflatedStream(file, packing), BUFFER_BYTES)
+
+
+@contextmanager
+def unpacked_path(path: Path) -> Iterator[Path]:
+    """The file itself, or a temporary copy of what is packed in it, for libraries that read here and there in a file.
+
+    Raises EOFError and OSError as InflatedStream does, LogUnreadableError where it cannot be opened.
+    """
+    with open_log_file(path) as stream:
+        if not isinstance(getattr(stream, "raw", None), InflatedStream):
+            yield path
+            return
+        with tempfile.NamedTemporaryFile(suffix=unpacked_suffix(path)) as copy:
+            shutil.copyfileobj(stream, copy, BUFFER_BYTES)
+            copy.flush()
+            yield Path(copy.name)
 
 
 def packing_of(content: bytes) -> Packing | None:

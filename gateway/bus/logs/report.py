@@ -26,6 +26,7 @@ class LogReject(StrEnum):
     TOO_LONG = "too_long"  # more bytes than a frame can hold
     GARBLED = "garbled"
     OVERLONG_LINE = "overlong_line"
+    DAMAGED_BLOCK = "damaged_block"  # of a binary log, with all the frames in it
 
 
 @dataclass(slots=True)
@@ -63,11 +64,13 @@ class LogReport:
         """Whether the number of a further line refused for ``reason`` would still be kept."""
         return reason not in self.rejects or len(self.rejects[reason].first_lines) < KEPT_LINE_NUMBERS
 
-    def reject(self, reason: LogReject, line: int | None = None) -> None:
-        """Count one refused line."""
+    def reject(self, reason: LogReject, line: int | None = None, *, n: int = 1) -> None:
+        """Count a refused line, or ``n`` of them where nobody knows their numbers."""
+        if n == 0:
+            return
         if line is not None and self.keeps_lines_of(reason):
             self.rejects.setdefault(reason, RejectedLines()).first_lines.append(line)
-        self.rejects.setdefault(reason, RejectedLines()).count += 1
+        self.rejects.setdefault(reason, RejectedLines()).count += n
 
     def hand_on(self, t_ns: I64) -> None:
         """Count frames handed on, by their stamps in order of arrival."""

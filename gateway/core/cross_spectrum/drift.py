@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
@@ -65,7 +65,7 @@ DRIFT_PRECISION: Final = np.linalg.inv(_believed_covariance())
 _OF_THE_VEHICLE: Final = np.array([name != "gyro_lag_s" for name in DRIFT_STD], dtype=float)  # a lag is the computer's
 _NATURAL_VAR: Final = np.maximum([NATURE_STD.get(name, 0.0) ** 2 for name in DRIFT_STD], _OWN_VAR)
 _NATURAL_PRECISION: Final = np.linalg.inv(_believed_covariance() + np.diag(_NATURAL_VAR - _OWN_VAR))
-MOST_TENSION: Final = float(chi2.ppf(1.0 - 1e-4, int(_OF_THE_VEHICLE.sum())))
+MOST_TENSION: Final = float(2.0 * gammaincinv(int(_OF_THE_VEHICLE.sum()) / 2.0, 1.0 - 1e-4))  # chi-squared quantile
 """A vehicle that drifts as vehicles do exceeds this once in ten thousand batches."""
 
 
