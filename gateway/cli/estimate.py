@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from gateway.bus.logs import LogReport
 from gateway.calibration.tare_file import FILE_NAME
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.text.estimate import sentence
@@ -47,12 +48,18 @@ def estimate(
     if not no_tare:
         setup = _tared(setup, tare, state)
     for log in logs:
-        for weighed in estimates_of_logs([log], setup, settings):
+        for weighed in estimates_of_logs([log], setup, settings, on_read=_tell):
             record = estimate_to_json(weighed)
             if len(logs) == 1:
                 click.echo(json_line(record) if as_json else sentence(record))
             else:
                 click.echo(json_line({"log": str(log), **record}) if as_json else f"{log}: {sentence(record)}")
+
+
+def _tell(report: LogReport) -> None:
+    """What could not be read, beside the estimates."""
+    for remark in report.remarks():
+        click.echo(remark, err=True)
 
 
 def _prepared(

@@ -1,5 +1,6 @@
 """What a log reader met on its way: counts, and the lines it could not read, by reason."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -96,6 +97,17 @@ class LogReport:
             "rejects": rejects,
             "ended_early": self.ended_early,
         }
+
+    def remarks(self) -> Iterator[str]:
+        """What a person should know of the reading, a sentence each; nothing where all was well."""
+        if self.ended_early:
+            yield f"{self.path}: {self.ended_early}; what lies before was read"
+        for reason, lines in self.rejects.items():
+            where = f", first in line {lines.first_lines[0]}" if lines.first_lines else ""
+            yield f"{self.path}: left out, {str(reason).replace('_', ' ')}: {lines.count}{where}"
+        if len(self.channels) > 1 and not self.other_channel:
+            seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
+            yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
 
     def require_frames(self) -> None:
         """After reading: raise LogUnreadableError, saying why, where not one wanted frame was found."""

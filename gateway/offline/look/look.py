@@ -84,7 +84,9 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
 def _near(log: Path) -> list[Path]:
     """Databases beside a log, or where there are none, one folder above: campaigns have a folder a drive."""
     folder = log.resolve().parent
-    return sorted(folder.glob("*.dbc")) or sorted(folder.parent.glob("*.dbc"))
+    places = [(place, kinds) for kinds in (("dbc",), ("kcd", "arxml", "sym")) for place in (folder, folder.parent)]
+    each = (sorted(path for kind in kinds for path in place.glob(f"*.{kind}")) for place, kinds in places)
+    return next((found for found in each if found), [])
 
 
 def _lacking(found: Sequence[Found], fits: Sequence[Fit], readings: Sequence[Reading], tilt: float) -> Iterator[str]:
