@@ -29,6 +29,10 @@ class CalibrationFileError(ConfigurationError):
     """A calibration file is missing, damaged, of another version or of another vehicle."""
 
 
+class LineError(ConfigurationError):
+    """Calibrations that make no line, or a vehicle that is none of theirs."""
+
+
 class TareRefusedError(SpringscaleError):
     """A vehicle cannot be re-zeroed now. ``reason`` is one of core.tare.Refusal; the message says what to do."""
 

@@ -13,15 +13,19 @@ from gateway.calibration.file import (
     CalibrationFile,
     CrossSpectrumPart,
     ExpectedErrorsPart,
+    LikeFile,
+    LinePart,
     ProvenancePart,
     RatioIndexPart,
     RunPart,
     SeenPart,
     VehiclePart,
+    line_of_files,
 )
 from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
-from gateway.calibration.inspection import Inspection, Severity, SplitRun
+from gateway.calibration.inspection import Inspection, Kind, Severity, SplitRun
 from gateway.calibration.known_run import KnownRun
+from gateway.calibration.line import Line, Seen
 from gateway.calibration.ratio_index import BandChoice, RatioIndexFit, StructureChoice, fit_ratio_index
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.errors import CalibrationImpossibleError
@@ -52,34 +56,33 @@ def calibrate_inspected(
     estimators: Sequence[str],
     bands: BandChoice = "campaign",
     structure: StructureChoice = "auto",
+    like: Sequence[LikeFile] = (),
     command: str = "",
     on_fit: OnFit = lambda name, done, of: None,
 ) -> Outcome:
     """Fits every named estimator on the identification parts of the runs without a fault.
 
-    ``bands`` and ``structure`` are the ratio index's: found on the campaign, or named.
+    ``like`` are calibrations of sister vehicles, or a line file: what they tell stands before the drives in place of
+    what is usual of any vehicle. ``bands`` and ``structure`` are the ratio index's: found on the campaign, or named.
 
     An estimator that these runs cannot carry is left out with a warning; raises CalibrationImpossibleError
     when none is left, and where the faults of the runs leave no calibration worth its name.
     """
     if inspection.refusal is not None:
         raise CalibrationImpossibleError(_refused(campaign, inspection, inspection.refusal))
+    line = line_of_files(like) if like else None
+    if line is not None:
+        inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)
     split = inspection.usable
     runs = [one.identification for one in split]
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
-    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, bands, structure, on_fit)
-    with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
-    speeds = [batch.mean_speed_mps for batch in counted]
+    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, line, bands, structure, on_fit)
     file = CalibrationFile(
         vehicle=VehiclePart(**asdict(campaign.vehicle)),
-        seen=SeenPart(
-            payload_kg=_span([run.payload_kg for run in with_batches]),
-            front_share_pct=_span([run.front_share_pct for run in with_batches]),
-            speed_mps=_span(speeds),
-            roughness_mps2=_roughness_span(counted),
-        ),
+        seen=_seen(runs, counted, line.seen if line and cross_spectrum else None),
         cross_spectrum=CrossSpectrumPart.of(cross_spectrum.calibration) if cross_spectrum else None,
         ratio_index=RatioIndexPart.of(ratio_index.calibration) if ratio_index else None,
+        line=LinePart.of(line) if line and cross_spectrum else None,
         expected_errors=_expected_errors(ratio_index=ratio_index, cross_spectrum=cross_spectrum),
         warnings=(*inspection.warnings, *warnings),
         provenance=_provenance(campaign, split, command),
@@ -91,6 +94,7 @@ def _fit(
     estimators: Sequence[str],
     runs: Sequence[KnownRun],
     campaign: Campaign,
+    line: Line | None,
     bands: BandChoice,
     structure: StructureChoice,
     on_fit: OnFit,
@@ -107,7 +111,7 @@ def _fit(
                     runs, campaign.vehicle, bands=bands, structure=structure, progress=progress
                 )
             else:
-                cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle, progress)
+                cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle, progress, line)
                 warnings.extend(cross_spectrum.calibration.warnings)
         except CalibrationImpossibleError as fault:
             warnings.append(f"{name}: {fault}")
@@ -125,6 +129,19 @@ def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
         if finding.severity is Severity.FAULT
     ]
     return "\n".join([f"{campaign.path}: {why}", *dict.fromkeys(faults)])
+
+
+def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], by_line: Seen | None) -> SeenPart:
+    """What the runs covered that hold a batch, and the line before them."""
+    driven = [run for run in runs if any(not batch.rejected for batch in run.batches)]
+    return SeenPart(
+        payload_kg=_span([*(run.payload_kg for run in driven), *(by_line.payload_seen_kg if by_line else ())]),
+        front_share_pct=_span(
+            [*(run.front_share_pct for run in driven), *(by_line.front_share_seen_pct if by_line else ())]
+        ),
+        speed_mps=_span([*(b.mean_speed_mps for b in counted), *(by_line.speed_seen_mps if by_line else ())]),
+        roughness_mps2=_roughness_span(counted),
+    )
 
 
 def _span(numbers: Sequence[float]) -> tuple[float, float]:

@@ -9,8 +9,8 @@ import click
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file import CalibrationFile
-from gateway.calibration.inspection import Inspection
+from gateway.calibration.file import CalibrationFile, LikeFile, load_like
+from gateway.calibration.inspection import Inspection, Kind
 from gateway.calibration.judgement import LearningCurve, curve_of
 from gateway.calibration.plan import LoadPlan, plan_first, plan_next
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
@@ -31,6 +31,13 @@ from gateway.records import json_line
 @click.option("--output", type=FILE, default=None, help="calibration file to write; needed but for --plan")
 @click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]")
 @click.option("--runs", "numbers", type=RunNumbers(), default=None, help="these runs only, counted from 1: 1,5,10")
+@click.option(
+    "--like",
+    "like",
+    type=FILE,
+    multiple=True,
+    help="calibration of a sister vehicle, or a line file; repeatable. One empty drive is then enough",
+)
 @click.option(
     "--bands",
     type=click.Choice(get_args(BandChoice)),
@@ -63,6 +70,7 @@ def calibrate(
     output: Path | None,
     estimators: tuple[str, ...],
     numbers: tuple[int, ...] | None,
+    like: tuple[Path, ...],
     bands: BandChoice,
     structure: StructureChoice,
     wants_plan: bool,
@@ -83,7 +91,10 @@ def calibrate(
     if not loaded.runs:
         _plan_first(loaded.vehicle, as_json=as_json)
         return
+    sisters = [load_like(path) for path in like]
     inspection = _inspect(loaded, numbers, batch_settings(window_s))
+    if sisters:
+        inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)  # other loads were driven with the sisters
     _tell_inspection(inspection, as_json=as_json, is_all=only_checks)
     if inspection.refusal is not None:
         raise CalibrationImpossibleError(f"{campaign}: {inspection.refusal}; the findings say what to mend")
@@ -96,7 +107,8 @@ def calibrate(
             estimators=estimators or ESTIMATOR_NAMES,
             bands=bands,
             structure=structure,
-            command=_command(campaign, estimators, numbers, bands, structure, window_s),
+            like=sisters,
+            command=_command(campaign, estimators, numbers, sisters, bands, structure, window_s),
             on_fit=on_share(on_step, estimators or ESTIMATOR_NAMES),
         )
     if output is not None:
@@ -114,17 +126,20 @@ def _command(
     campaign: Path,
     estimators: Sequence[str],
     numbers: Sequence[int] | None,
+    like: Sequence[LikeFile],
     bands: BandChoice,
     structure: StructureChoice,
     window_s: float | None,
 ) -> str:
     """What decides the result, as it would be asked for again: the calibration's id comes from it too.
 
-    Not where the file lies or is written to, for the same drives give the same calibration under any name.
+    Sisters by their ids. Not where the file lies or is written to, for the same drives give the same calibration under
+    any name.
     """
     words = ["springscale", "calibrate", campaign.name]
     words += [word for name in estimators for word in ("--estimator", name)]
     words += [] if numbers is None else ["--runs", ",".join(map(str, numbers))]
+    words += [word for one in like for word in ("--like", one.id)]
     words += ["--bands", bands, "--structure", structure]
     words += [] if window_s is None else ["--window-s", f"{window_s:g}"]
     return shlex.join(words)
@@ -217,6 +232,7 @@ def _sentences(file: CalibrationFile, output: Path | None, plan: LoadPlan | None
         f"{output or 'no file written'}: {', '.join(file.estimators)}; payloads {low:g} to {high:g} kg, "
         f"{len(file.provenance.runs)} runs, {sum(run.n_batches for run in file.provenance.runs)} batches",
         f"id {file.id}",
+        *([f"inherited from {len(file.line.members)} of its line"] if file.line else []),
         *(f"warning: {warning}" for warning in file.warnings if warning not in said),
         *([plan_sentences(plan)] if plan else []),
     ]

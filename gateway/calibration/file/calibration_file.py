@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 
 from pydantic import Field, ValidationError
 
+from gateway.calibration.file.line_part import LinePart
 from gateway.calibration.file.parts import (
     CrossSpectrumPart,
     ExpectedErrorsPart,
@@ -19,9 +20,10 @@ from gateway.calibration.file.parts import (
     SeenPart,
     VehiclePart,
 )
+from gateway.calibration.line import Sister
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle, sensor_offset_left
-from gateway.errors import CalibrationFileError, UntrustedFileError
+from gateway.errors import CalibrationFileError, LineError, UntrustedFileError
 from gateway.files.signed import Read
 from gateway.toml_file import describe_faults
 
@@ -29,14 +31,14 @@ Content = dict[str, Any]
 FIRST_VERSION: Final = 1
 
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 3
+VERSION: Final = 4
 
 
 class CalibrationFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-calibration"] = FORMAT
-    version: Literal[3] = VERSION
+    version: Literal[4] = VERSION
     migrated_from: str | None = Field(
         None, description="id of the file of an older version that this content was read from; null: written as it is"
     )
@@ -44,6 +46,9 @@ class CalibrationFile(Part):
     seen: SeenPart
     cross_spectrum: CrossSpectrumPart | None = None
     ratio_index: RatioIndexPart | None = None
+    line: LinePart | None = Field(
+        None, description="what sister vehicles told before it was driven; null: its own drives are all that it knows"
+    )
     expected_errors: dict[str, ExpectedErrorsPart] = Field(
         default_factory=dict, description="by estimator: errors on runs left out of the fit"
     )
@@ -76,6 +81,16 @@ class CalibrationFile(Part):
             cross_spectrum=self.cross_spectrum.for_core() if self.cross_spectrum else None,
         )
 
+    def sister(self) -> Sister:
+        """What it tells of other vehicles of its line. Raises LineError where it holds no half-car."""
+        if self.cross_spectrum is None:
+            raise LineError(
+                f"{self.vehicle.name} ({self.id}): holds no cross_spectrum calibration, of which alone a line is made: "
+                "calibrate it again without --estimator ratio_index"
+            )
+        line = self.line.for_core() if self.line else None
+        return Sister(self.id, Vehicle(**dict(self.vehicle)), self.cross_spectrum.for_core(), line)
+
     @property
     def estimators(self) -> tuple[str, ...]:
         """Estimators that this file holds a calibration for; the service runs the first unless told otherwise."""
@@ -98,7 +113,7 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
     Raises CalibrationFileError saying what to do.
     """
     path = Path(path)
-    content = _read(path, read)
+    content = read_content(path, read)
     if content.get("format") != FORMAT:
         raise CalibrationFileError(f"{path}: not a springscale calibration file (format is {content.get('format')!r})")
     _refuse_unknown_version(path, content.get("version"))
@@ -111,6 +126,8 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
         current = migrated(content, VERSION)
         held = CalibrationFile.model_validate({key: part for key, part in current.items() if key != "id"})
         held.for_core()  # a term or a model of another springscale is told here, with the file's name
+        if held.line is not None:
+            held.line.for_core()
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
     except ValidationError as fault:
@@ -142,7 +159,8 @@ def _matches_its_id(content: dict[str, Any]) -> bool:
         return False
 
 
-def _read(path: Path, read: Read) -> dict[str, Any]:
+def read_content(path: Path, read: Read) -> Content:
+    """A file's JSON object. Raises CalibrationFileError where it is none."""
     try:
         content = json.loads(read(path).decode("utf-8"))
     except FileNotFoundError:
@@ -181,8 +199,15 @@ def _to_version_3(content: Content) -> None:
         run["payload_left_m"] = None
 
 
+def _to_version_4(content: Content) -> None:
+    """Version 4 says what was inherited from a line. Before, there were no lines."""
+    content["line"] = None
+
+
 # Entry v turns version v into v + 1. Entries are never edited, only added.
-MIGRATIONS: Final[Mapping[int, Callable[[Content], None]]] = MappingProxyType({1: _to_version_2, 2: _to_version_3})
+MIGRATIONS: Final[Mapping[int, Callable[[Content], None]]] = MappingProxyType(
+    {1: _to_version_2, 2: _to_version_3, 3: _to_version_4}
+)
 
 
 def migrated(content: Content, version: int) -> Content:

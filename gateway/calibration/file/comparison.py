@@ -9,7 +9,7 @@ from gateway.calibration.file.figures import Figure, figures_of
 
 # Fitted arrays: compared as figures. The rest of these names is identity, which says nothing by itself.
 _LEFT_OUT: Final = frozenset({"id", "migrated_from", "parameters", "covariance", "names", "coefficients",
-                              "gram_inverse", "terms"})  # fmt: skip
+                              "gram_inverse", "terms", "information", "pull"})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

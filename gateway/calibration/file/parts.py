@@ -27,7 +27,7 @@ def _array(numbers: Any) -> F64:
     return array
 
 
-def _check_shapes(**expected: tuple[F64, tuple[int, ...]]) -> None:
+def check_shapes(**expected: tuple[F64, tuple[int, ...]]) -> None:
     """Arrays by name, each with the shape it must have. Raises ValueError."""
     for name, (array, shape) in expected.items():
         if array.shape != shape:
@@ -67,7 +67,7 @@ class RegressionPart(Part):
     @model_validator(mode="after")
     def _is_consistent(self) -> "RegressionPart":
         n = len(self.terms)
-        _check_shapes(
+        check_shapes(
             lows=(self.lows, (n,)),
             highs=(self.highs, (n,)),
             coefficients=(self.coefficients, (n + 1,)),
@@ -181,7 +181,7 @@ class CrossSpectrumPart(Part):
     @model_validator(mode="after")
     def _is_consistent(self) -> "CrossSpectrumPart":
         n = len(self.names)
-        _check_shapes(parameters=(self.parameters, (n,)), covariance=(self.covariance, (n, n)))
+        check_shapes(parameters=(self.parameters, (n,)), covariance=(self.covariance, (n, n)))
         return self
 
     @classmethod
@@ -230,7 +230,7 @@ class VehiclePart(Part):
 
 
 class SeenPart(Part):
-    """What the identification runs covered: the ranges of validity."""
+    """What the identification runs covered, and those of its line: the ranges of validity."""
 
     payload_kg: tuple[float, float]
     front_share_pct: tuple[float, float]

@@ -11,12 +11,14 @@ from gateway.calibration.half_car.fit import (
     fit_cross_spectrum,
     half_car_calibration,
 )
+from gateway.calibration.half_car.inherited import Inherited
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
 from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
 from gateway.calibration.half_car.prior import Prior, prior_of
 
 __all__ = [
     "CrossSpectrumFit",
+    "Inherited",
     "KnownSpectra",
     "Prior",
     "calibrate_cross_spectrum",

@@ -18,6 +18,7 @@ import numpy as np
 
 from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATION
 from gateway.calibration.half_car.inflation import inflation_of, of_places
+from gateway.calibration.half_car.inherited import Inherited
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
 from gateway.calibration.half_car.most_probable_vehicle import fit_vehicle, seen_by
 from gateway.calibration.half_car.prior import Prior, can_roll, prior_of
@@ -61,36 +62,48 @@ def calibrate_cross_spectrum(runs: Sequence[KnownRun], vehicle: Vehicle) -> Cros
 
 
 def fit_cross_spectrum(
-    runs: Sequence[KnownRun], vehicle: Vehicle, progress: Callable[[int, int], None] | None = None
+    runs: Sequence[KnownRun],
+    vehicle: Vehicle,
+    progress: Callable[[int, int], None] | None = None,
+    inherited: Inherited | None = None,
 ) -> CrossSpectrumFit:
     """Fit the half-car to ``runs``; one empty run is enough, then with the warning ``springs_from_priors``.
 
-    ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError where no
-    run holds enough steady driving.
+    ``inherited`` is what vehicles of the same line tell; it takes the place of what is usual of any vehicle.
+    ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError where no run holds enough
+    steady driving.
     """
-    known = known_spectra(runs, vehicle, with_roll=can_roll(vehicle))
-    prior = prior_of(vehicle, with_roll=known[0].spectra.roll is not None)
+    usual = inherited.usual_log_amplitude if inherited else None
+    known = known_spectra(runs, vehicle, with_roll=can_roll(vehicle), usual_log_amplitude=usual)
+    with_roll = known[0].spectra.roll is not None
+    prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=with_roll)
+    shifts = _STARTS[:1] if inherited else _STARTS  # sisters tell which peak it is
     can_leave_out = len(known) >= LEAST_RUNS_TO_LEAVE_ONE_OUT
-    step = _counted(progress, len(_STARTS) + (2 * len(_STARTS) + len(known)) * can_leave_out)
-    found = _from_priors(known, prior, step)
-    calibration = half_car_calibration(known, vehicle, found)
+    step = _counted(progress, len(shifts) + (2 * len(shifts) + len(known)) * can_leave_out)
+
+    def taught(by: Sequence[KnownSpectra], found: Found) -> CrossSpectrumCalibration:
+        untested = half_car_calibration(by, vehicle, found)
+        return inherited.on(untested, is_tested=False) if inherited else untested
+
+    calibration = taught(known, _from_priors(known, prior, shifts, step))
+    untested = calibration if inherited else replace(calibration, warnings=(*calibration.warnings, UNTESTED))
     if not can_leave_out:
-        return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
+        return CrossSpectrumFit(untested, {})
     errors: list[_LeftOut] = []
     without: dict[int, CrossSpectrumCalibration] = {}
-    for one, others, start in _left_out_in_turn(known, prior, step):
-        without[one.run.number] = half_car_calibration(others, vehicle, fit_vehicle(others, prior, [start]))
+    for one, others, start in _left_out_in_turn(known, prior, shifts, step):
+        without[one.run.number] = taught(others, fit_vehicle(others, prior, [start]))
         errors.extend(_left_out_errors(one, without[one.run.number]))
         step()
     if not errors:
-        return CrossSpectrumFit(replace(calibration, warnings=(*calibration.warnings, UNTESTED)), {})
+        return CrossSpectrumFit(untested, {})
     columns = np.array([astuple(one) for one in errors]).T
     payload_z, share_z, misfits, payload_kg, share_pct, reach, position_scores, noise_scores, place_z = columns
     of_payload, of_share = inflation_of(payload_z, reach), inflation_of(share_z, reach)
 
-    def tested(untested: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
-        return replace(
-            untested,
+    def tested(one: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
+        shown = replace(
+            one,
             payload_inflation=of_payload.within,
             payload_inflation_per_reach=of_payload.per_reach,
             front_share_inflation=of_share.within,
@@ -100,6 +113,7 @@ def fit_cross_spectrum(
             cg_left_inflation=of_places(place_z[np.isfinite(place_z)]),
             misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.nanmax([0.0, *misfits]))),
         )
+        return inherited.on(shown, is_tested=True) if inherited else shown
 
     tested_without = {number: tested(one) for number, one in without.items()}
     return CrossSpectrumFit(tested(calibration), tested_without, payload_kg, share_pct)
@@ -116,20 +130,22 @@ def _counted(progress: Callable[[int, int], None] | None, n_steps: int) -> Calla
     return step
 
 
-def _from_priors(known: Sequence[KnownSpectra], prior: Prior, step: Callable[[], None]) -> Found:
-    """The most probable of what is found from each of _STARTS: the posterior need not have one peak."""
-    return fit_vehicle(known, prior, [prior.start(*shift) for shift in _STARTS], step)
+def _from_priors(
+    known: Sequence[KnownSpectra], prior: Prior, shifts: Sequence[tuple[float, float]], step: Callable[[], None]
+) -> Found:
+    """The most probable of what is found from each start: the posterior need not have one peak."""
+    return fit_vehicle(known, prior, [prior.start(*shift) for shift in shifts], step)
 
 
 def _left_out_in_turn(
-    known: Sequence[KnownSpectra], prior: Prior, step: Callable[[], None]
+    known: Sequence[KnownSpectra], prior: Prior, shifts: Sequence[tuple[float, float]], step: Callable[[], None]
 ) -> Iterator[tuple[KnownSpectra, list[KnownSpectra], F64]]:
     """Each run, all others, and a start (p,) for their fit in which that run had no part.
 
     Every second run is of one half, the rest of the other: the start is what the half without the run has found from
     the priors. That costs a quarter of trying all of _STARTS for every run, and comes out at the same peak.
     """
-    starts = [_from_priors(half, prior, step).x for half in (known[1::2], known[::2])]
+    starts = [_from_priors(half, prior, shifts, step).x for half in (known[1::2], known[::2])]
     for i, one in enumerate(known):
         yield one, [k for k in known if k is not one], starts[i % 2]
 

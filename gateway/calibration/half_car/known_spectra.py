@@ -81,8 +81,10 @@ class KnownSpectra:
         return Whittle(spectra, Ground.of(self._vehicle), EVIDENCE_WEIGHT)
 
 
-def known_spectra(runs: Sequence[KnownRun], vehicle: Vehicle, *, with_roll: bool = False) -> list[KnownSpectra]:
-    """Those of ``runs`` that hold enough steady driving, their usual amplitude the median of all.
+def known_spectra(
+    runs: Sequence[KnownRun], vehicle: Vehicle, *, with_roll: bool = False, usual_log_amplitude: float | None = None
+) -> list[KnownSpectra]:
+    """Those of ``runs`` that hold enough steady driving, their usual amplitude the median of all unless given.
 
     ``with_roll`` reads the roll rate too, where every run has one. Raises CalibrationImpossibleError where no run holds
     enough.
@@ -94,7 +96,9 @@ def known_spectra(runs: Sequence[KnownRun], vehicle: Vehicle, *, with_roll: bool
             "no run holds enough steady driving with both sensors for the cross-spectral estimator: drive at least a "
             "minute at speed, and map both"
         )
-    usual = float(np.median([spectra.reading.usual_log_amplitude for _, spectra in read]))
+    usual = usual_log_amplitude
+    if usual is None:
+        usual = float(np.median([spectra.reading.usual_log_amplitude for _, spectra in read]))
     with_roll = all(spectra.roll is not None for _, spectra in read)
     reading = replace(reading, usual_log_amplitude=usual, with_roll=with_roll)
     again = [(run, _spectra_of(run, reading)) for run, _ in read]

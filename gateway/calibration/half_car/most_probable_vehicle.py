@@ -56,4 +56,4 @@ def fit_half_car(known: Sequence[KnownSpectra], prior: Prior, start: F64) -> Fou
             information=np.sum([part.information for part in parts], axis=0),
         )
 
-    return most_probable(start, prior.mean, np.diag(prior.std**-2.0), cost, curvature, tolerance=0.05)
+    return most_probable(start, prior.mean, prior.precision, cost, curvature, tolerance=0.05)

@@ -11,6 +11,7 @@ from math import log, pi
 from typing import Final
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from gateway.core.cross_spectrum.model.parameters import BEND_SHARES, INDEX, PARAMETERS, ROLL_PARAMETERS
 from gateway.core.cross_spectrum.model.usual_roll import usual_roll
@@ -69,20 +70,45 @@ _ROLL_STD: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """Independent Gaussians over the parameter vector: mean and std (p,)."""
+    """A Gaussian over the parameter vector: mean (p,) and precision (p, p), the inverse of its covariance.
+
+    How a vehicle rolls is independent of how it heaves and pitches.
+    """
 
     mean: F64
-    std: F64
+    precision: F64
+
+    @classmethod
+    def independent(cls, mean: F64, std: F64) -> "Prior":
+        """Of parameters that know nothing of each other: mean and std (p,)."""
+        return cls(mean, np.diag(std**-2.0))
+
+    @property
+    def covariance(self) -> F64:
+        """(p, p)"""
+        return np.asarray(np.linalg.inv(self.precision), float)
+
+    @property
+    def std(self) -> F64:
+        """(p,) of each parameter by itself."""
+        std: F64 = np.sqrt(np.diag(self.covariance))
+        return std
 
     @property
     def upright(self) -> "Prior":
         """Of how the vehicle heaves and pitches."""
-        return Prior(self.mean[: len(PARAMETERS)], self.std[: len(PARAMETERS)])
+        n = len(PARAMETERS)
+        return Prior(self.mean[:n], self.precision[:n, :n])
 
     @property
     def roll(self) -> "Prior":
         """Of how it rolls; empty where that is not asked."""
-        return Prior(self.mean[len(PARAMETERS) :], self.std[len(PARAMETERS) :])
+        n = len(PARAMETERS)
+        return Prior(self.mean[n:], self.precision[n:, n:])
+
+    def beside(self, roll: "Prior") -> "Prior":
+        """Of all parameters: this one of how the vehicle heaves and pitches, ``roll`` of how it rolls."""
+        return Prior(np.r_[self.mean, roll.mean], block_diag(self.precision, roll.precision))
 
     def start(self, log_springs: float, log_dampers: float) -> F64:
         """The centre, with springs and dampers moved by these logarithms."""
@@ -111,7 +137,7 @@ def prior_of(vehicle: Vehicle, *, with_roll: bool = False) -> Prior:
         entries |= _roll(vehicle)
     entries |= {name: (log(SLACK), _LOG_STD["slack"]) for name in names if name.startswith("slack_")}
     mean, std = np.array([entries[name] for name in names]).T
-    return Prior(mean, std)
+    return Prior.independent(mean, std)
 
 
 def _roll(vehicle: Vehicle) -> dict[str, tuple[float, float]]:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from gateway.calibration.half_car.known_spectra import KnownSpectra
 from gateway.calibration.half_car.prior import Prior
@@ -33,7 +34,7 @@ def fit_roll(known: Sequence[KnownSpectra], upright: Found, prior: Prior, start:
     m, r = len(start), len(known)
     seen = [(one, one.rolling) for one in known]
     mean = np.r_[prior.mean, np.zeros(r)]
-    precision = np.diag(np.r_[prior.std**-2.0, [one.moment_std_kgm**-2.0 for one in known]])
+    precision = block_diag(prior.precision, np.diag([one.moment_std_kgm**-2.0 for one in known]))
 
     def cost(x: F64) -> float:
         theta = np.r_[upright.x, x[:m]]

@@ -9,6 +9,7 @@ rows, axes and signs, and loads are asked in this order; a fault keeps its run o
 from gateway.calibration.inspection.campaign import inspect_campaign
 from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
 from gateway.calibration.inspection.inspection import Inspection
+from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.inspection.log import LogFacts
 from gateway.calibration.inspection.roll import offset_findings, unmapped_roll_findings
 from gateway.calibration.inspection.rows import RowFacts, row_facts
@@ -17,6 +18,7 @@ from gateway.calibration.inspection.split_run import SplitRun
 __all__ = [
     "Finding",
     "Inspection",
+    "Kind",
     "LogFacts",
     "RowFacts",
     "RunVerdict",

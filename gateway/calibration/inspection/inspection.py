@@ -1,9 +1,10 @@
 """A campaign's drives read and inspected, before anything is fitted to them."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
+from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.inspection.split_run import SplitRun
 
 
@@ -19,6 +20,10 @@ class Inspection:
     def usable(self) -> tuple[SplitRun, ...]:
         """The runs without a fault."""
         return tuple(one for one, verdict in zip(self.split, self.verdicts, strict=True) if verdict.is_usable)
+
+    def excusing(self, kind: Kind) -> "Inspection":
+        """Without what it says of the campaign as a whole of this ``kind``."""
+        return replace(self, findings=tuple(one for one in self.findings if one.kind is not kind))
 
     @property
     def refusal(self) -> str | None:

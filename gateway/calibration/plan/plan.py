@@ -95,7 +95,7 @@ def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST) -> LoadPlan:
     prior = prior_of(vehicle)
     planner = _Planner(vehicle, prior.mean, FIRST_DRIVE)
     unloaded = empty(vehicle)
-    known = planner.after(np.diag(prior.std**2), unloaded)
+    known = planner.after(prior.covariance, unloaded)
     first = Advice(unloaded, planner.expected(known, (unloaded,)))
     return LoadPlan(
         vehicle=vehicle.name,

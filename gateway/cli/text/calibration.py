@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, Figure, figures_of
+from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, Figure, LinePart, figures_of
 
 
 def calibration_text(held: CalibrationFile) -> str:
@@ -11,7 +11,8 @@ def calibration_text(held: CalibrationFile) -> str:
         "vehicle (as the campaign stated it)": _vehicle(held),
         "calibrated for": _ranges(held),
         "expected errors (runs left out of the fit)": _expected(held),
-        **{_title(part, figures): map(_figure, figures) for part, figures in figures_of(held).items()},
+        **({"inherited from its line": _line(held.line)} if held.line else {}),
+        **{_title(part, figures): _figures(figures, held.line) for part, figures in figures_of(held).items()},
         "warnings": iter(held.warnings or ("none",)),
         "made by": _provenance(held),
     }
@@ -57,8 +58,17 @@ def _title(part: str, figures: Sequence[Figure]) -> str:
     return f"{part}: {len(figures)} parameters ± their standard deviations"
 
 
-def _figure(figure: Figure) -> str:
-    return f"{figure.name:28}{figure.centre:>12.5g} ± {figure.std:.2g}"
+def _figures(figures: Sequence[Figure], line: LinePart | None) -> Iterator[str]:
+    """With a line, what was inherited is told from what is the vehicle's own."""
+    for figure in figures:
+        row = f"{figure.name:28}{figure.centre:>12.5g} ± {figure.std:.2g}"
+        yield row if line is None else f"{row:52}{'inherited' if figure.name in line.scatter_std else 'its own'}"
+
+
+def _line(line: LinePart) -> Iterator[str]:
+    scatter = f"estimated from {line.n_siblings} of them" if line.n_siblings else "the defaults"
+    yield f"{'scatter between vehicles':28}{scatter}"
+    yield from (f"{'ancestor':28}{member}" for member in line.members)
 
 
 def _provenance(held: CalibrationFile) -> Iterator[str]:

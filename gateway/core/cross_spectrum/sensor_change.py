@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING
+from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
@@ -54,13 +54,16 @@ def scores_of(whole: Curvature, point: Point, covariance: F64, calibration: Cros
     """``whole`` is the curvature at ``point`` for every parameter and the load, ``covariance`` that of FITTED."""
     pull = whole.gradient[FITTED].copy()
     pull[: len(DRIFTING)] += DRIFT_PRECISION @ (point.theta - calibration.parameters)[DRIFTING]
+    across = whole.information[np.ix_(FITTED, STEADY)]
+    left_open = calibration.covariance[np.ix_(STEADY, STEADY)]
 
     def score(name: str) -> float:
         entry = INDEX[name]
         slope, information = whole.towards(entry, FITTED, covariance, pull)
         if not information > 0.0:
             return 0.0
-        return float(-slope / information / np.sqrt(1.0 / information + calibration.covariance[entry, entry]))
+        by_steady = whole.information[entry, STEADY] - whole.information[entry, FITTED] @ covariance @ across
+        return float(-slope / np.sqrt(information + by_steady @ left_open @ by_steady))
 
     return SensorScores(score("sensor_position_m"), score("noise_acceleration_m2ps3"))
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gateway.calibration.half_car import Inherited
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
@@ -75,10 +76,15 @@ def _joined(parts: Sequence[Spectra]) -> Spectra | None:
     )
 
 
-def half_car_section(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration, vehicle: Vehicle) -> Section:
+def half_car_section(
+    runs: Sequence[KnownRun],
+    calibration: CrossSpectrumCalibration,
+    vehicle: Vehicle,
+    inherited: Inherited | None = None,
+) -> Section:
     """Identifiability, and every run's spectra beside the model's; the worst run first."""
     fits = sorted(fits_of(runs, calibration), key=lambda fit: -fit.misfit)
-    known = knowledge_of(calibration, vehicle)
+    known = knowledge_of(calibration, vehicle, inherited)
     charts = [_fit_chart(fit) for fit in fits]
     return Section(
         "half-car",

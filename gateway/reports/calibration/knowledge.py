@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car import prior_of
+from gateway.calibration.half_car import Inherited, prior_of
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import ROLL_PARAMETERS, has_roll, is_positive, names_of
 from gateway.core.vehicle import Vehicle
@@ -27,10 +27,13 @@ class Known:
     is_slack: bool
 
 
-def knowledge_of(calibration: CrossSpectrumCalibration, vehicle: Vehicle) -> list[Known]:
-    """What calibration made of the prior, in the order of the parameters."""
+def knowledge_of(
+    calibration: CrossSpectrumCalibration, vehicle: Vehicle, inherited: Inherited | None = None
+) -> list[Known]:
+    """What calibration made of the prior, or of what was ``inherited``, in the order of the parameters."""
     theta = calibration.parameters
-    prior, stds = prior_of(vehicle, with_roll=has_roll(theta)), np.sqrt(np.diag(calibration.covariance))
+    prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=has_roll(theta))
+    stds, before_stds = np.sqrt(np.diag(calibration.covariance)), prior.std
     known = []
     for i, name in enumerate(names_of(theta)):
         before, after, std = float(prior.mean[i]), float(theta[i]), float(stds[i])
@@ -38,7 +41,7 @@ def knowledge_of(calibration: CrossSpectrumCalibration, vehicle: Vehicle) -> lis
             before, after, spread = float(np.exp(before)), float(np.exp(after)), f"{100.0 * std:.1f} %"
         else:
             spread = f"{std:.3g}"
-        known.append(Known(name, before, after, spread, std / float(prior.std[i]), name.startswith("slack_")))
+        known.append(Known(name, before, after, spread, std / float(before_stds[i]), name.startswith("slack_")))
     return known
 
 

@@ -73,7 +73,8 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: LoadPlan |
     if outcome.ratio_index is not None:
         yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.split])
     if outcome.cross_spectrum is not None:
-        yield half_car_section(identification, outcome.cross_spectrum.calibration, campaign.vehicle)
+        line = outcome.file.line.for_core() if outcome.file.line else None
+        yield half_car_section(identification, outcome.cross_spectrum.calibration, campaign.vehicle, line)
 
 
 def _evaluation_sections(assessment: Assessment) -> list[Section]:

@@ -23,11 +23,12 @@ between the outer levels; p is 0.1 or so.
 MOST: Final = 1.2  # an amplitude further from the usual one counts as this far
 LEAST_LEFT: Final = 0.05  # of a rate, however large its friction is thought to be
 
-_RATES: Final = tuple(
+RATES: Final = tuple(
     (INDEX[f"{kind}_friction_{end}"], INDEX[f"{kind}_{end}_{unit}"])
     for kind, unit in (("damper", "nspm"), ("spring", "npm"))
     for end in ("front", "rear")
 )
+"""Where the vector has each friction share, and the rate that it is a share of."""
 
 
 def at_levels(theta: F64) -> F64:
@@ -44,7 +45,7 @@ def level_weights(log_amplitude: F64) -> F64:
 
 def _at(theta: F64, log_amplitude: float) -> F64:
     moved = theta.copy()
-    for share, rate in _RATES:
+    for share, rate in RATES:
         ratio = 1.0 + theta[..., share] * np.expm1(-log_amplitude)
         moved[..., rate] += np.log(np.maximum(ratio, LEAST_LEFT))
     return moved

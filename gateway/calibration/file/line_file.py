@@ -1,0 +1,90 @@
+"""The line file: what ``springscale line build`` makes of several calibration files, and ``--like`` takes."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, Literal
+
+from pydantic import Field, ValidationError
+
+from gateway.calibration.file.calibration_file import CalibrationFile, content_id, load_calibration, read_content
+from gateway.calibration.file.line_part import LinePart
+from gateway.calibration.file.parts import Part
+from gateway.calibration.line import Line, line_of
+from gateway.errors import CalibrationFileError, LineError
+from gateway.files.signed import Read
+from gateway.toml_file import describe_faults
+
+LINE_FORMAT: Final = "springscale-line"
+LINE_VERSION: Final = 1
+
+
+class SiblingPart(Part):
+    """One of the vehicles that a line was built of."""
+
+    id: str = Field(description="of its calibration file")
+    name: str
+    empty_mass_kg: float
+    n_runs: int
+
+
+class LineFile(Part):
+    """The whole file but for its id."""
+
+    format: Literal["springscale-line"] = LINE_FORMAT
+    version: Literal[1] = LINE_VERSION
+    software: str
+    siblings: tuple[SiblingPart, ...] = Field(min_length=1)
+    line: LinePart
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def id(self) -> str:
+        """sha256 of the canonical JSON of everything in the file but the id itself."""
+        return content_id(self.model_dump(mode="json"))
+
+    def to_json(self) -> str:
+        """The file's text, id first."""
+        return json.dumps({"id": self.id, **self.model_dump(mode="json")}, indent=1, allow_nan=False) + "\n"
+
+
+LikeFile = CalibrationFile | LineFile
+
+
+def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
+    """A calibration of a sister vehicle, or a line file. Raises CalibrationFileError saying what to do."""
+    content = read_content(path, read)
+    if content.get("format") != LINE_FORMAT:
+        return load_calibration(path, read)
+    if content.get("version") != LINE_VERSION:
+        raise CalibrationFileError(
+            f"{path}: line file version {content.get('version')!r}, this springscale reads version {LINE_VERSION}: "
+            "build it again with `springscale line build`"
+        )
+    if content.get("id") != content_id(content):
+        raise CalibrationFileError(
+            f"{path}: content does not match its id: the file was changed after it was written; restore it or build "
+            "it again"
+        )
+    try:
+        held = LineFile.model_validate({key: part for key, part in content.items() if key != "id"})
+        held.line.for_core()
+    except ValidationError as fault:
+        raise CalibrationFileError(describe_faults(path, fault)) from None
+    except CalibrationFileError as fault:
+        raise CalibrationFileError(f"{path}: {fault}") from None
+    return held
+
+
+def line_of_files(files: Sequence[LikeFile]) -> Line:
+    """The line that these make together: calibrations of sister vehicles, and at most one line file.
+
+    Raises LineError where they make none.
+    """
+    lines = [one.line.for_core() for one in files if isinstance(one, LineFile)]
+    if len(lines) > 1:
+        raise LineError(
+            "two line files: whether their vehicles are of one line is for you to say: build one line of all "
+            "calibrations with `springscale line build`"
+        )
+    return line_of([one.sister() for one in files if isinstance(one, CalibrationFile)], *lines)

@@ -1,0 +1,98 @@
+"""What the drives of one vehicle say of its parameters, apart from what was believed before them.
+
+A calibration is a posterior: prior times likelihood. Sisters share the prior, so that it must not be counted once for
+each. Divided out of a Gaussian posterior N(x, C) with the prior N(m, P) it leaves evidence
+
+    I = C^-1 - P^-1        h = C^-1 x - P^-1 m
+
+with which any other prior is multiplied by adding. Parameters of which the drives said nothing have no information,
+and no mean is needed for them.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.calibration.half_car.prior import Prior
+from gateway.core.cross_spectrum.model.friction import RATES
+from gateway.records import F64, Bool
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Information (n, n), positive semi-definite, and pull (n,): the mean is what the information makes of it."""
+
+    information: F64
+    pull: F64
+
+    @classmethod
+    def of(cls, mean: F64, covariance: F64, prior: Prior, shared: Bool) -> "Evidence":
+        """What led from ``prior`` to the posterior N(mean, covariance), of the parameters that are ``shared`` (n,).
+
+        Of the others, which in the prior these do not depend on, it is silent: what they may be is in the posterior.
+        """
+        at = np.flatnonzero(shared)
+        block = np.ix_(at, at)
+        posterior, before = _symmetric(np.linalg.inv(covariance[block])), prior.precision[block]
+        told = cls.none(len(mean))
+        told.information[block] = _semi_definite(posterior - before, np.sqrt(np.diag(before)))
+        told.pull[at] = posterior @ mean[at] - before @ prior.mean[at]
+        return told
+
+    @classmethod
+    def none(cls, n: int) -> "Evidence":
+        """Of ``n`` parameters of which nobody knows anything."""
+        return cls(np.zeros((n, n)), np.zeros(n))
+
+    def __add__(self, other: "Evidence") -> "Evidence":
+        return Evidence(self.information + other.information, self.pull + other.pull)
+
+    def of_another(self, variance: F64) -> "Evidence":
+        """What it says of a vehicle whose parameters differ from this one's by N(0, diag(variance)), variance (n,).
+
+        N(e, I^-1) becomes N(e, I^-1 + S), whose information is (1 + I S)^-1 I: no inverse of I is needed.
+        """
+        blurred = np.eye(len(self.pull)) + self.information * variance
+        information = np.linalg.solve(blurred, self.information)
+        return Evidence(_symmetric(information), np.asarray(np.linalg.solve(blurred, self.pull), float))
+
+    def upon(self, prior: Prior) -> Prior:
+        """The posterior: ``prior`` times this evidence."""
+        precision = prior.precision + self.information
+        mean = np.linalg.solve(precision, prior.precision @ prior.mean + self.pull)
+        return Prior(np.asarray(mean, float), _symmetric(precision))
+
+    def at_amplitude(self, about: F64, log_ratio: float) -> "Evidence":
+        """The same with friction shares and rates told at another usual amplitude, exp(-log_ratio) times the old one.
+
+        A rate c (1 - p + p / a) at the amplitude a is c' (1 - p' + p' / a') at a' = r a (log_ratio = log r) with
+
+            c' = c (1 - p + p r)        p' = p r / (1 - p + p r)
+
+        linearised about the parameters ``about`` (n,).
+        """
+        if log_ratio == 0.0:
+            return self
+        r, moved = np.exp(log_ratio), about.copy()
+        back = np.eye(len(about))  # of the old parameters by the new
+        for share, rate in RATES:
+            p = about[share]
+            whole = 1.0 - p + p * r
+            moved[rate] += np.log(whole)
+            moved[share] = p * r / whole
+            back[share, share] = whole**2 / r
+            back[rate, share] = -(r - 1.0) / whole * back[share, share]
+        information = back.T @ self.information @ back
+        return Evidence(information, information @ moved + back.T @ (self.pull - self.information @ about))
+
+
+def _symmetric(matrix: NDArray[np.floating[Any]]) -> F64:
+    return np.asarray(0.5 * (matrix + matrix.T), float)
+
+
+def _semi_definite(information: F64, scale: F64) -> F64:
+    """Without what rounding, or a posterior that is wider than its prior, left below zero; in units of 1 / scale."""
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    return _symmetric((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale))

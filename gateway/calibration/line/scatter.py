@@ -1,0 +1,71 @@
+"""By how much vehicles of one line differ from each other, parameter by parameter, before any two were compared.
+
+Standard deviations of the difference between two of them: shares of what is positive, else in the unit that ends the
+name. Of vehicles about their mean it is less by the root of two. Tolerances that makers state as limits are read as
+three standard deviations about the mean.
+"""
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from gateway.core.cross_spectrum.model.parameters import BEND_SHARES, PARAMETERS, ROLL_PARAMETERS
+from gateway.records import F64, Bool
+
+_ENDS: Final = ("front", "rear")
+
+_OF_AXLE: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "spring_{}_npm": 0.03,  # coil springs are made to +-10 % of their rate (springs3d.com/en/tolerancias)
+        "damper_{}_nspm": 0.10,  # new ones to +-15 % or so, and they wear; no source beyond the fleet trade's rule
+        "damper_mount_{}_npm": 0.15,  # rubber: +-5 degrees of Shore hardness are about 15 % of its modulus
+        "tyre_{}_npm": 0.04,  # goes with its pressure: 10 % of that, which a fleet lets pass, are about 8 %
+        "unsprung_{}_kg": 0.03,  # wheels and tyres of other makes
+        "damper_friction_{}": 0.05,  # a third of the 0.1 to 0.3 that vans were found to have
+        "spring_friction_{}": 0.02,  # likewise, of 0.03 to 0.09
+        "spring_slope_{}_per_kn": 0.01,  # the coil's winding: a third of a usual slope of 0.03
+    }
+)
+_OF_BODY: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "pitch_inertia_kgm2": 0.03,  # mass and centre of gravity differ by 1.5 %, its square by twice that
+        "payload_gyration_m2": 0.3,  # loads, not vehicles
+        "payload_mode_hz": 0.1,  # the same floor
+        "payload_damping_ratio": 0.3,
+        "rear_lag_s": 0.001,
+        "roll_inertia_kgm2": 0.03,
+        "payload_roll_gyration_m2": 0.3,
+        "anti_roll_front_npm": 0.1,  # bars are steel; their bushes and links are not
+        "anti_roll_rear_npm": 0.1,
+        "damper_against_front": 0.1,
+        "damper_against_rear": 0.1,
+        "tracks_apart_m": 0.3,  # roads, not vehicles
+        "twist_level": 0.3,
+    }
+)
+BEND_STD_PER_KN: Final = 0.01  # of each bend of a spring's rate: bump stops and helper springs are of one part number
+
+SCATTER_STD: Final[Mapping[str, float]] = MappingProxyType(
+    {name.format(end): std for name, std in _OF_AXLE.items() for end in _ENDS}
+    | {f"spring_bend_{end}_{i}_per_kn": BEND_STD_PER_KN for end in _ENDS for i in range(len(BEND_SHARES))}
+    | dict(_OF_BODY)
+)
+"""What a vehicle inherits from its line."""
+
+OWN: Final = frozenset(PARAMETERS + ROLL_PARAMETERS) - SCATTER_STD.keys()
+"""What no sister tells: the sensor unit, its place, noise and lag, tracks, slack, where the empty body's centre is."""
+
+SCATTER_DOF: Final = 4.0
+"""The defaults count as if they had been seen on so many vehicles; chosen, so that three siblings can double them."""
+
+
+def is_inherited(names: Sequence[str]) -> Bool:
+    """(n,) which of these parameters sisters share."""
+    return np.array([name not in OWN for name in names])
+
+
+def default_scatter_std(names: Sequence[str]) -> F64:
+    """(n,) of the names that are inherited; 0 for those that are not."""
+    return np.array([SCATTER_STD.get(name, 0.0) for name in names])
