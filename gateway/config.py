@@ -144,6 +144,19 @@ class RecordSection(Section):
     )
 
 
+class VerificationSection(Section):
+    """What a verification with known loads asks for, and how often: choose what your law or your customer asks for."""
+
+    permitted_error_pct: float = Field(
+        5.0, gt=0.0, le=100.0, description="largest error of the gross weight, in percent of the known one"
+    )
+    permitted_axle_error_pct: float | None = Field(
+        None, gt=0.0, le=100.0, description="likewise of each axle's [default: axles are told and not judged]"
+    )
+    loads: int = Field(1, ge=1, le=10, description="least number of known loads for a record to pass")
+    every_days: float = Field(0.0, ge=0.0, le=36_500.0, description="due so long after the last that passed (0: never)")
+
+
 class UplinkSection(Section):
     """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that nobody can ask."""
 
@@ -222,6 +235,7 @@ class Settings(BaseSettings):
     store: StoreSection = StoreSection()
     keep: KeepSection = KeepSection()
     record: RecordSection = RecordSection()
+    verification: VerificationSection = VerificationSection()
     uplink: UplinkSection = UplinkSection()
     trust: TrustSection = TrustSection()
     log: LogSection = LogSection()

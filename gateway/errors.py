@@ -41,6 +41,14 @@ class TareRefusedError(SpringscaleError):
         self.reason = reason
 
 
+class WeightRefusedError(SpringscaleError):
+    """A stated weight cannot be used. ``reason`` is one of calibration.known_weight.WeightRefusal."""
+
+    def __init__(self, reason: str, message: str) -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
 class CalibrationImpossibleError(SpringscaleError):
     """The known-load drives do not carry enough to calibrate from."""
 

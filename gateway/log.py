@@ -69,6 +69,8 @@ class Event(StrEnum):
     RECORD_REFUSED = "frames not recorded"
     RECORD_RECOVERED = "frames recorded again"
     RECORD_MENDED = "unfinished block cut off"
+    VERIFIED = "verified"
+    HISTORY_SET_ASIDE = "broken history set aside"
     TARE_SET = "tare set"
     TARE_UNDONE = "tare undone"
     TARE_DROPPED = "tare dropped"

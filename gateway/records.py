@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from typing import Any, Final
 
@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.units import NS_PER_S
+
+_START: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -230,6 +232,11 @@ def iso_utc(t_ns: int) -> str:
     whole_us = t_ns // 1000
     stamp = datetime.fromtimestamp(whole_us // 1_000_000, UTC)
     return f"{stamp:%Y-%m-%dT%H:%M:%S}.{whole_us % 1_000_000:06d}Z"
+
+
+def ns_of(text: str) -> int:
+    """The inverse of :func:`iso_utc`, to the microsecond."""
+    return (datetime.fromisoformat(text) - _START) // timedelta(microseconds=1) * 1000
 
 
 def json_line(record: Mapping[str, Any]) -> str:

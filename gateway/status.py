@@ -148,6 +148,17 @@ class RecordStatus:
     last_fault: Annotated[str | None, Field(description="why nothing is recorded; null while it is")] = None
 
 
+@dataclass(frozen=True, slots=True)
+class VerificationStatus:
+    """Known loads weighed with the present calibration, and when that is due again."""
+
+    n_records: Annotated[int, Field(description="kept in all, those of earlier calibrations among them")] = 0
+    last_at: Annotated[str | None, Field(description="of the present calibration; null: never")] = None
+    last_verdict: Annotated[str | None, Field(examples=["passed", "failed"])] = None
+    due_at: Annotated[str | None, Field(description="null: never asked for, [verification] every_days = 0")] = None
+    is_due: bool = False
+
+
 class Status(_Told):
     """The service as it is now; counts begin at its start."""
 
@@ -167,6 +178,7 @@ class Status(_Told):
     store: StoreStatus = StoreStatus()
     uplink: UplinkStatus | None = Field(None, description="null where no broker is configured")
     record: RecordStatus | None = Field(None, description="the ring log; null where it is off")
+    verification: VerificationStatus = VerificationStatus()
     is_ready: bool = Field(True, description="whether estimates can come: what /health/ready tells")
     not_ready_reason: str | None = None
     warnings: tuple[str, ...] = Field(

@@ -28,8 +28,9 @@ _COMMANDS = {
     "run": "Run the service.",
     "simulate": "Simulate drives, as log files or onto a bus.",
     "token": "Make, list and revoke access tokens for other machines.",
+    "verification": "Known loads held against what a running service weighed, as dated records.",
 }  # each in the module of its name, or a room of ours
-_ROOMS = {"record": "asked"}
+_ROOMS = {"record": "asked", "verification": "asked"}
 
 
 # What a vehicle does without: the extra "workbench", in Debian a package of its own.

@@ -3,16 +3,14 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 
 import numpy as np
 
 from gateway.estimate import PLACES, Lack, Weight, Weights
-from gateway.records import F64, Spectra, Why, iso_utc
+from gateway.records import F64, Spectra, Why, iso_utc, ns_of
 
 NS_PER_US: Final = 1000
-_START: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +56,6 @@ def _interval(bounds: tuple[float, float]) -> list[float] | None:
     return None if low is None or high is None else [low, high]
 
 
-def _ns_of(stamp: str) -> int:
-    return (datetime.fromisoformat(stamp) - _START) // timedelta(microseconds=1) * NS_PER_US
-
-
 def _as_is(x: Any) -> Any:
     return x
 
@@ -100,7 +94,7 @@ TEXT: Final = Kind(str | None, _as_is, _as_is)
 FLAG: Final = Kind(bool | None, _as_is, _as_is)
 WHOLE: Final = Kind(int | None, _as_is, _as_is)
 COUNT: Final = Kind(float | None, float, int)
-INSTANT: Final = Kind(str | None, iso_utc, _ns_of)
+INSTANT: Final = Kind(str | None, iso_utc, ns_of)
 NUMBER: Final = Kind(float | None, lambda x: _number(x, 9), float)
 ROUGH_NUMBER: Final = Kind(float | None, lambda x: _number(x, 6), float)
 INTERVAL: Final = Kind(list[float] | None, _interval, tuple, cells=list)

@@ -18,7 +18,7 @@ from gateway.log import Event, log_event
 from gateway.service.changes import BatchLog, StateLog
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
-from gateway.service.parts import keeper_of, ring_log_of, source_of, store_of, uplink_of
+from gateway.service.parts import keeper_of, ring_log_of, source_of, store_of, uplink_of, verification_desk_of
 from gateway.service.pipeline import Pipeline
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
@@ -106,6 +106,8 @@ class Gateway:
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
         self.uplink = uplink_of(forwarding, setup, self.store)
+        subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
+        self.verification = verification_desk_of(settings, subject, self.store)
         self.status = StatusReport(
             settings,
             setup,
@@ -115,12 +117,13 @@ class Gateway:
             self.board,
             self.uplink,
             self.ring_log,
+            self.verification.status,
             around=self.around,
             warnings=self._warnings,
         )
         self.tare = TareDesk(
             settings.store.directory,
-            Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id),
+            subject,
             self.pipeline,
             stale_after_s=settings.web.stale_after_s,
             on_event=self.store.write_event,
@@ -134,6 +137,7 @@ class Gateway:
             tare=self.tare,
             known_loads=known_loads,
             record=self.ring_log,
+            verification=self.verification,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = _Server(web)
@@ -151,6 +155,7 @@ class Gateway:
             self.pipeline.roll_rate_fault,
             self.keeper.fault,
             self.ring_log.fault if self.ring_log else None,
+            self.verification.fault,
         )
         return tuple(fault for fault in faults if fault)
 

@@ -11,7 +11,7 @@ from gateway.config import Settings
 from gateway.records import Signal
 from gateway.service.pipeline import Pipeline
 from gateway.setup import Setup
-from gateway.status import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status
+from gateway.status import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, VerificationStatus
 from gateway.store import Store
 from gateway.uplink import Uplink
 from gateway.web import Board
@@ -34,6 +34,7 @@ class StatusReport:
         board: Board,
         uplink: Uplink | None = None,
         ring_log: RingLog | None = None,
+        verification: Callable[[], VerificationStatus] = VerificationStatus,
         *,
         around: Around,
         warnings: Callable[[], tuple[str, ...]] = tuple,
@@ -47,6 +48,7 @@ class StatusReport:
         self._uplink = uplink
         self._around = around
         self._ring_log = ring_log
+        self._verification = verification
         self._warnings = warnings
         self._version = version("springscale")  # read once: it is a file, and a status must not want one
         self._started = time.monotonic()
@@ -76,6 +78,7 @@ class StatusReport:
             store=self._store.health(),
             uplink=self._uplink.report() if self._uplink else None,
             record=self._ring_log.status() if self._ring_log else None,
+            verification=self._verification(),
             is_ready=not_ready is None,
             not_ready_reason=not_ready,
             warnings=self._warnings(),

@@ -30,8 +30,10 @@ from gateway.web.routes import (
     KnownLoads,
     NoFrameLog,
     NoTareDesk,
+    NoVerificationDesk,
     Scales,
     TareDesk,
+    VerificationDesk,
     api_router,
     export_router,
     health_router,
@@ -44,6 +46,7 @@ from gateway.web.routes import (
     spectra_router,
     tare_router,
     vehicle_router,
+    verification_router,
     vss_router,
     weights_router,
 )
@@ -65,6 +68,7 @@ def create_app(
     tare: TareDesk | None = None,
     known_loads: KnownLoads | None = None,
     record: FrameLog | None = None,
+    verification: VerificationDesk | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the
@@ -100,6 +104,7 @@ def create_app(
     app.include_router(vehicle_router(status, calibrated))
     app.include_router(spectra_router(board, calibrated))
     app.include_router(tare_router(tare or NoTareDesk()))
+    app.include_router(verification_router(verification or NoVerificationDesk()))
     app.include_router(export_router(reader))
     app.include_router(record_router(record or NoFrameLog()))
     app.include_router(weights_router(board, scales))

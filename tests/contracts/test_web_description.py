@@ -23,7 +23,11 @@ from gateway.records import Why
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.web import Scope, TokenFile, WebSettings
 
-CHANGES = ["POST /api/v1/calibration/tare", "DELETE /api/v1/calibration/tare"]
+CHANGES = [
+    "POST /api/v1/calibration/tare",
+    "DELETE /api/v1/calibration/tare",
+    "POST /api/v1/calibration/verifications",
+]
 PATHS = [
     "/api/v1/estimates/latest",
     "/api/v1/estimates",
@@ -38,6 +42,8 @@ PATHS = [
     "/api/v1/weights/j1939",
     "/api/v1/vss",
     "/api/v1/calibration/tare",
+    "/api/v1/calibration/verifications",
+    "/api/v1/calibration/verifications/{record_id}",
     "/api/v1/record",
     "/api/v1/record/{name}",
     "/rfms/vehicles",
@@ -94,7 +100,7 @@ def test_no_path_escapes(schema: BaseSchema) -> None:
 EXCLUDED = {"GET /rfms/vehiclestatuses": [positive_data_acceptance]}
 LABELS = [*(f"GET {path}" for path in PATHS), *CHANGES]
 WITHOUT_PARAMETERS = ("latest", "status", "reasons", "vehicle", "vss", "live", "ready", "metrics", "record")
-WITHOUT_PARAMETERS += ("GET /api/v1/calibration/tare",)
+WITHOUT_PARAMETERS += ("GET /api/v1/calibration/tare", "GET /api/v1/calibration/verifications")
 WITH_PARAMETERS = [label for label in LABELS if not label.endswith(WITHOUT_PARAMETERS)]
 
 

@@ -19,8 +19,8 @@ from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
+from gateway.web.routes.calibration import TareDesk, VerificationDesk
 from gateway.web.routes.record import FrameLog
-from gateway.web.routes.tare import TareDesk
 from support.patience import PATIENCE_S
 
 
@@ -36,6 +36,7 @@ class Gateway:
         calibrated: CalibratedVehicle | None = None,
         known_loads: KnownLoads | None = None,
         record: FrameLog | None = None,
+        verification: VerificationDesk | None = None,
     ) -> None:
         self.clock_s = 1000.0
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
@@ -48,6 +49,7 @@ class Gateway:
             "calibrated": calibrated,
             "known_loads": known_loads,
             "record": record,
+            "verification": verification,
         }
         self.app = self._make_app()
 

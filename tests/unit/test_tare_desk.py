@@ -19,7 +19,7 @@ from gateway.files.kept import KeptFiles
 from gateway.log import Event
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.units import NS_PER_S
-from gateway.web.routes.tare import TareState
+from gateway.web.routes.calibration.tare import TareState
 
 NOW_NS = 1_790_000_000 * NS_PER_S
 

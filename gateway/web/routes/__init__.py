@@ -4,6 +4,14 @@ The live board, the store's reader and the service's status come in; a router a 
 puts together. Here an estimate becomes weights, metrics, and the words of rFMS, VSS and J1939.
 """
 
+from gateway.web.routes.calibration import (
+    NoTareDesk,
+    NoVerificationDesk,
+    TareDesk,
+    VerificationDesk,
+    tare_router,
+    verification_router,
+)
 from gateway.web.routes.estimates import api_router
 from gateway.web.routes.export import export_router
 from gateway.web.routes.health import health_router
@@ -14,7 +22,6 @@ from gateway.web.routes.reasons import reasons_router
 from gateway.web.routes.record import FrameLog, NoFrameLog, record_router
 from gateway.web.routes.rfms import rfms_router
 from gateway.web.routes.spectra import spectra_router
-from gateway.web.routes.tare import NoTareDesk, TareDesk, tare_router
 from gateway.web.routes.vehicle import vehicle_router
 from gateway.web.routes.vss import vss_router
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest, weights_router
@@ -27,8 +34,10 @@ __all__ = [
     "LatestWeights",
     "NoFrameLog",
     "NoTareDesk",
+    "NoVerificationDesk",
     "Scales",
     "TareDesk",
+    "VerificationDesk",
     "api_router",
     "export_router",
     "health_router",
@@ -41,6 +50,7 @@ __all__ = [
     "spectra_router",
     "tare_router",
     "vehicle_router",
+    "verification_router",
     "vss_router",
     "weigh_latest",
     "weights_router",

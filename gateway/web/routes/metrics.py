@@ -9,7 +9,7 @@ from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from gateway.estimate import PLACES
-from gateway.status import RecordStatus, State, Status, UplinkStatus
+from gateway.status import RecordStatus, State, Status, UplinkStatus, VerificationStatus
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 
@@ -34,6 +34,7 @@ class StatusCollector:
         yield from _signals(now)
         yield from _batches(now)
         yield from _store(now)
+        yield from _verification(now.verification)
         if now.record is not None:
             yield from _record(now.record)
         if now.uplink is not None:
@@ -137,6 +138,13 @@ def _store(now: Status) -> Iterator[Metric]:
             "pruned": store.n_pruned,
         },
     )
+
+
+def _verification(verification: VerificationStatus) -> Iterator[Metric]:
+    yield _gauge("springscale_verification_due", "1 while one with known loads is due.", float(verification.is_due))
+    if verification.last_at is not None:
+        passed = float(verification.last_verdict == "passed")
+        yield _gauge("springscale_verification_passed", "1 where the last of this calibration passed.", passed)
 
 
 def _record(record: RecordStatus) -> Iterator[Metric]:

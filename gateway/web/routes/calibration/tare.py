@@ -1,8 +1,7 @@
 """/api/v1/calibration/tare: the zero of an empty vehicle, set, undone and looked at."""
 
 import asyncio
-from collections.abc import Callable
-from typing import Annotated, Any, Final, Literal, Protocol
+from typing import Annotated, Final, Literal, Protocol
 
 from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
@@ -10,14 +9,10 @@ from starlette.responses import Response
 
 from gateway.errors import TareRefusedError
 from gateway.records import json_line
-from gateway.web.door.problems import problem_response
+from gateway.web.routes.calibration.asking import REFUSALS, answered, json_response, who
 from gateway.web.schemas import Body, problem_responses
 
 TARE_PATH: Final = "/calibration/tare"
-LOCAL: Final = "local"  # who asks where no tokens are in use
-_CONFLICT: Final = 409
-_UNAVAILABLE: Final = 503
-_NO_ROOM: Final = "not_stored"  # the one refusal that the disk causes
 
 
 class TareDesk(Protocol):
@@ -142,38 +137,20 @@ class UndoQuery(BaseModel):
 def tare_router(desk: TareDesk) -> APIRouter:
     """The routes of the tare."""
     router = APIRouter(prefix="/api/v1", tags=["calibration"])
-    refusals = problem_responses(_CONFLICT, _UNAVAILABLE)
 
     @router.get(TARE_PATH, response_model=TareState)
     async def tare_state() -> Response:
         """The tare in use, what another would be made from now, and the history."""
-        return _json(await asyncio.to_thread(desk.told))
+        return json_response(await asyncio.to_thread(desk.told))
 
-    @router.post(TARE_PATH, status_code=201, response_model=Tare, responses={**refusals, **problem_responses(400, 422)})
+    @router.post(TARE_PATH, status_code=201, response_model=Tare, responses={**REFUSALS, **problem_responses(400, 422)})
     async def set_tare(request: Request, claim: TareRequest) -> Response:
         """Make the last weighing the zero of the empty vehicle, from the next batch on. On disk when answered."""
-        return await _answered(request, lambda: desk.tare(_who(request), claim.told_note), 201)
+        return await answered(request, lambda: desk.tare(who(request), claim.told_note), 201)
 
-    @router.delete(TARE_PATH, response_model=TareState, responses={**refusals, **problem_responses(422)})
+    @router.delete(TARE_PATH, response_model=TareState, responses={**REFUSALS, **problem_responses(422)})
     async def undo_tare(request: Request, query: Annotated[UndoQuery, Query()]) -> Response:
         """Take the last tare out of use, or all of them; raw numbers never change. On disk when answered."""
-        return await _answered(request, lambda: desk.undo(_who(request), to_factory=query.to == "factory"), 200)
+        return await answered(request, lambda: desk.undo(who(request), to_factory=query.to == "factory"), 200)
 
     return router
-
-
-async def _answered(request: Request, ask: Callable[[], str], status: int) -> Response:
-    try:
-        return _json(await asyncio.to_thread(ask), status)
-    except TareRefusedError as refusal:
-        code = _UNAVAILABLE if refusal.reason == _NO_ROOM else _CONFLICT
-        return problem_response(code, str(refusal), request.url.path, reason=refusal.reason)
-
-
-def _who(request: Request) -> str:
-    name: Any = getattr(request.state, "token_name", None)
-    return LOCAL if name is None else str(name)
-
-
-def _json(text: str, status: int = 200) -> Response:
-    return Response(text, status, media_type="application/json")

@@ -1,0 +1,107 @@
+"""What a stated weight makes known of a load: payload and front share of the sprung mass."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from gateway.core.vehicle import Vehicle, front_share_pct
+from gateway.core.weights import Unsprung
+from gateway.errors import WeightRefusedError
+from gateway.stated_weight import StatedWeight
+
+LEAST_PAYLOAD_SHARE: Final = -0.1  # of the empty mass: a lighter vehicle is another one, or another unit
+MOST_PAYLOAD_SHARE: Final = 3.0
+SHARES_PCT: Final = (5.0, 95.0)  # on the front axle: beyond, it is another vehicle's ticket or axles are swapped
+
+
+class WeightRefusal(StrEnum):
+    """Why a stated weight cannot be used. docs/verification.md tells what each asks of a person."""
+
+    NO_CALIBRATION = "no_calibration"
+    NO_UNSPRUNG_MASS = "no_unsprung_mass"
+    IMPOSSIBLE_WEIGHT = "impossible_weight"
+    NO_EPOCH = "no_epoch"
+    AMBIGUOUS_EPOCH = "ambiguous_epoch"
+    OTHER_CALIBRATION = "other_calibration"
+    NOT_KNOWN = "not_known"
+    NOT_STORED = "not_stored"
+
+
+@dataclass(frozen=True, slots=True)
+class KnownWeight:
+    """A load in a calibration's terms; ``front_share_pct`` None: nobody said where it lies.
+
+    ``gross_kg`` and the axle's are as they stand on the road, None where no unsprung mass is known.
+    """
+
+    payload_kg: float
+    front_share_pct: float | None
+    gross_kg: float | None
+    front_axle_kg: float | None
+    rear_axle_kg: float | None
+
+
+def known_weight_of(stated: StatedWeight, vehicle: Vehicle, unsprung: Unsprung) -> KnownWeight:
+    """Statics: what stands on an axle is its share of the sprung mass M + L and its unsprung mass u.
+
+        L = G - M - u_front - u_rear,    D = (F_front - u_front) / (M + L)
+
+    ``unsprung`` is what calibration found, for where nobody stated any. Raises WeightRefusedError.
+    """
+    below = unsprung.unless_stated(vehicle)
+    front_u, rear_u = below.front.number, below.rear.number
+    share_pct: float | None
+    if stated.payload_kg is not None:
+        payload_kg = stated.payload_kg
+        is_placed = stated.position_m is not None or payload_kg == 0.0
+        share_pct = front_share_pct(vehicle, payload_kg, stated.position_m) if is_placed else None
+    else:
+        _require_unsprung(front_u, rear_u)
+        gross_kg = _gross_kg(stated)
+        payload_kg = gross_kg - vehicle.empty_mass_kg - front_u - rear_u
+        front_kg = stated.front_axle_kg
+        share_pct = None if front_kg is None else 100.0 * (front_kg - front_u) / (vehicle.empty_mass_kg + payload_kg)
+    _require_possible(payload_kg, share_pct, vehicle)
+    sprung_kg = vehicle.empty_mass_kg + payload_kg
+    return KnownWeight(
+        payload_kg=payload_kg,
+        front_share_pct=share_pct,
+        gross_kg=_known(sprung_kg + front_u + rear_u),
+        front_axle_kg=None if share_pct is None else _known(share_pct / 100.0 * sprung_kg + front_u),
+        rear_axle_kg=None if share_pct is None else _known((1.0 - share_pct / 100.0) * sprung_kg + rear_u),
+    )
+
+
+def _gross_kg(stated: StatedWeight) -> float:
+    if stated.gross_kg is not None:
+        return stated.gross_kg
+    return (stated.front_axle_kg or 0.0) + (stated.rear_axle_kg or 0.0)
+
+
+def _require_unsprung(front_kg: float, rear_kg: float) -> None:
+    if math.isnan(front_kg + rear_kg):
+        raise WeightRefusedError(
+            WeightRefusal.NO_UNSPRUNG_MASS,
+            "a weight on the road makes no payload known: neither unsprung masses nor kerb axle weights are stated in "
+            "the campaign's [vehicle], and calibration found none; state the payload instead",
+        )
+
+
+def _require_possible(payload_kg: float, share_pct: float | None, vehicle: Vehicle) -> None:
+    low_kg, high_kg = (share * vehicle.empty_mass_kg for share in (LEAST_PAYLOAD_SHARE, MOST_PAYLOAD_SHARE))
+    if not low_kg <= payload_kg <= high_kg:
+        raise WeightRefusedError(
+            WeightRefusal.IMPOSSIBLE_WEIGHT,
+            f"that would be a payload of {payload_kg:.0f} kg; for this vehicle ({vehicle.empty_mass_kg:.0f} kg sprung, "
+            f"empty) {low_kg:.0f} to {high_kg:.0f} kg are possible: is it another vehicle's, or another unit?",
+        )
+    if share_pct is not None and not SHARES_PCT[0] <= share_pct <= SHARES_PCT[1]:
+        raise WeightRefusedError(
+            WeightRefusal.IMPOSSIBLE_WEIGHT,
+            f"that would be {share_pct:.0f} % of the sprung mass on the front axle: are axles or place mixed up?",
+        )
+
+
+def _known(kg: float) -> float | None:
+    return kg if math.isfinite(kg) else None

@@ -1,0 +1,5 @@
+"""Known weights held against what was weighed: verifications, which teach nothing, and how parameters drift.
+
+A weight that somebody states comes in and is attached to the load epoch of its time, as the store has it; dated records
+go out, kept beside the database as tares are.
+"""

@@ -1,0 +1,125 @@
+"""The load epochs of a time, from the estimates that the store has: which load a stated weight is of."""
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from gateway.calibration.known_weight import WeightRefusal
+from gateway.errors import StoreError, WeightRefusedError
+from gateway.estimate import Estimate, Quantity
+from gateway.estimate_json import estimate_from_json
+from gateway.history import Page
+from gateway.records import iso_utc
+from gateway.stated_weight import Drive
+from gateway.units import NS_PER_S
+
+NEAR_NS: Final = 12 * 3600 * NS_PER_S  # a drive further from a weighing than that carried another load, for all we know
+BATCH_IDS: Final = 20
+_PAGE: Final = 500
+
+Ask = Callable[..., Page]
+
+
+@dataclass(frozen=True, slots=True)
+class WeighedEpoch:
+    """One load as its counted batches told it together, tare and all: what was shown last."""
+
+    t_start_ns: int
+    t_end_ns: int
+    n_batches: int
+    payload: Quantity
+    front_share: Quantity
+    batch_ids: tuple[str, ...]
+    calibration_id: str | None
+    estimator: str
+    tare_id: str | None
+
+    def told(self) -> str:
+        """When it was, for people."""
+        return f"{iso_utc(self.t_start_ns)[:16]}Z to {iso_utc(self.t_end_ns)[:16]}Z ({self.payload.number:.0f} kg)"
+
+
+def epochs_of(estimates: Iterable[Estimate]) -> list[WeighedEpoch]:
+    """Estimates in order of arrival -> their load epochs, oldest first.
+
+    The count of an epoch's batches begins anew with each epoch; who weighs is the same throughout one.
+    """
+    epochs: list[WeighedEpoch] = []
+    for estimate in estimates:
+        found = _epoch_so_far(estimate)
+        if found is None:
+            continue
+        before = epochs[-1] if epochs else None
+        if before is not None and found.n_batches == before.n_batches + 1 and _is_same_scale(found, before):
+            ids = (*before.batch_ids, *found.batch_ids)[-BATCH_IDS:]
+            epochs[-1] = replace(found, t_start_ns=before.t_start_ns, batch_ids=ids)
+        else:
+            epochs.append(found)
+    return epochs
+
+
+def epoch_at(epochs: Sequence[WeighedEpoch], at_ns: int, drive: Drive | None) -> WeighedEpoch:
+    """The epoch whose load was weighed at this time. Raises WeightRefusedError where there is none, or either of two.
+
+    Within a drive there is no doubt. Between two, the load is of the one before, or of the one after, or of both.
+    """
+    near = [epoch for epoch in epochs if epoch.t_start_ns - NEAR_NS <= at_ns <= epoch.t_end_ns + NEAR_NS]
+    during = [epoch for epoch in near if epoch.t_start_ns <= at_ns <= epoch.t_end_ns]
+    if during:
+        return during[-1]
+    before = [epoch for epoch in near if epoch.t_end_ns < at_ns][-1:]
+    after = [epoch for epoch in near if epoch.t_start_ns > at_ns][:1]
+    candidates = {Drive.BEFORE: before, Drive.AFTER: after, None: before + after}[drive]
+    if not candidates:
+        raise WeightRefusedError(
+            WeightRefusal.NO_EPOCH,
+            f"no load was weighed {'around' if drive is None else drive} {iso_utc(at_ns)[:16]}Z (12 hours at most): "
+            "drive with it until a batch has counted, and state it then with the time at which it was known",
+        )
+    if len(candidates) > 1:
+        raise WeightRefusedError(
+            WeightRefusal.AMBIGUOUS_EPOCH,
+            f"{iso_utc(at_ns)[:16]}Z lies between two loads, {before[0].told()} and {after[0].told()}: "
+            "say whether it is of the drive before or after",
+        )
+    return candidates[0]
+
+
+def epochs_around(ask: Ask, at_ns: int) -> list[WeighedEpoch]:
+    """The epochs that the store tells of around a time. Raises WeightRefusedError where it cannot be read."""
+    try:
+        return epochs_of(_estimates(ask, at_ns - NEAR_NS, at_ns + NEAR_NS))
+    except (StoreError, TimeoutError) as fault:
+        raise WeightRefusedError(WeightRefusal.NOT_STORED, f"the store cannot be read now: {fault}") from None
+
+
+def _estimates(ask: Ask, since_ns: int, until_ns: int) -> Iterator[Estimate]:
+    cursor: str | None = None
+    while True:
+        page = ask(since_ns=since_ns, until_ns=until_ns, limit=_PAGE, cursor=cursor, with_spectra=False)
+        yield from (estimate_from_json(json.loads(item)) for item in page.items)
+        if page.next_cursor is None:
+            return
+        cursor = page.next_cursor
+
+
+def _epoch_so_far(found: Estimate) -> WeighedEpoch | None:
+    """What a counted batch tells of its load; None for rejected ones, and those of versions that told no epochs."""
+    if not found.counted or found.epoch is None:
+        return None
+    return WeighedEpoch(
+        t_start_ns=found.t_start_ns,
+        t_end_ns=found.t_end_ns,
+        n_batches=found.epoch.n_batches,
+        payload=found.epoch.payload,
+        front_share=found.epoch.front_share,
+        batch_ids=(found.id,),
+        calibration_id=found.calibration_id,
+        estimator=found.estimator,
+        tare_id=None if found.tare is None else found.tare.tare_id,
+    )
+
+
+def _is_same_scale(one: WeighedEpoch, other: WeighedEpoch) -> bool:
+    return (one.calibration_id, one.estimator) == (other.calibration_id, other.estimator)

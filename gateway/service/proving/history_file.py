@@ -1,0 +1,55 @@
+"""A history of the service in one file of its own: believed or set aside, replaced in one step."""
+
+import logging
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from pydantic import ValidationError
+
+from gateway.calibration.file.parts import Part
+from gateway.files.kept import KeptFiles
+from gateway.log import Event, log_event
+
+H = TypeVar("H", bound=Part)
+
+
+class HistoryFile(Generic[H]):
+    """Not thread-safe: its desk is. ``fault`` says what became of a file that could not be believed."""
+
+    def __init__(self, path: Path, empty: H) -> None:
+        """Reads the file; ``empty`` is the history where there is none, and of its kind."""
+        self._path = path
+        self._files = KeptFiles(path.parent)
+        self.fault: str | None = None
+        self._is_broken = False
+        self.history = self._believed(empty)
+
+    def keep(self, history: H) -> None:
+        """Put it in place of the one before, on disk when this returns. Raises OSError; then nothing has changed."""
+        if self._is_broken:  # it is never written over
+            self._set_aside()
+        text = history.model_dump_json(indent=1)
+        self._files.write(self._path.name, (text + "\n").encode())
+        self.history = history
+        self.fault = None
+
+    def _believed(self, empty: H) -> H:
+        try:
+            return type(empty).model_validate_json(self._files.read(self._path.name))
+        except FileNotFoundError:
+            return empty
+        except (OSError, ValidationError) as broken:
+            fault = str(broken)
+        self._is_broken = True
+        try:
+            aside = f"is set aside as {self._set_aside()}"
+        except OSError as refusal:
+            aside = f"cannot be set aside: {refusal}"
+        self.fault = f"{self._path} cannot be believed, its history begins anew (it {aside})"
+        log_event(Event.HISTORY_SET_ASIDE, level=logging.ERROR, file=str(self._path), fault=fault, set_aside=aside)
+        return empty
+
+    def _set_aside(self) -> str:
+        name = self._files.set_aside(self._path.name)
+        self._is_broken = False
+        return name

@@ -1,0 +1,27 @@
+"""A weight that somebody states of a vehicle at a time: a weighbridge's ticket, or a load that is known."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Drive(StrEnum):
+    """Which drive carried the weight, seen from the time at which it was taken."""
+
+    BEFORE = "before"
+    AFTER = "after"
+
+
+@dataclass(frozen=True, slots=True)
+class StatedWeight:
+    """Of one load: the gross weight, or both axles' weights, or the payload and, unless it is zero, its place.
+
+    ``at`` is RFC 3339. ``position_m`` is behind the front axle. ``drive`` None: whichever it must be.
+    """
+
+    at: str
+    gross_kg: float | None = None
+    front_axle_kg: float | None = None
+    rear_axle_kg: float | None = None
+    payload_kg: float | None = None
+    position_m: float | None = None
+    drive: Drive | None = None

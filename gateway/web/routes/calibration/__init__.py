@@ -1,0 +1,17 @@
+"""What can be asked about the calibration in use, and changed: its zero, and known loads held against it.
+
+Requests with a good token come in; who keeps these things (a desk of the service) answers in JSON, blocking, from a
+thread of its own; its refusals go out as problems with a reason.
+"""
+
+from gateway.web.routes.calibration.tare import NoTareDesk, TareDesk, tare_router
+from gateway.web.routes.calibration.verification import NoVerificationDesk, VerificationDesk, verification_router
+
+__all__ = [
+    "NoTareDesk",
+    "NoVerificationDesk",
+    "TareDesk",
+    "VerificationDesk",
+    "tare_router",
+    "verification_router",
+]

@@ -1,0 +1,71 @@
+"""A weight as a request states it: gross, by axle, or a known payload and its place."""
+
+import time
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from gateway.records import iso_utc
+from gateway.stated_weight import Drive, StatedWeight
+from gateway.web.instant import Instant
+
+_LAST_NS: Final = 9_223_372_036_000_000_000
+Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0, allow_inf_nan=False)]
+
+
+class _When(BaseModel):
+    """The moment at which the weight was known, and which drive carried it."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    at: Instant | None = Field(None, description="when it was taken [default: now]")
+    drive: Drive | None = Field(
+        None, description="the drive before or after `at` carried it [default: whichever was weighed, if one alone was]"
+    )
+
+    def at_text(self) -> str:
+        """RFC 3339; what lies beyond the years that stamps can hold is brought to their edge."""
+        at_ns = time.time_ns() if self.at is None else self.at
+        return iso_utc(min(max(at_ns, 0), _LAST_NS))
+
+
+class GrossWeight(_When):
+    """The whole vehicle on scales."""
+
+    by: Literal["gross"]
+    gross_kg: Kilograms = Field(examples=[1890.0])
+
+    def stated(self) -> StatedWeight:
+        """In the service's terms."""
+        return StatedWeight(self.at_text(), gross_kg=self.gross_kg, drive=self.drive)
+
+
+class AxleWeights(_When):
+    """Each axle on scales."""
+
+    by: Literal["axles"]
+    front_axle_kg: Kilograms = Field(examples=[850.0])
+    rear_axle_kg: Kilograms = Field(examples=[1040.0])
+
+    def stated(self) -> StatedWeight:
+        """In the service's terms."""
+        return StatedWeight(
+            self.at_text(), front_axle_kg=self.front_axle_kg, rear_axle_kg=self.rear_axle_kg, drive=self.drive
+        )
+
+
+class KnownPayload(_When):
+    """What is aboard, from papers or from scales."""
+
+    by: Literal["payload"]
+    payload_kg: Kilograms = Field(examples=[270.0])
+    position_m: float | None = Field(
+        None, ge=-10.0, le=20.0, allow_inf_nan=False, description="its centre of gravity behind the front axle"
+    )
+
+    def stated(self) -> StatedWeight:
+        """In the service's terms."""
+        return StatedWeight(self.at_text(), payload_kg=self.payload_kg, position_m=self.position_m, drive=self.drive)
+
+
+Stated = Annotated[GrossWeight | AxleWeights | KnownPayload, Field(discriminator="by")]

@@ -1,0 +1,173 @@
+"""/api/v1/calibration/verifications: known loads held against what was weighed, as dated records."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Final, Literal, Protocol
+
+from fastapi import APIRouter, Path, Request
+from pydantic import BaseModel, Field
+from starlette.responses import HTMLResponse, Response
+
+from gateway.errors import WeightRefusedError
+from gateway.records import json_line
+from gateway.stated_weight import StatedWeight
+from gateway.status import VerificationStatus
+from gateway.web.door.problems import problem_response
+from gateway.web.routes.calibration.asking import REFUSALS, answered, who
+from gateway.web.routes.calibration.stated import Stated
+from gateway.web.routes.calibration.verification_page import POLICY, verification_page
+from gateway.web.schemas import Body, problem_responses
+
+VERIFICATIONS_PATH: Final = "/calibration/verifications"
+_PAGE: Final[dict[int | str, dict[str, Any]]] = {
+    200: {"content": {"text/html": {"schema": {"type": "string"}}}, "description": "the page"}
+}
+
+
+class VerificationDesk(Protocol):
+    """Who keeps the records. Blocking calls; answers are JSON as described below."""
+
+    def told(self) -> str:
+        """A VerificationState."""
+        ...
+
+    def record(self, record_id: str) -> Mapping[str, Any] | None:
+        """A VerificationRecord; None where there is none of this id."""
+        ...
+
+    def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str:
+        """The new VerificationRecord. Raises WeightRefusedError."""
+        ...
+
+
+class NoVerificationDesk:
+    """Where nothing is weighed there is nothing to verify."""
+
+    def told(self) -> str:
+        """No record, and none is due."""
+        rule = {"permitted_error_pct": 5.0, "permitted_axle_error_pct": None, "loads": 1}
+        due = {"n_records": 0, "last_at": None, "last_verdict": None, "due_at": None, "is_due": False}
+        return json_line({"rule": rule, "due": due, "warning": None, "history": []})
+
+    def record(self, record_id: str) -> Mapping[str, Any] | None:
+        """None."""
+        return None
+
+    def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str:
+        """Always refused."""
+        raise WeightRefusedError("no_calibration", "there is no calibration, and so nothing to verify")
+
+
+class VerificationRequest(Body):
+    """The loads that were weighed, and a word on them."""
+
+    loads: list[Stated] = Field(min_length=1, max_length=10)
+    note: str = Field("", max_length=200, description="kept with the record: scales used, place, weather")
+
+
+class Rule(BaseModel):
+    """What is asked for ([verification] in the settings)."""
+
+    permitted_error_pct: float = Field(description="of the known gross weight")
+    permitted_axle_error_pct: float | None = Field(description="of each axle's known weight; null: not judged")
+    loads: int
+
+
+class StatedTold(BaseModel):
+    """What was stated of a load."""
+
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    gross_kg: float | None
+    front_axle_kg: float | None
+    rear_axle_kg: float | None
+    payload_kg: float | None
+    position_m: float | None
+    drive: Literal["before", "after"] | None
+
+
+class AxleErrorTold(BaseModel):
+    """Weighed less known."""
+
+    known_kg: float
+    error_kg: float
+    error_pct: float
+
+
+class LoadTold(BaseModel):
+    """One load: stated, weighed, and the errors."""
+
+    stated: StatedTold
+    t_start: str
+    t_end: str
+    n_batches: int
+    batch_ids: list[str]
+    known_payload_kg: float
+    known_reference_kg: float = Field(description="gross; without unsprung masses the sprung mass alone")
+    payload_kg: float
+    payload_std_kg: float
+    error_kg: float
+    error_pct: float = Field(description="of known_reference_kg")
+    front_axle: AxleErrorTold | None
+    rear_axle: AxleErrorTold | None
+    is_within: bool
+
+
+class VerificationRecord(BaseModel):
+    """A dated record; it is never changed."""
+
+    id: str = Field(examples=["sha256:9f86d081"])
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    by: str = Field(description="name of the token; `local` where none are in use")
+    note: str | None
+    vehicle_id: str | None
+    calibration_id: str
+    estimator: str
+    tare_id: str | None
+    rule: Rule
+    loads: list[LoadTold]
+    verdict: Literal["passed", "failed"]
+
+
+class VerificationState(BaseModel):
+    """What is asked for, when it is due, and the records, newest first."""
+
+    rule: Rule
+    due: VerificationStatus
+    warning: str | None = Field(description="what is wrong with the file of the records")
+    history: list[VerificationRecord]
+
+
+def verification_router(desk: VerificationDesk) -> APIRouter:
+    """The routes of verification."""
+    router = APIRouter(prefix="/api/v1", tags=["calibration"])
+
+    @router.get(VERIFICATIONS_PATH, response_model=VerificationState)
+    async def verification_state(request: Request) -> Response:
+        """What is asked for, when a verification is due, and the records."""
+        return await answered(request, desk.told)
+
+    @router.post(
+        VERIFICATIONS_PATH,
+        status_code=201,
+        response_model=VerificationRecord,
+        responses={**REFUSALS, **problem_responses(400, 422)},
+    )
+    async def verify(request: Request, claim: VerificationRequest) -> Response:
+        """Hold known loads against what was weighed of them. Nothing is learned; on disk when answered."""
+        stated = [load.stated() for load in claim.loads]
+        return await answered(request, lambda: desk.verify(who(request), claim.note or None, stated), 201)
+
+    @router.get(
+        VERIFICATIONS_PATH + "/{record_id}",
+        response_class=Response,
+        responses={**_PAGE, **problem_responses(404, 422)},
+    )
+    async def verification_record(
+        request: Request, record_id: Annotated[str, Path(max_length=80, description="as the list has it")]
+    ) -> Response:
+        """One record as a page to print, or to keep as a file: it needs nothing else."""
+        record = desk.record(record_id)
+        if record is None:
+            return problem_response(404, "there is no such record: the list has those there are", request.url.path)
+        return HTMLResponse(verification_page(record), headers={"content-security-policy": POLICY})
+
+    return router
