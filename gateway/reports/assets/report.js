@@ -24,7 +24,8 @@
     const layout = isPhone.matches ? chart.narrow : chart.layout;
     const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
     place.hidden = false;
-    figure.querySelector("img").style.display = "none";
+    const still = figure.querySelector("img");
+    if (still) still.style.display = "none";
     place.firstElementChild || place.append(document.createElement("div"));
     Plotly.react(place.firstElementChild, chart.data, themed(layout), options);
   };

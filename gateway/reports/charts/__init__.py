@@ -7,8 +7,10 @@ without knowing them: the same record gives the SVG file and the chart that answ
 from gateway.reports.charts.chart import (
     GREY,
     Axis,
+    Cell,
     Chart,
     Line,
+    Link,
     Mark,
     Marker,
     Panel,
@@ -23,8 +25,10 @@ from gateway.reports.charts.chart import (
 __all__ = [
     "GREY",
     "Axis",
+    "Cell",
     "Chart",
     "Line",
+    "Link",
     "Mark",
     "Marker",
     "Panel",

@@ -15,12 +15,21 @@ GREY: Final = 7
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """``places`` names the positions 0, 1, 2 ... of an axis of kinds instead of numbers."""
+    """``places`` names the positions 0, 1, 2 ... of an axis of kinds instead of numbers.
+
+    ``ticks`` names positions of an axis of numbers that people do not read as such, as instants: (position, name).
+    """
 
     title: str
     is_log: bool = False
     limits: tuple[float, float] | None = None
     places: tuple[str, ...] = ()
+    ticks: tuple[tuple[float, str], ...] = ()
+
+    @property
+    def named(self) -> tuple[tuple[float, str], ...]:
+        """Positions that have names, with these; empty where the numbers stand for themselves."""
+        return self.ticks or tuple((float(n), place) for n, place in enumerate(self.places))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +104,10 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """Panels side by side, ``most_columns`` in a row. ``name`` is a file's; ``alt`` tells in words what is seen."""
+    """Panels side by side, ``most_columns`` in a row. ``name`` is a file's; ``alt`` tells in words what is seen.
+
+    ``has_still`` is false where no picture is drawn, for tables beside it hold the same numbers.
+    """
 
     name: str
     caption: str
@@ -103,6 +115,7 @@ class Chart:
     panels: tuple[Panel, ...]
     most_columns: int = 2
     row_height_px: int = 340
+    has_still: bool = True
 
     @property
     def n_columns(self) -> int:
@@ -116,12 +129,23 @@ class Chart:
 
 
 @dataclass(frozen=True, slots=True)
+class Link:
+    """A cell that leads to another page; ``to`` is a relative URL."""
+
+    text: str
+    to: str
+
+
+Cell = str | Link
+
+
+@dataclass(frozen=True, slots=True)
 class Table:
     """Numbers as text, the first ``n_heads`` cells of a row naming it. A row may be as wide as ``columns`` only."""
 
     caption: str
     columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    rows: tuple[tuple[Cell, ...], ...]
     n_heads: int = 1
 
 

@@ -82,7 +82,11 @@ def _named(mark: Mark, seen: set[str]) -> dict[str, Any]:
 
 def _axis(axis: Axis) -> dict[str, Any]:
     limits = None if axis.limits is None else [_position(axis, end) for end in axis.limits]
-    places = {"tickmode": "array", "tickvals": list(range(len(axis.places))), "ticktext": list(axis.places)}
+    named = {
+        "tickmode": "array",
+        "tickvals": [at for at, _ in axis.named],
+        "ticktext": [name for _, name in axis.named],
+    }
     return {
         "title_text": axis.title,
         "type": "log" if axis.is_log else "linear",
@@ -90,7 +94,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
         "automargin": True,
         "zeroline": False,
         **(_LOG_TICKS if axis.is_log else {}),
-        **(places if axis.places else {}),
+        **(named if axis.named else {}),
     }
 
 

@@ -68,8 +68,8 @@ def _set_axis(drawn: XAxis | YAxis, axis: Axis, **of_places: Any) -> None:
         _with_plain_ticks(drawn)
     if axis.limits:
         drawn.axes.set(**{f"{name}lim": axis.limits})
-    if axis.places:
-        drawn.set_ticks(range(len(axis.places)), axis.places, fontsize=7, **of_places)
+    if axis.named:
+        drawn.set_ticks([at for at, _ in axis.named], [name for _, name in axis.named], fontsize=7, **of_places)
 
 
 def _with_plain_ticks(axis: XAxis | YAxis) -> None:

@@ -1,0 +1,107 @@
+"""Sections, charts and tables as HTML: they read without scripts; where plotly.min.js is there it draws the charts."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.resources import files
+from typing import Final
+
+from gateway.reports.charts.chart import Cell, Chart, Link, Section, Table
+
+PLOTLY_FILE: Final = "plotly.min.js"
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A document: its head, and all that stands in ``main`` (HTML). ``skip_to`` is the anchor of what matters.
+
+    ``plotly`` is where plotly's script lies beside it; None: the page has no chart for it.
+    """
+
+    title: str
+    header: str
+    main: str
+    skip_to: tuple[str, str]
+    plotly: str | None = PLOTLY_FILE
+
+
+def document(page: Page) -> str:
+    """The whole document; it fetches nothing from elsewhere."""
+    script = f'<script src="{page.plotly}"></script><script>{_asset("report.js")}</script>' if page.plotly else ""
+    anchor, words = page.skip_to
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<meta name="color-scheme" content="light dark">'
+        f"<title>{escape(page.title)}</title><style>{_asset('report.css')}</style></head><body>"
+        f'<a class="skip" href="#{anchor}">{escape(words)}</a>'
+        f"<header><h1>{escape(page.title)}</h1>{page.header}</header>"
+        f"<main>{page.main}</main>{script}</body></html>\n"
+    )
+
+
+def contents_html(sections: Sequence[Section]) -> str:
+    """Links to the sections."""
+    links = "".join(f'<li><a href="#{one.anchor}">{escape(one.heading)}</a></li>' for one in sections)
+    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
+
+
+def prose(text: str) -> str:
+    """Escaped, with a number and its unit kept on one line."""
+    return re.sub(r"(?<=\d) (?=(?:%|kg|pp|Hz|m|km/h|m/s²)(?:\W|$))", "\u00a0", escape(text)).replace("± ", "±\u00a0")
+
+
+def _asset(name: str) -> str:
+    return files("gateway.reports").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def section_html(section: Section, live: Mapping[str, str]) -> str:
+    """A chapter; ``live`` holds plotly's JSON by the chart's name."""
+    paragraphs = "".join(f"<p>{prose(text)}</p>" for text in section.paragraphs)
+    items: list[Chart | Table] = [*section.charts, *section.tables]
+    body = "".join(_item(item, live) for item in items)
+    folded = "".join(
+        f"<details><summary>{escape(summary)}</summary>{''.join(_item(item, live) for item in inside)}</details>"
+        for summary, inside in section.folded
+    )
+    heading = f"<h2>{escape(section.heading)}</h2>"
+    return f'<section id="{section.anchor}">{heading}{paragraphs}{body}{folded}</section>'
+
+
+def _item(item: Chart | Table, live: Mapping[str, str]) -> str:
+    return _figure(item, live) if isinstance(item, Chart) else table_html(item)
+
+
+def _figure(chart: Chart, live: Mapping[str, str]) -> str:
+    """The still picture, where there is one, and what plotly needs to draw the chart on screen."""
+    spec = live[chart.name].replace("<", "\\u003c")  # so that no text can end the element
+    alt, picture = escape(chart.alt), f"figures/{chart.name}"
+    still = f'<div class="wide"><img src="{picture}.svg" alt="{alt}"></div>' if chart.has_still else ""
+    files = f' <a href="{picture}.svg">SVG</a> <a href="{picture}.png">PNG</a>' if chart.has_still else ""
+    return (
+        f'<figure id="figure-{chart.name}">{still}'
+        f'<div class="wide live" role="img" aria-label="{alt}" hidden></div>'
+        f'<script type="application/json">{spec}</script>'
+        f"<figcaption>{prose(chart.caption)}{files}</figcaption></figure>"
+    )
+
+
+def table_html(table: Table) -> str:
+    """A table that scrolls by itself where the page is narrow."""
+    head = "".join(f'<th scope="col">{escape(column)}</th>' for column in table.columns)
+    body = "".join(_row(row, table.n_heads) for row in table.rows)
+    caption = escape(table.caption)
+    return (
+        f'<div class="wide" role="region" tabindex="0" aria-label="{caption}"><table><caption>{caption}</caption>'
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+    )
+
+
+def _row(cells: Sequence[Cell], n_heads: int) -> str:
+    heads = "".join(f'<th scope="row">{_cell(cell)}</th>' for cell in cells[:n_heads])
+    return f"<tr>{heads}{''.join(f'<td>{_cell(cell)}</td>' for cell in cells[n_heads:])}</tr>"
+
+
+def _cell(cell: Cell) -> str:
+    return f'<a href="{escape(cell.to)}">{prose(cell.text)}</a>' if isinstance(cell, Link) else prose(cell)
