@@ -1,0 +1,163 @@
+"""The fleet's report over a year: how long it takes, how much memory, and how large its pages are.
+
+    python -m benchmarks.speed.fleet_report [--vehicles 100] [--days 365] [--hours 2] [--json] [--keep DIR]
+
+Makes a data set as `springscale reprocess` leaves it, with numbers drawn at random: a batch every five minutes of
+driving, seasons that move the dampers of all vehicles, a few vehicles that drift by themselves, a few whose sensor
+fails. The report runs in a process of its own; memory is compared with that of a tenth of the vehicles.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gateway.archive.dataset import schema
+from gateway.archive.receipts import Slot, text_of
+from gateway.units import NS_PER_S
+
+START_DAY = 20_454  # 2026-01-01
+WINDOW_S = 300
+DRIFTING_EVERY, FAILING_EVERY = 25, 40  # one vehicle in so many
+PER_YEAR = 0.2
+STD_KG, OWN_STD_KG = 8.0, 5.0
+
+
+def write_dataset(folder: Path, n_vehicles: int, n_days: int, hours_a_day: float) -> int:
+    """Tables and receipts, one a vehicle and month; returns how many batches they hold."""
+    n_total = 0
+    for n in range(n_vehicles):
+        rng = np.random.default_rng([7, n])
+        day = np.repeat(np.arange(n_days), round(hours_a_day * 3600 / WINDOW_S))
+        months = (np.datetime64("1970-01-01") + START_DAY + day).astype("datetime64[M]")
+        columns = _columns(rng, n, day)
+        for month in np.unique(months):
+            rows = months == month
+            slot = Slot(f"van-{n:04}", str(month), f"{n:08x}{abs(int(month.astype(int))):024x}")
+            _write(folder, slot, {name: _chosen(column, rows) for name, column in columns.items()})
+        n_total += len(day)
+    return n_total
+
+
+def _columns(rng: np.random.Generator, n: int, day: Any) -> dict[str, Any]:
+    """A vehicle's year; a tenth of its batches are refused, and all of a failing sensor's."""
+    size, year = len(day), day / 365.25
+    within = np.arange(size) % max(1, int(np.count_nonzero(day == 0)))
+    t_end_ns = ((START_DAY + day) * 86_400 + 8 * 3600 + (within + 1) * WINDOW_S) * NS_PER_S
+    is_refused = rng.random(size) < 0.1
+    is_failing = (n % FAILING_EVERY == 1) & (year > 0.7) & (rng.random(size) < 0.8)
+    loads = np.repeat(rng.uniform(0.0, 450.0, size // 6 + 1), 6)[:size]
+    payload = np.where(is_refused | is_failing, np.nan, loads + rng.normal(0.0, OWN_STD_KG, size))
+    own_drift = PER_YEAR * year if n % DRIFTING_EVERY == 2 else 0.0
+    damper = 1.0 + 0.05 * np.sin(2.0 * np.pi * year) + own_drift
+    rejected = [
+        ["acceleration_stuck"] if failing else ["too_slow"] if refused else []
+        for failing, refused in zip(is_failing, is_refused, strict=True)
+    ]
+    known = {
+        "t_end_ns": t_end_ns,
+        "payload_kg": payload,
+        "payload_std_kg": np.where(np.isnan(payload), np.nan, STD_KG),
+        "payload_own_std_kg": np.where(np.isnan(payload), np.nan, OWN_STD_KG),
+        "damper_front_ratio": damper + rng.normal(0.0, 0.05, size),
+        "damper_rear_ratio": 1.0 + 0.05 * np.sin(2.0 * np.pi * year) + rng.normal(0.0, 0.05, size),
+        "delay_scale": rng.normal(0.0, 0.003, size),
+        "misfit": rng.gamma(100.0, 0.01, size),
+        "tension": rng.chisquare(5, size),
+        "sensor_position_score": rng.normal(0.0, 1.0, size),
+        "sensor_noise_score": rng.normal(0.0, 1.0, size),
+    }
+    return {**known, "rejected": rejected, "over_limit": [["gross"] if load > 440.0 else [] for load in loads]}
+
+
+def _chosen(column: Any, rows: Any) -> Any:
+    return (
+        column[rows]
+        if isinstance(column, np.ndarray)
+        else [one for one, is_in in zip(column, rows, strict=True) if is_in]
+    )
+
+
+def _write(folder: Path, slot: Slot, columns: dict[str, Any]) -> None:
+    import pyarrow as pa  # noqa: PLC0415 - an extra
+    import pyarrow.parquet as pq  # noqa: PLC0415 - likewise
+
+    n, table = len(columns["t_end_ns"]), schema()
+    columns |= {"vehicle_id": [slot.vehicle] * n, "calibration_id": ["sha256:1"] * n, "job": [slot.job] * n}
+    columns |= {"estimator": ["cross_spectrum"] * n}
+    arrays = [
+        pa.array(columns[field.name], field.type, from_pandas=True)
+        if field.name in columns
+        else pa.nulls(n, field.type)
+        for field in table
+    ]
+    for path in (folder / slot.table, folder / slot.receipt):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    pq.write_table(pa.Table.from_arrays(arrays, schema=table), folder / slot.table, compression="zstd")
+    (folder / slot.receipt).write_bytes(text_of({"vehicle": slot.vehicle, "month": slot.month, "job": slot.job}))
+
+
+def report(dataset: Path, output: Path) -> dict[str, float]:
+    """Wall time, processor time and peak memory of the command; what it wrote."""
+    command = [sys.executable, "-m", "gateway", "fleet-report", str(dataset), "--output", str(output)]
+    begun_s = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, code, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(code)
+    assert process.returncode == 0, command
+    pages = list((output / "vehicles").glob("*.html"))
+    return {
+        "seconds": time.perf_counter() - begun_s,
+        "cpu_s": used.ru_utime + used.ru_stime,
+        "peak_mb": used.ru_maxrss / 1024,
+        "page_kb": (output / "report.html").stat().st_size / 1e3,
+        "vehicle_page_kb": sum(page.stat().st_size for page in pages) / max(1, len(pages)) / 1e3,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--vehicles", type=int, default=100)
+    parser.add_argument("--days", type=int, default=365)
+    parser.add_argument("--hours", type=float, default=2.0, help="of driving a day")
+    parser.add_argument("--json", action="store_true", help="print the figures for machines")
+    parser.add_argument("--keep", type=Path, help="directory in which data set and report stay")
+    parser.add_argument("--write", type=Path, help=argparse.SUPPRESS)
+    asked = parser.parse_args()
+    if asked.write:
+        print(write_dataset(asked.write, asked.vehicles, asked.days, asked.hours))
+        return
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = asked.keep or Path(scratch)
+        figures: dict[str, Any] = {"vehicles": asked.vehicles, "days": asked.days, "hours_a_day": asked.hours}
+        for name, n_vehicles in (("tenth", max(1, asked.vehicles // 10)), ("whole", asked.vehicles)):
+            dataset = folder / f"dataset-{name}"
+            n_batches = _written_in_own_process(dataset, n_vehicles, asked)
+            figures[name] = {"batches": n_batches, **report(dataset, folder / f"report-{name}")}
+    if asked.json:
+        print(json.dumps(figures))
+        return
+    whole, tenth = figures["whole"], figures["tenth"]
+    print(
+        f"{asked.vehicles} vehicles, {asked.days} days, {whole['batches']:,} batches: {whole['seconds']:.0f} s "
+        f"({whole['cpu_s']:.0f} s of processor), peak {whole['peak_mb']:.0f} MB (a tenth of the vehicles: "
+        f"{tenth['peak_mb']:.0f} MB), page {whole['page_kb']:.0f} kB, each vehicle's {whole['vehicle_page_kb']:.0f} kB"
+    )
+
+
+def _written_in_own_process(dataset: Path, n_vehicles: int, asked: argparse.Namespace) -> int:
+    """Of its own, because a process that is started inherits its parent's peak of memory."""
+    command = [sys.executable, "-m", "benchmarks.speed.fleet_report", "--write", str(dataset)]
+    command += ["--vehicles", str(n_vehicles), "--days", str(asked.days), "--hours", str(asked.hours)]
+    return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+"""A data set of estimates, vehicle by vehicle: what was carried, what was refused, what drifts, which sensors are bad.
+
+    fleet = fleet_of(place_of("DATASET"))
+
+One vehicle's batches are in memory at a time; what is kept of it is a few numbers a week.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import date
+from typing import Any, Final
+
+import numpy as np
+
+from gateway.archive.fleet.batches import Batches, by_vehicle, read_batches
+from gateway.archive.fleet.drift import Drift, Series, drifts_of, series_of
+from gateway.archive.fleet.sensors import Health, Trouble, troubles_of
+from gateway.archive.fleet.weeks import DAY_NS, Weeks, weeks_of
+from gateway.archive.places import Place
+from gateway.archive.receipts import failures, slots_done
+from gateway.errors import ConfigurationError
+from gateway.records import Bool
+
+OnVehicle = Callable[[int, int], None]  # (vehicles done, vehicles in all)
+EPOCH: Final = date(1970, 1, 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Vehicle:
+    """What a data set tells of one vehicle. ``n_refused`` counts a batch for each of its reasons."""
+
+    name: str
+    n: int
+    n_answered: int
+    n_over_limit: int
+    first: date
+    last: date
+    weeks: Weeks
+    n_refused: Mapping[str, int]
+    troubles: tuple[Trouble, ...]
+    calibrations: tuple[str, ...]
+    drifts: Mapping[str, Drift]
+
+    @property
+    def bad_sensors(self) -> tuple[Trouble, ...]:
+        return tuple(trouble for trouble in self.troubles if trouble.health is Health.BAD)
+
+    @property
+    def believed_drifts(self) -> dict[str, Drift]:
+        return {name: drift for name, drift in self.drifts.items() if drift.is_believed}
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A log, or with ``log`` None a whole job, that gave nothing, and why."""
+
+    vehicle: str
+    month: str
+    log: str | None
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fleet:
+    """Every vehicle of a data set, by name; those of which it holds no batch at all; and what failed."""
+
+    vehicles: tuple[Vehicle, ...]
+    without_batches: tuple[str, ...]
+    failures: tuple[Failure, ...]
+
+    @property
+    def n(self) -> int:
+        return sum(vehicle.n for vehicle in self.vehicles)
+
+    @property
+    def n_answered(self) -> int:
+        return sum(vehicle.n_answered for vehicle in self.vehicles)
+
+    @property
+    def first(self) -> date:
+        return min(vehicle.first for vehicle in self.vehicles)
+
+    @property
+    def last(self) -> date:
+        return max(vehicle.last for vehicle in self.vehicles)
+
+
+def fleet_of(dataset: Place, on_vehicle: OnVehicle = lambda done, of: None) -> Fleet:
+    """Everything the receipts of a data set vouch for, and nothing else.
+
+    Raises ConfigurationError where there is nothing, or what cannot be understood; PlaceError where it cannot be read.
+    """
+    jobs = list(by_vehicle(slots_done(dataset)))
+    if not jobs:
+        raise ConfigurationError(
+            f"{dataset}: holds no receipt of `springscale reprocess`: name the folder that was its --output"
+        )
+    found: list[Vehicle] = []
+    series: dict[str, Series] = {}
+    for done, (name, slots) in enumerate(jobs):
+        on_vehicle(done, len(jobs))
+        batches = read_batches(dataset, slots)
+        if len(batches):
+            vehicle, series[name] = _vehicle(name, batches)
+            found.append(vehicle)
+    on_vehicle(len(jobs), len(jobs))
+    if not found:
+        raise ConfigurationError(f"{dataset}: its tables hold no batch at all: were the drives long enough for one?")
+    drifts = drifts_of(series)
+    failed = _failures(dataset)
+    vehicles = tuple(replace(one, drifts=drifts[one.name]) for one in found)
+    named = {name for name, _ in jobs} | {failure.vehicle for failure in failed}
+    return Fleet(vehicles, tuple(sorted(named - series.keys())), failed)
+
+
+def _vehicle(name: str, batches: Batches) -> tuple[Vehicle, Series]:
+    """What is kept of a vehicle, its drifts still to be judged, and the series they will be judged by."""
+    answered = batches.is_answered
+    first, last = (EPOCH.fromordinal(EPOCH.toordinal() + int(t // DAY_NS)) for t in batches.t_end_ns[[0, -1]])
+    vehicle = Vehicle(
+        name,
+        len(batches),
+        int(answered.sum()),
+        int((batches.is_over_limit & answered).sum()),
+        first,
+        last,
+        weeks_of(batches),
+        {reason: int(refused.sum()) for reason, refused in batches.rejected.items()},
+        troubles_of(batches),
+        tuple(dict.fromkeys(one for one in batches.calibration_id if one)),
+        {},
+    )
+    since = batches.rows(_by_last_calibration(batches))
+    return vehicle, series_of(weeks_of(since))
+
+
+def _by_last_calibration(batches: Batches) -> Bool:
+    """Parameters are told relative to a calibration: only those of the last one can be compared."""
+    last = batches.calibration_id[-1]
+    return np.array([one == last for one in batches.calibration_id], dtype=bool)
+
+
+def _failures(dataset: Place) -> tuple[Failure, ...]:
+    return tuple(_failure(told) for told in failures(dataset))
+
+
+def _failure(told: Mapping[str, Any]) -> Failure:
+    return Failure(str(told.get("vehicle")), str(told.get("month")), told.get("log"), str(told.get("reason")))

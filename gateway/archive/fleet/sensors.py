@@ -1,0 +1,128 @@
+"""Sensors that went bad: on which days a reason of the sensors refused what was driven, and since when."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date, timedelta
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from gateway.archive.fleet.batches import Batches
+from gateway.archive.fleet.weeks import CAUSES, DAY_NS
+from gateway.estimate import Z95
+from gateway.reasons import Cause
+from gateway.records import F64, I64, Bool
+
+BAD_DAY_SHARE: Final = (
+    0.5  # chosen: of a day's batches that the reason refused; batches of a day are no independent news
+)
+RECENT_DAYS: Final = 14  # chosen: the last days on which the vehicle drove
+BAD_SHARE: Final = 0.2  # chosen: more bad days than that, surely, is a sensor that is bad
+LEAST_LIKELIHOOD_RATIO: Final = 12.0  # chosen: twice the logarithm, from which a day divides good from bad
+
+
+class Health(StrEnum):
+    """What the days say of one reason."""
+
+    BAD = "bad"  # now: surely more than BAD_SHARE of the recent days
+    WAS_BAD = "was bad"  # had as many bad days in a row as make a sensor bad, but not now
+    SOME = "now and then"
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """``n_bad`` of ``n`` and the 95 % interval of the share behind it (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927)."""
+
+    n_bad: int
+    n: int
+
+    @property
+    def interval95(self) -> tuple[float, float]:
+        """(0, 1) where there is nothing to tell from."""
+        if self.n == 0:
+            return 0.0, 1.0
+        share, z2 = self.n_bad / self.n, Z95**2
+        middle = (share + z2 / (2 * self.n)) / (1 + z2 / self.n)
+        reach = Z95 / (1 + z2 / self.n) * math.sqrt(share * (1 - share) / self.n + z2 / (4 * self.n**2))
+        return max(0.0, middle - reach), min(1.0, middle + reach)
+
+    @property
+    def is_surely_bad(self) -> bool:
+        return self.interval95[0] > BAD_SHARE
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """One reason of the sensors in one vehicle: batches, days, how it stands, and since when if it is bad."""
+
+    reason: str
+    n_batches: int
+    days: Share
+    recent: Share
+    health: Health
+    first: date
+    last: date
+    since: date | None = None
+
+
+def troubles_of(batches: Batches) -> tuple[Trouble, ...]:
+    """Every reason of the sensors that refused a batch, the worst first."""
+    return tuple(sorted(_troubles(batches), key=lambda one: (list(Health).index(one.health), -one.n_batches)))
+
+
+def _troubles(batches: Batches) -> Iterator[Trouble]:
+    day_of = batches.t_end_ns // DAY_NS
+    days, first, n = np.unique(day_of, return_index=True, return_counts=True)
+    for reason, refused in batches.rejected.items():
+        if CAUSES.get(reason) is Cause.SENSORS and refused.any():
+            is_bad = np.add.reduceat(refused.astype(np.int64), first) >= BAD_DAY_SHARE * n
+            met = day_of[refused]
+            yield _trouble(reason, int(refused.sum()), days, is_bad, (_date(met[0]), _date(met[-1])))
+
+
+def _trouble(reason: str, n_batches: int, days: I64, is_bad: Bool, met: tuple[date, date]) -> Trouble:
+    recent = Share(int(is_bad[-RECENT_DAYS:].sum()), len(is_bad[-RECENT_DAYS:]))
+    health = Health.BAD if recent.is_surely_bad else Health.WAS_BAD if _was_bad(is_bad) else Health.SOME
+    since = _date(days[_first_of_the_bad(is_bad)]) if health is Health.BAD else None
+    return Trouble(reason, n_batches, Share(int(is_bad.sum()), len(is_bad)), recent, health, *met, since)
+
+
+def _was_bad(is_bad: Bool) -> bool:
+    """Whether any stretch of RECENT_DAYS would have been called bad then."""
+    if len(is_bad) < RECENT_DAYS:
+        return False
+    most = int(np.convolve(is_bad, np.ones(RECENT_DAYS, dtype=np.int64), "valid").max())
+    return Share(most, RECENT_DAYS).is_surely_bad
+
+
+def _first_of_the_bad(is_bad: Bool) -> int:
+    """The day that best divides the days into two with a share of bad ones each, by the binomial likelihood.
+
+    The first bad day where no division is much likelier than none, or where there were more before it.
+    """
+    n, total = len(is_bad), int(is_bad.sum())
+    before = np.arange(1, n, dtype=np.int64)
+    bad_before = np.cumsum(is_bad, dtype=np.int64)[:-1]
+    divided = _log_likelihood(bad_before, before) + _log_likelihood(total - bad_before, n - before)
+    ratio = 2.0 * (divided - _log_likelihood(np.array([total]), np.array([n])))
+    rising = (total - bad_before) / (n - before) > bad_before / before
+    if n > 1 and np.any(chosen := rising & (ratio > LEAST_LIKELIHOOD_RATIO)):
+        return int(np.argmax(np.where(chosen, ratio, -np.inf))) + 1
+    return int(np.argmax(is_bad))
+
+
+def _log_likelihood(n_bad: I64, n: I64) -> F64:
+    """Of n_bad among n with the share that makes it likeliest."""
+    share = n_bad / n
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = np.where(n_bad > 0, n_bad * np.log(share), 0.0) + np.where(
+            n_bad < n, (n - n_bad) * np.log1p(-share), 0.0
+        )
+    likelihood: F64 = parts
+    return likelihood
+
+
+def _date(day: int) -> date:
+    return date(1970, 1, 1) + timedelta(days=int(day))
