@@ -1,0 +1,5 @@
+"""The report of a fleet's data set: a page with what wants a look, and a page for each vehicle."""
+
+from gateway.reports.fleet.report import write_fleet_report
+
+__all__ = ["write_fleet_report"]

@@ -1,0 +1,278 @@
+"""The fleet's page: what wants a look, every vehicle in a line, and the fleet week by week."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Final
+
+import numpy as np
+
+from gateway.archive.fleet import DRIFTING, OF_VEHICLE, Drift, Fleet, Vehicle
+from gateway.archive.fleet.trend import FALSE_SHARE
+from gateway.reasons import Cause
+from gateway.reports.charts import Axis, Chart, Line, Link, Mark, Panel, Points, Ribbon, Section, Table
+from gateway.reports.fleet.text import (
+    NAMES,
+    NONE,
+    drift_told,
+    kg,
+    page_of,
+    percent,
+    time_axis,
+    trouble_told,
+    whole,
+)
+from gateway.reports.fleet.vehicle import reason_told, runs_of
+
+SILENT_DAYS: Final = 28  # chosen: without a batch, before the last of the fleet's
+LITTLE_ANSWERED: Final = 0.5  # chosen: of a vehicle's batches
+MOST_SLOPES: Final = 400  # in a chart: the steepest either way
+MOST_FAILURES: Final = 200  # in the table; all are in report.json
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Something of one vehicle that a person should look at."""
+
+    vehicle: str
+    what: str
+    told: str
+    advice: str
+    has_page: bool = True
+
+
+def looks_of(fleet: Fleet) -> list[Look]:
+    """What wants a look: sensors that are bad first, then drift, silence, few answers and logs that failed."""
+    return [
+        *(_bad(vehicle, n) for vehicle in fleet.vehicles for n in range(len(vehicle.bad_sensors))),
+        *sorted(_drifts(fleet), key=lambda look: look.what),
+        *(Look(name, "no batch", "the data set has no batch of it", "see the logs that failed", False)
+          for name in fleet.without_batches),
+        *_silent(fleet),
+        *_little_answered(fleet),
+        *_failing(fleet),
+    ]  # fmt: skip
+
+
+def fleet_sections(fleet: Fleet, looks: Sequence[Look]) -> list[Section]:
+    """The whole page."""
+    failed = [_failed(fleet)] if fleet.failures else []
+    return [_look_section(looks), _vehicles(fleet), _loads(fleet), _refusals(fleet), _drift(fleet), *failed, _how()]
+
+
+def _bad(vehicle: Vehicle, n: int) -> Look:
+    trouble = vehicle.bad_sensors[n]
+    return Look(vehicle.name, f"sensor: {trouble.reason}", trouble_told(trouble), reason_told(trouble.reason)[1])
+
+
+def _drifts(fleet: Fleet) -> Iterator[Look]:
+    for vehicle in fleet.vehicles:
+        for name, drift in vehicle.believed_drifts.items():
+            yield _drifting(vehicle, name, drift)
+
+
+def _drifting(vehicle: Vehicle, name: str, drift: Drift) -> Look:
+    advice = (
+        "look for wear; calibrate again where it is repaired"
+        if name in OF_VEHICLE
+        else "look for a changed tyre, spring or sensor mount; calibrate anew"
+    )
+    return Look(vehicle.name, f"drift: {NAMES[name]}", drift_told(drift), advice)
+
+
+def _silent(fleet: Fleet) -> Iterator[Look]:
+    since = fleet.last - timedelta(days=SILENT_DAYS)
+    for vehicle in fleet.vehicles:
+        if vehicle.last < since:
+            yield Look(
+                vehicle.name, "silent", f"its last batch is of {vehicle.last}", "is it parked, or its logs lost?"
+            )
+
+
+def _little_answered(fleet: Fleet) -> Iterator[Look]:
+    for vehicle in fleet.vehicles:
+        if vehicle.n_answered < LITTLE_ANSWERED * vehicle.n:
+            reason, n = max(vehicle.n_refused.items(), key=lambda one: one[1])
+            told = f"{percent(vehicle.n_answered, vehicle.n)} of {whole(vehicle.n)} batches; {whole(n)} were {reason}"
+            yield Look(vehicle.name, "few answers", told, reason_told(reason)[1])
+
+
+def _failing(fleet: Fleet) -> Iterator[Look]:
+    with_page = {vehicle.name for vehicle in fleet.vehicles}
+    for name, n in sorted(Counter(failure.vehicle for failure in fleet.failures).items()):
+        yield Look(name, "logs failed", f"{whole(n)}, told below", "mend or remove them", name in with_page)
+
+
+def _look_section(looks: Sequence[Look]) -> Section:
+    rows = tuple((_name(look.vehicle, look.has_page), look.what, look.told, look.advice) for look in looks)
+    table = Table("What wants a look", ("Vehicle", "what", "as found", "what to do"), rows)
+    return Section("look", "What wants a look", () if rows else ("Nothing does.",), (), (table,) if rows else ())
+
+
+def _name(vehicle: str, has_page: bool = True) -> Link | str:
+    return Link(vehicle, f"vehicles/{page_of(vehicle)}") if has_page else vehicle
+
+
+def _vehicles(fleet: Fleet) -> Section:
+    rows = tuple(_vehicle_row(vehicle) for vehicle in fleet.vehicles)
+    columns = ("Vehicle", "batches", "answered", "last answered week: mean load (95 %)", "over a limit",
+               "refused most for", "drifts", "bad sensors", "from", "to")  # fmt: skip
+    text = "Batches are all that the data set holds; a vehicle's page has its weeks, reasons and parameters."
+    return Section("vehicles", "Vehicles", (text,), (), (Table("Every vehicle", columns, rows),))
+
+
+def _vehicle_row(vehicle: Vehicle) -> tuple[Link | str, ...]:
+    weeks, known = vehicle.weeks, np.flatnonzero(vehicle.weeks.n_answered)
+    most = max(vehicle.n_refused.items(), key=lambda one: one[1], default=None)
+    last = NONE
+    if known.size:
+        k = known[-1]
+        load = kg(weeks.payload_mean_kg[k], weeks.payload_low_kg[k], weeks.payload_high_kg[k])
+        last = f"{load}, n = {whole(int(weeks.n_answered[k]))}"
+    return (
+        _name(vehicle.name),
+        whole(vehicle.n),
+        percent(vehicle.n_answered, vehicle.n),
+        last,
+        percent(vehicle.n_over_limit, vehicle.n_answered),
+        f"{most[0]}, n = {whole(most[1])}" if most else NONE,
+        str(len(vehicle.believed_drifts)),
+        str(len(vehicle.bad_sensors)),
+        str(vehicle.first),
+        str(vehicle.last),
+    )
+
+
+def _loads(fleet: Fleet) -> Section:
+    means: dict[int, list[float]] = {}
+    for vehicle in fleet.vehicles:
+        answered = vehicle.weeks.n_answered > 0
+        for week, mean in zip(vehicle.weeks.number[answered], vehicle.weeks.payload_mean_kg[answered], strict=True):
+            means.setdefault(int(week), []).append(float(mean))
+    number = np.array(sorted(means), dtype=np.int64)
+    if number.size == 0:
+        return Section("loads", "Loads over time", ("No batch was answered.",))
+    low, middle, high = np.array([np.quantile(means[week], [0.25, 0.5, 0.75]) for week in number.tolist()]).T
+    counts = [len(means[week]) for week in number.tolist()]
+    axis, x = time_axis(number.tolist()), number.astype(float)
+    runs = list(runs_of(np.isfinite(middle), number))
+    marks: tuple[Mark, ...] = (
+        *(Ribbon(x[run], low[run], high[run], "middle half of the vehicles") for run in runs),
+        *(Line(x[run], middle[run], "median of the vehicles") for run in runs),
+    )
+    chart = Chart(
+        "loads",
+        f"Weekly mean loads of the vehicles, and how many vehicles had an answer that week ({min(counts)} to "
+        f"{max(counts)} of {len(fleet.vehicles)}). {whole(fleet.n_answered)} batches.",
+        "Median and middle half over the vehicles of each one's weekly mean load, and the number of vehicles by week.",
+        (
+            Panel(axis, Axis("load [kg]"), marks, "Weekly mean loads"),
+            Panel(axis, Axis("vehicles"), (Line(x, np.array(counts, dtype=float), "vehicles", 7),), "With an answer"),
+        ),
+    )
+    return Section("loads", "Loads over time", (), (chart,))
+
+
+def _refusals(fleet: Fleet) -> Section:
+    by_week: dict[int, Counter[str]] = {}
+    for vehicle in fleet.vehicles:
+        weeks = vehicle.weeks
+        for k, week in enumerate(weeks.number.tolist()):
+            counts = by_week.setdefault(week, Counter())
+            counts["n"] += int(weeks.n[k])
+            counts.update({str(cause): int(refused[k]) for cause, refused in weeks.n_refused_by.items()})
+    number = sorted(by_week)
+    x, n = np.array(number, dtype=float), np.array([by_week[week]["n"] for week in number])
+    lines = tuple(
+        Points(x, 100.0 * np.array([by_week[week][cause] for week in number]) / n, str(cause), k)
+        for k, cause in enumerate(Cause)
+        if any(by_week[week][cause] for week in number)
+    )
+    chart = Chart(
+        "refused",
+        f"Share of each week's batches that were refused, by where the reason lies; {whole(fleet.n)} batches.",
+        "Share of all batches refused in each week, by cause; the table below holds the sums.",
+        (Panel(time_axis(number), Axis("refused [%]"), lines),),
+        1,
+    )
+    total: Counter[str] = Counter()
+    vehicles: Counter[str] = Counter()
+    for vehicle in fleet.vehicles:
+        total.update(vehicle.n_refused)
+        vehicles.update(reason for reason, times in vehicle.n_refused.items() if times)
+    rows = tuple(
+        (reason, whole(times), percent(times, fleet.n), whole(vehicles[reason]), *reason_told(reason))
+        for reason, times in total.most_common()
+    )
+    columns = ("Reason", "batches", "share", "vehicles", "what happened", "what to do")
+    n_refused = fleet.n - fleet.n_answered
+    text = (
+        f"{whole(n_refused)} of {whole(fleet.n)} batches were refused ({percent(n_refused, fleet.n)}). A batch with "
+        "several reasons stands with each of them."
+    )
+    table = (Table("Refused batches by reason", columns, rows),) if rows else ()
+    return Section("refused", "Refusals", (text,), (chart,) if lines else (), table)
+
+
+def _drift(fleet: Fleet) -> Section:
+    panels = tuple(panel for name in DRIFTING if (panel := _drift_panel(fleet, name)) is not None)
+    n = sum(len(vehicle.drifts) for vehicle in fleet.vehicles)
+    n_believed = sum(len(vehicle.believed_drifts) for vehicle in fleet.vehicles)
+    if not panels:
+        return Section("drift", "Drift", ("No vehicle has weeks enough since its calibration to tell a drift.",))
+    text = (
+        f"{whole(n)} slopes of {whole(len(fleet.vehicles))} vehicles, {whole(n_believed)} of them believed. At most "
+        f"{100 * FALSE_SHARE:g} % of the believed are expected to be there by chance. With twenty vehicles or more "
+        "the median movement of the fleet, such as the seasons make, is taken off first."
+    )
+    chart = Chart(
+        "drift",
+        f"Slope of each vehicle with its 95 % interval, in order; of more than {MOST_SLOPES} the steepest either way.",
+        "Slopes of every parameter by vehicle in order of steepness, with intervals; believed ones stand out.",
+        panels,
+        2,
+        260,
+    )
+    return Section("drift", "Drift", (text,), (chart,))
+
+
+def _drift_panel(fleet: Fleet, name: str) -> Panel | None:
+    told = sorted(
+        ((vehicle.drifts[name], vehicle.name) for vehicle in fleet.vehicles if name in vehicle.drifts),
+        key=lambda one: one[0].judged.slope,
+    )
+    if not told:
+        return None
+    half = MOST_SLOPES // 2
+    shown = told if len(told) <= MOST_SLOPES else [*told[:half], *told[-half:]]
+    marks: list[Mark] = []
+    for is_believed, label, colour in ((False, "not believed", 7), (True, "believed", 1)):
+        chosen = [(k, drift, vehicle) for k, (drift, vehicle) in enumerate(shown) if drift.is_believed is is_believed]
+        if chosen:
+            at = np.array([float(k) for k, _, _ in chosen])
+            slopes, low, high = np.array([[d.judged.slope, d.judged.low, d.judged.high] for _, d, _ in chosen]).T
+            names = tuple(f"{vehicle}, {drift.judged.n} weeks" for _, drift, vehicle in chosen)
+            marks.append(Points(at, slopes, label, colour, "circle", low, high, names))
+    return Panel(Axis("vehicles"), Axis("a year"), tuple(marks), NAMES[name])
+
+
+def _failed(fleet: Fleet) -> Section:
+    rows = tuple((one.vehicle, one.month, one.log or "every log", one.reason) for one in fleet.failures[:MOST_FAILURES])
+    more = len(fleet.failures) - len(rows)
+    text = f"{whole(len(fleet.failures))} logs or months gave nothing. No figure of this report holds them."
+    paragraphs = (text, *((f"{whole(more)} more stand in report.json.",) if more else ()))
+    table = Table("What could not be read", ("Vehicle", "month", "log", "why"), rows)
+    return Section("failed", "Logs that failed", paragraphs, (), (table,))
+
+
+def _how() -> Section:
+    return Section(
+        "how",
+        "How to read it",
+        (
+            "Only what a receipt of the data set vouches for is counted. Unknown is a dash, never 0. Weeks are UTC and "
+            "begin on Monday; every figure says of how many batches, weeks or vehicles it is.",
+            "docs/archive.md tells how each figure is made.",
+        ),
+    )
