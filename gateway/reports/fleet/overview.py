@@ -15,8 +15,10 @@ from gateway.reports.charts import Axis, Chart, Line, Link, Mark, Panel, Points,
 from gateway.reports.fleet.text import (
     NAMES,
     NONE,
+    day,
     drift_told,
     kg,
+    over_limit,
     page_of,
     percent,
     time_axis,
@@ -118,7 +120,10 @@ def _vehicles(fleet: Fleet) -> Section:
     rows = tuple(_vehicle_row(vehicle) for vehicle in fleet.vehicles)
     columns = ("Vehicle", "batches", "answered", "last answered week: mean load (95 %)", "over a limit",
                "refused most for", "drifts", "bad sensors", "from", "to")  # fmt: skip
-    text = "Batches are all that the data set holds; a vehicle's page has its weeks, reasons and parameters."
+    text = (
+        "Batches are all that the data set holds; a vehicle's page has its weeks, reasons and parameters. A dash under "
+        "limits: none was over one, or no limit is known."
+    )
     return Section("vehicles", "Vehicles", (text,), (), (Table("Every vehicle", columns, rows),))
 
 
@@ -135,12 +140,12 @@ def _vehicle_row(vehicle: Vehicle) -> tuple[Link | str, ...]:
         whole(vehicle.n),
         percent(vehicle.n_answered, vehicle.n),
         last,
-        percent(vehicle.n_over_limit, vehicle.n_answered),
+        over_limit(vehicle.n_over_limit, vehicle.n_answered),
         f"{most[0]}, n = {whole(most[1])}" if most else NONE,
         str(len(vehicle.believed_drifts)),
         str(len(vehicle.bad_sensors)),
-        str(vehicle.first),
-        str(vehicle.last),
+        day(vehicle.first),
+        day(vehicle.last),
     )
 
 

@@ -4,6 +4,7 @@ import hashlib
 import math
 import re
 from collections.abc import Sequence
+from datetime import date
 from typing import Final
 
 from gateway.archive.fleet import OF_SENSOR, OF_VEHICLE, Drift, Share, Trend, Trouble, monday_of
@@ -11,6 +12,7 @@ from gateway.reports.charts import Axis
 
 NONE: Final = "–"
 MOST_TICKS: Final = 8
+LEAST_WEEKS_APART: Final = 3  # names that would else lie on one another
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 NAMES: Final = {**OF_VEHICLE, **OF_SENSOR}
 
@@ -43,6 +45,16 @@ def slope(trend: Trend) -> str:
     return f"{trend.slope:+.2g} a year ({trend.low:+.2g} to {trend.high:+.2g})"
 
 
+def day(told: date) -> str:
+    """A date that no line breaks."""
+    return f"{told}".replace("-", "\u2011")
+
+
+def over_limit(n_over: int, n_answered: int) -> str:
+    """A dash for none: it may be that no limit is known."""
+    return percent(n_over, n_answered) if n_over else NONE
+
+
 def share(told: Share) -> str:
     """So many of so many days, and what that may mean."""
     low, high = told.interval95
@@ -66,5 +78,7 @@ def time_axis(weeks: Sequence[int]) -> Axis:
     first, last = min(weeks), max(weeks)
     months = [(number, f"{monday_of(number):%Y-%m}") for number in range(first, last + 1)]
     begun = [one for k, one in enumerate(months) if k == 0 or one[1] != months[k - 1][1]]
+    if len(begun) > 1 and begun[1][0] - begun[0][0] < LEAST_WEEKS_APART:
+        del begun[0]
     every = -(-len(begun) // MOST_TICKS)
     return Axis("week", ticks=tuple((float(number), name) for number, name in begun[::every]))

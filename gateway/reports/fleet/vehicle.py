@@ -13,8 +13,10 @@ from gateway.reports.charts import Axis, Chart, Line, Mark, Panel, Points, Ribbo
 from gateway.reports.fleet.text import (
     NAMES,
     NONE,
+    day,
     drift_told,
     kg,
+    over_limit,
     percent,
     share,
     slope,
@@ -36,7 +38,7 @@ def _loads(vehicle: Vehicle) -> Section:
     weeks = vehicle.weeks
     x = weeks.number.astype(float)
     known = np.isfinite(weeks.payload_mean_kg)
-    notes = tuple(f"week of {day}, n = {n}" for day, n in zip(weeks.mondays, weeks.n_answered.tolist(), strict=True))
+    notes = tuple(f"week of {one}, n = {n}" for one, n in zip(weeks.mondays, weeks.n_answered.tolist(), strict=True))
     marks: list[Mark] = [
         *(
             Ribbon(x[run], weeks.payload_lower_quartile_kg[run], weeks.payload_upper_quartile_kg[run], "middle half")
@@ -55,14 +57,14 @@ def _loads(vehicle: Vehicle) -> Section:
     ]
     rows = tuple(
         (
-            str(day),
+            day(monday),
             whole(int(weeks.n[k])),
             whole(int(weeks.n_answered[k])),
             kg(weeks.payload_mean_kg[k], weeks.payload_low_kg[k], weeks.payload_high_kg[k]),
             _span(weeks.payload_lower_quartile_kg[k], weeks.payload_upper_quartile_kg[k]),
-            percent(int(weeks.n_over_limit[k]), int(weeks.n_answered[k])),
+            over_limit(int(weeks.n_over_limit[k]), int(weeks.n_answered[k])),
         )
-        for k, day in enumerate(weeks.mondays)
+        for k, monday in enumerate(weeks.mondays)
     )
     columns = ("Week of", "batches", "answered", "mean load (95 %)", "middle half", "over a limit")
     chart = Chart(
@@ -77,7 +79,8 @@ def _loads(vehicle: Vehicle) -> Section:
     text = (
         "A week's interval counts in full the error that its batches have in common (calibration, changes of the "
         "vehicle since), and lets what each batch has for itself shrink with their number. Batches that were refused "
-        "are in no mean: if the vehicle is refused more often with some loads than with others, the mean tells less of these."
+        "are in no mean: if some loads are refused more often than others, the mean tells less of these. A dash under "
+        "limits: none was over one, or no limit is known."
     )
     table = Table("Loads by week, UTC, from Monday", columns, rows)
     return Section("loads", "Loads over time", (text,), (chart,), (), (("The numbers", (table,)),))
@@ -151,8 +154,8 @@ def _parameter_panel(vehicle: Vehicle, name: str) -> Panel:
     medians, known = weeks.medians[name], np.isfinite(weeks.medians[name])
     x = weeks.number.astype(float)
     notes = tuple(
-        f"week of {day}, n = {n}"
-        for day, n, is_known in zip(weeks.mondays, weeks.n_medians[name].tolist(), known, strict=True)
+        f"week of {monday}, n = {n}"
+        for monday, n, is_known in zip(weeks.mondays, weeks.n_medians[name].tolist(), known, strict=True)
         if is_known
     )
     marks: list[Mark] = [Points(x[known], medians[known], "weekly median", 0, notes=notes)]
@@ -173,7 +176,7 @@ def _sensors(vehicle: Vehicle) -> Section:
             whole(trouble.n_batches),
             share(trouble.days),
             trouble_told(trouble),
-            f"{trouble.first} to {trouble.last}",
+            f"{day(trouble.first)} to {day(trouble.last)}",
             reason_told(trouble.reason)[1],
         )
         for trouble in vehicle.troubles
@@ -193,7 +196,7 @@ def reason_told(reason: str) -> tuple[str, str]:
     why = known_reason(reason)
     if why is None:
         return NONE, NONE
-    return EXPLANATIONS[why].happened, EXPLANATIONS[why].advice
+    return EXPLANATIONS[why].happened.replace("`", ""), EXPLANATIONS[why].advice.replace("`", "")
 
 
 def runs_of(known: Bool, number: I64) -> Iterator[slice]:
