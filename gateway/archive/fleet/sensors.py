@@ -19,6 +19,7 @@ BAD_DAY_SHARE: Final = (
     0.5  # chosen: of a day's batches that the reason refused; batches of a day are no independent news
 )
 RECENT_DAYS: Final = 14  # chosen: the last days on which the vehicle drove
+LEAST_DAYS: Final = 5  # chosen: fewer are an incident, not a state
 BAD_SHARE: Final = 0.2  # chosen: more bad days than that, surely, is a sensor that is bad
 LEAST_LIKELIHOOD_RATIO: Final = 12.0  # chosen: twice the logarithm, from which a day divides good from bad
 
@@ -50,7 +51,7 @@ class Share:
 
     @property
     def is_surely_bad(self) -> bool:
-        return self.interval95[0] > BAD_SHARE
+        return self.n >= LEAST_DAYS and self.interval95[0] > BAD_SHARE
 
 
 @dataclass(frozen=True, slots=True)

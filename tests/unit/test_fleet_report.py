@@ -1,0 +1,184 @@
+"""springscale fleet-report: what the pages say, that they are whole, and that no name can break out of them."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from support.fleet import DAY_S, MONDAY_S, row, week, write_table
+from support.html_page import Page
+
+from gateway.cli import main, springscale
+from gateway.reports.fleet.text import page_of, time_axis
+from gateway.reports.fleet.vehicle import runs_of
+
+EVIL = "<script>alert(1)</script>\"'&"
+N_WEEKS = 26
+
+
+def run(dataset: Path, output: Path) -> Result:
+    return CliRunner().invoke(springscale, ["fleet-report", str(dataset), "--output", str(output), "--json"])
+
+
+def drifting() -> list[dict[str, Any]]:
+    rng = np.random.default_rng(1)
+    return [
+        one
+        for number in range(N_WEEKS)
+        for one in week(number, damper_front_ratio=1.0 + 0.01 * number + rng.normal(0.0, 0.002), misfit=1.0)
+    ]
+
+
+def failing() -> list[dict[str, Any]]:
+    """Answers for sixty days, then a sensor that is stuck."""
+    return [
+        row(MONDAY_S + day * DAY_S + 300 * k, *(["acceleration_stuck"] if day >= 60 else []))
+        for day in range(80)
+        for k in range(1, 5)
+    ]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """report/ of a data set with a vehicle that drifts, one that fails, one that was silent, one without a batch."""
+    folder = tmp_path_factory.mktemp("fleet")
+    dataset = folder / "dataset"
+    write_table(dataset, "van-1", drifting())
+    write_table(dataset, "van-2", failing())
+    write_table(dataset, "van-3", week(0, 5, "too_slow", EVIL))
+    failure = {"vehicle": "van-4", "month": "2026-01", "log": f"{EVIL}.log", "reason": f"line 1: {EVIL}"}
+    path = dataset / "failed/vehicle=van-4/month=2026-01/job.json"
+    path.parent.mkdir(parents=True)
+    path.write_text(json.dumps(failure))
+    done = run(dataset, folder / "report")
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.output)["report"] == str(folder / "report/report.html")
+    return folder / "report"
+
+
+@pytest.fixture(scope="module")
+def page(made: Path) -> Page:
+    return Page((made / "report.html").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def numbers(made: Path) -> dict[str, Any]:
+    return dict(json.loads((made / "report.json").read_text(encoding="utf-8")))
+
+
+def pages(made: Path) -> list[Path]:
+    return [made / "report.html", *sorted((made / "vehicles").glob("*.html"))]
+
+
+def table(page: Page, first: str) -> list[list[str]]:
+    """The table whose second column is of that name."""
+    return next(one for one in page.tables if one[0][1] == first)
+
+
+def test_what_wants_a_look_is_told_first_and_with_its_numbers(page: Page) -> None:
+    looks = {(look[0], look[1]): look[2] for look in table(page, "what")[1:]}
+    bad = looks["van-2", "sensor: acceleration_stuck"]
+    assert "14 of 14 days (78 to 100 %)" in bad
+    assert "since 2026-03-06" in bad
+    drift = looks["van-1", "drift: front dampers, of the calibrated"]
+    assert drift.startswith("+0.52 a year")
+    assert f"{N_WEEKS} weeks" in drift
+    assert looks["van-3", "few answers"].startswith("0.0 % of 5 batches")
+    assert looks["van-3", "silent"] == "its last batch is of 2026-01-05"
+    assert ("van-4", "no batch") in looks
+    assert looks["van-4", "logs failed"].startswith("1,")
+    assert "sensor" in table(page, "what")[1][1]
+
+
+def test_no_refusal_is_dropped(page: Page, numbers: dict[str, Any]) -> None:
+    refused = {line[0]: line[1:4] for line in next(one for one in page.tables if one[0][0] == "Reason")[1:]}
+    assert refused["acceleration_stuck"] == ["80", "14 %", "1"]
+    assert refused["too_slow"] == ["5", "0.9 %", "1"]
+    assert refused[EVIL][0] == "5"
+    assert numbers["n"] == N_WEEKS * 10 + 320 + 5 == sum(vehicle["n"] for vehicle in numbers["vehicles"])
+    assert numbers["n_answered"] == N_WEEKS * 10 + 240
+
+
+def test_unknown_is_a_dash_on_the_page_and_null_in_json(page: Page, numbers: dict[str, Any]) -> None:
+    line = next(line for line in table(page, "batches") if line[0] == "van-3")
+    assert (line[2], line[3], line[4]) == ("0.0 %", "–", "–")
+    [monday] = numbers["vehicles"][2]["weeks"]
+    assert (monday["n"], monday["n_answered"]) == (5, 0)
+    assert monday["payload_mean_kg"] is None
+    assert monday["payload_mean_interval95_kg"] is None
+    assert monday["medians"]["damper_front_ratio"] is None
+
+
+def test_a_vehicles_page_has_every_week_with_its_number_of_batches(made: Path) -> None:
+    van = Page((made / "vehicles/van-1.html").read_text(encoding="utf-8"))
+    weeks = table(van, "batches")
+    assert len(weeks) == N_WEEKS + 1
+    assert weeks[1][1:5] == ["10", "10", "100 kg (92 to 108)", "100 to 100 kg"]
+    slopes = next(one for one in van.tables if one[0][0] == "Parameter")
+    assert [line[-1] for line in slopes[1:]] == ["yes", "no"]
+
+
+def test_every_page_is_well_formed_and_headings_descend_by_one(made: Path) -> None:
+    for path in pages(made):
+        page = Page(path.read_text(encoding="utf-8"))
+        assert page.open == []
+        assert len(page.ids) == len(set(page.ids))
+        assert page.headings[0] == 1
+        assert all(later <= sooner + 1 for sooner, later in zip(page.headings, page.headings[1:], strict=False))
+        assert all(len(line) == len(one[0]) for one in page.tables for line in one)
+        assert all(len(alt) > 40 for alt in page.alts)
+
+
+def test_all_that_pages_need_lies_beside_them(made: Path) -> None:
+    for path in pages(made):
+        text = path.read_text(encoding="utf-8")
+        page = Page(text)
+        for source in [*page.fetched, *(link for link in page.links if not link.startswith("#"))]:
+            assert not re.match(r"[a-z]+:|//", source)
+            assert (path.parent / source).stat().st_size > 1000
+        assert not re.search(r"https?://|url\(|@import|<link", text)
+
+
+def test_names_cannot_break_out_of_the_page(made: Path) -> None:
+    for path in pages(made):
+        text = path.read_text(encoding="utf-8")
+        assert "<script>alert" not in text
+        assert text.count("<script") == text.count("</script>")
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;&quot;&#x27;&amp;.log" in (made / "report.html").read_text()
+
+
+def test_every_chart_has_its_numbers_and_tables_hold_them_too(made: Path) -> None:
+    for path in pages(made):
+        text = path.read_text(encoding="utf-8")
+        charts = [json.loads(found) for found in re.findall(r'<script type="application/json">(.*?)</script>', text)]
+        assert len(charts) == text.count("<figure")
+        assert all(chart["data"] and "height" in chart["narrow"] for chart in charts)
+    assert '<img src="figures/loads.svg"' in (made / "report.html").read_text()
+
+
+@pytest.mark.parametrize("name", ["van-17", "../../etc/passwd", "a b", "", EVIL, "x" * 300])
+def test_a_vehicles_page_is_a_file_of_its_folder(name: str) -> None:
+    assert re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.html", page_of(name))
+    assert page_of("van-17") == "van-17.html"
+
+
+def test_months_are_named_where_they_begin() -> None:
+    axis = time_axis(range(2922, 2930))  # from 2025-12-29 on
+    assert axis.ticks == ((2923.0, "2026-01"), (2927.0, "2026-02"))
+    assert time_axis([2923]).ticks == ((2923.0, "2026-01"),)
+
+
+def test_a_band_does_not_span_weeks_that_are_unknown() -> None:
+    number = np.array([1, 2, 3, 5, 6, 7])
+    known = np.array([True, True, True, True, False, True])
+    assert list(runs_of(known, number)) == [slice(0, 3), slice(3, 4), slice(5, 6)]
+
+
+def test_a_data_set_that_is_none_ends_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["fleet-report", str(tmp_path), "--output", str(tmp_path / "report")])
+    assert left.value.code == 2
+    assert "holds no receipt" in capsys.readouterr().err
