@@ -22,6 +22,7 @@ _COMMANDS = {
     "estimate": "Weigh from log files, one line per batch.",
     "evaluate": "Compare estimates with known loads: the error table.",
     "fleet-report": "What a fleet's data set tells of each vehicle, as pages.",
+    "line": "Build the line of several vehicles, so that the next one is calibrated by an empty drive.",
     "look": "What an unknown log holds, and a first signal map from it.",
     "record": "Frames on disk: list and fetch those of a service, or record from a bus.",
     "replay": "Send a log to a bus, paced by its time stamps.",
@@ -31,7 +32,7 @@ _COMMANDS = {
     "token": "Make, list and revoke access tokens for other machines.",
     "verification": "Known loads held against what a running service weighed, as dated records.",
 }  # each in the module of its name, or a room of ours
-_ROOMS = {"fleet-report": "archived", "record": "asked", "verification": "asked"}
+_ROOMS = {"fleet-report": "archived", "line": "fleet", "record": "asked", "verification": "asked"}
 
 
 # What a vehicle does without: the extra "workbench", in Debian a package of its own.

@@ -11,7 +11,7 @@ from support.known_runs import LOADS, known_run
 from gateway.calibration.half_car import calibrate_cross_spectrum, fit_cross_spectrum, prior_of
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED
 from gateway.calibration.half_car.prior import Prior
-from gateway.calibration.line import Line, Sister, line_of
+from gateway.calibration.line import Line, Sibling, Sister, line_of, with_siblings_left_out
 from gateway.calibration.line.scatter import SCATTER_STD
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.half_car import HalfCar
@@ -156,3 +156,25 @@ def test_another_model_is_refused(line: Line, change: dict[str, float]) -> None:
 def test_a_calibration_that_says_not_how_much_it_moved_is_refused(known: CrossSpectrumCalibration) -> None:
     with pytest.raises(LineError, match="calibrate it again"):
         line_of([sister("a", replace(known, usual_log_amplitude=None))])
+
+
+def test_siblings_left_out_tell_how_far_intervals_are_widened(known: CrossSpectrumCalibration, line: Line) -> None:
+    other = calibrated(seed=2, car=SIBLING)
+    siblings = [
+        Sibling(sister(name, held), tuple(known_run(i, *load, seed=seed, car=car) for i, load in enumerate(LOADS)))
+        for name, held, seed, car in (("a", known, 1, CAR), ("b", other, 2, SIBLING))
+    ]
+    whole = line_of([one.sister for one in siblings])
+    left_out: list[None] = []
+    tested = with_siblings_left_out(siblings, whole, lambda: left_out.append(None))
+    assert len(left_out) == 2
+    assert 0.0 < tested.payload_rms_kg < 25.0
+    assert 0.0 < tested.front_share_rms_pct < 0.6
+    assert tested.line.limits.payload_inflation >= 1.25
+    assert tested.line.half_car is whole.half_car
+
+
+def test_one_vehicle_alone_cannot_be_left_out(known: CrossSpectrumCalibration, line: Line) -> None:
+    alone = Sibling(sister("a", known), (known_run(1, 0.0, None, seed=1),))
+    with pytest.raises(LineError, match="no sibling can be left out"):
+        with_siblings_left_out([alone], line)

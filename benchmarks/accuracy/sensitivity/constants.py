@@ -61,11 +61,11 @@ CONSTANTS: Final = (
         "amplitudes at which a vehicle with friction is solved",
     ),
     Constant(
-        "MISFIT_MARGIN", "gateway.calibration.half_car.fit", Acts.IN_CALIBRATION,
+        "MISFIT_MARGIN", "gateway.calibration.half_car.left_out", Acts.IN_CALIBRATION,
         "how much worse than in calibration a batch may fit",
     ),
     Constant(
-        "SCORE_MARGIN", "gateway.calibration.half_car.fit", Acts.IN_CALIBRATION,
+        "SCORE_MARGIN", "gateway.calibration.half_car.left_out", Acts.IN_CALIBRATION,
         "how much more like a moved sensor than in calibration it may look",
     ),
     Constant(

@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError
 
 from gateway.calibration.file.calibration_file import CalibrationFile, content_id, load_calibration, read_content
 from gateway.calibration.file.line_part import LinePart
-from gateway.calibration.file.parts import Part
+from gateway.calibration.file.parts import ExpectedErrorsPart, Part
 from gateway.calibration.line import Line, line_of
 from gateway.errors import CalibrationFileError, LineError
 from gateway.files.signed import Read
@@ -36,6 +36,11 @@ class LineFile(Part):
     software: str
     siblings: tuple[SiblingPart, ...] = Field(min_length=1)
     line: LinePart
+    expected_errors: ExpectedErrorsPart | None = Field(
+        None,
+        description="root mean square, of siblings left out in turn, each calibrated by one empty drive of its own and "
+        "what the others tell; null: none was left out",
+    )
     warnings: tuple[str, ...] = ()
 
     @property

@@ -9,7 +9,7 @@ true of loads that calibration has not seen.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import count
 from statistics import fmean
 from typing import Final
@@ -17,26 +17,19 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATION
-from gateway.calibration.half_car.inflation import inflation_of, of_places
 from gateway.calibration.half_car.inherited import Inherited
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
+from gateway.calibration.half_car.left_out import MISFIT_MARGIN, LeftOut, left_out_errors, limits_shown_by
 from gateway.calibration.half_car.most_probable_vehicle import fit_vehicle, seen_by
 from gateway.calibration.half_car.prior import Prior, can_roll, prior_of
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import MOST_TENSION
-from gateway.core.cross_spectrum.located import Located, locate
-from gateway.core.cross_spectrum.measured import cross_spectra_of
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import names_of, upright
-from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 
 LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
-MISFIT_MARGIN: Final = 3.0
-SCORE_MARGIN: Final = 1.5
-"""For other roads and loads than those of calibration. Chosen; `benchmarks.accuracy sensitivity` tells what they do."""
 SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
 UNTESTED: Final = "intervals_untested"
 
@@ -89,33 +82,24 @@ def fit_cross_spectrum(
     untested = calibration if inherited else replace(calibration, warnings=(*calibration.warnings, UNTESTED))
     if not can_leave_out:
         return CrossSpectrumFit(untested, {})
-    errors: list[_LeftOut] = []
+    errors: list[LeftOut] = []
     without: dict[int, CrossSpectrumCalibration] = {}
     for one, others, start in _left_out_in_turn(known, prior, shifts, step):
         without[one.run.number] = taught(others, fit_vehicle(others, prior, [start]))
-        errors.extend(_left_out_errors(one, without[one.run.number]))
+        errors.extend(left_out_errors(one, without[one.run.number]))
         step()
     if not errors:
         return CrossSpectrumFit(untested, {})
-    columns = np.array([astuple(one) for one in errors]).T
-    payload_z, share_z, misfits, payload_kg, share_pct, reach, position_scores, noise_scores, place_z = columns
-    of_payload, of_share = inflation_of(payload_z, reach), inflation_of(share_z, reach)
+    limits = limits_shown_by(errors, calibration.misfit_limit)
 
     def tested(one: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
-        shown = replace(
-            one,
-            payload_inflation=of_payload.within,
-            payload_inflation_per_reach=of_payload.per_reach,
-            front_share_inflation=of_share.within,
-            front_share_inflation_per_reach=of_share.per_reach,
-            most_position_score=max(SCORE, SCORE_MARGIN * float(np.max(position_scores))),
-            most_noise_score=max(SCORE, SCORE_MARGIN * float(np.max(noise_scores))),
-            cg_left_inflation=of_places(place_z[np.isfinite(place_z)]),
-            misfit_limit=max(calibration.misfit_limit, MISFIT_MARGIN * float(np.nanmax([0.0, *misfits]))),
-        )
+        shown = limits.on(one, is_tested=False)
         return inherited.on(shown, is_tested=True) if inherited else shown
 
     tested_without = {number: tested(one) for number, one in without.items()}
+    payload_kg, share_pct = (
+        np.array([getattr(one, name) for one in errors]) for name in ("payload_kg", "front_share_pct")
+    )
     return CrossSpectrumFit(tested(calibration), tested_without, payload_kg, share_pct)
 
 
@@ -182,63 +166,3 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         sensor_left_std_m=vehicle.sensor_offset_left_std_m,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),
     )
-
-
-@dataclass(frozen=True, slots=True)
-class _LeftOut:
-    """A batch of a run that the others weighed: errors in their own standard deviations, errors in kg and percentage
-    points, and how far the load that was found lies beyond the others'. The misfit is NaN where the run itself does,
-    the place's error where nobody noted where the payload lay, or no roll rate tells.
-    """
-
-    payload_z: float
-    front_share_z: float
-    misfit: float
-    payload_kg: float
-    front_share_pct: float
-    reach: float
-    position_score: float
-    noise_score: float
-    place_z: float
-
-
-def _left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) -> list[_LeftOut]:
-    """Every batch of a run that ``calibration`` has not seen."""
-    errors = []
-    truth = one.run.load
-    is_among = beyond(truth, calibration.known_loads, calibration.empty_mass_kg) == 0.0
-    for batch in one.run.batches:
-        spectra = cross_spectra_of([batch], calibration.reading)
-        if spectra is None or batch.rejected:
-            continue
-        located = locate(spectra, calibration)
-        if located.tension > MOST_TENSION:  # the service would refuse it
-            continue
-        reach = beyond(located.point.load, calibration.known_loads, calibration.empty_mass_kg)
-        payload_std_kg, share_std = np.sqrt(np.diag(located.load_covariance))
-        payload_kg = located.point.payload_kg - truth.payload_kg
-        share = located.point.front_share - truth.front_share
-        errors.append(
-            _LeftOut(
-                payload_z=payload_kg / payload_std_kg,
-                front_share_z=share / share_std,
-                misfit=located.misfit if is_among else np.nan,
-                payload_kg=payload_kg,
-                front_share_pct=100.0 * share,
-                reach=reach,
-                position_score=abs(located.scores.position),
-                noise_score=located.scores.noise,
-                place_z=_place_z(one, located),
-            )
-        )
-    return errors
-
-
-def _place_z(one: KnownSpectra, located: Located) -> float:
-    """Error of the centre of gravity's lateral place in its own standard deviations."""
-    run, found = one.run, located.sideways
-    if found is None or (run.payload_kg > 0.0 and run.payload_left_m is None):
-        return np.nan
-    truth_m = one.placed(located.point.theta, 0.0).cg_left_m
-    by_load = found.moves_with_load @ located.load_covariance @ found.moves_with_load
-    return float((found.cg_left_m - truth_m) / np.sqrt(found.variance + by_load))

@@ -1,0 +1,114 @@
+"""springscale line: what several vehicles of one line tell of the next."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from gateway.calibration.build_line import build_line
+from gateway.calibration.campaign import Campaign, file_sha256, load_campaign
+from gateway.calibration.file import CalibrationFile, LineFile, load_calibration, load_like
+from gateway.calibration.known_run import KnownRun
+from gateway.cli.options import FILE, as_json, batch_settings
+from gateway.cli.text.line import line_text
+from gateway.cli.text.progress import Steps, counted
+from gateway.errors import CampaignError, ConfigurationError
+from gateway.offline import inspect
+from gateway.records import json_line
+
+
+@click.group("line")
+def line() -> None:
+    """Build the line of several vehicles, for `calibrate --like`; show one."""
+
+
+@line.command("build")
+@click.argument("files", type=FILE, nargs=-1, required=True)
+@click.option("--output", type=FILE, required=True, help="line file to write")
+@click.option(
+    "--logs",
+    "campaigns",
+    type=FILE,
+    multiple=True,
+    help="campaign that one of FILES was calibrated from; repeatable; each such vehicle is left out in turn",
+)
+@as_json
+def build(files: tuple[Path, ...], output: Path, campaigns: tuple[Path, ...], as_json: bool) -> None:
+    """Make the line of the calibrations FILES, sisters of one model.
+
+    From three on, the scatter between vehicles is estimated. With --logs each vehicle of these campaigns is calibrated
+    once more, by one empty drive and what the others tell, and weighs its other loads: how far intervals are widened
+    comes from there.
+    """
+    _require_place(output)
+    calibrations = [load_calibration(path) for path in files]
+    with counted("reading drives") as on_step:
+        runs = _runs(calibrations, [load_campaign(path) for path in campaigns], on_step)
+    built = _build(calibrations, runs)
+    try:
+        output.write_text(built.to_json(), encoding="utf-8")
+    except OSError as fault:
+        raise ConfigurationError(f"{output}: cannot be written: {fault.strerror}") from None
+    if as_json:
+        left_out = built.expected_errors.model_dump(mode="json") if built.expected_errors else None
+        record: dict[str, object] = {"line_id": built.id, "output": str(output), "members": list(built.line.members)}
+        record |= {"n_siblings": built.line.n_siblings, "expected_errors": left_out, "warnings": list(built.warnings)}
+        click.echo(json_line(record))
+    else:
+        click.echo(f"{output}: {len(built.siblings)} vehicles\n{line_text(built)}")
+
+
+@line.command("show")
+@click.argument("file", type=FILE)
+@as_json
+def show(file: Path, as_json: bool) -> None:
+    """What the line FILE says: its vehicles, the scatter between them, and how far intervals are widened."""
+    held = load_like(file)
+    if not isinstance(held, LineFile):
+        raise ConfigurationError(f"{file}: is the calibration of one vehicle: see `springscale calibration show`")
+    click.echo(json_line({"id": held.id, **held.model_dump(mode="json")}) if as_json else line_text(held))
+
+
+def _build(calibrations: Sequence[CalibrationFile], runs: dict[str, tuple[KnownRun, ...]]) -> LineFile:
+    """A bar telling how many siblings were left out."""
+    done = 0
+    with counted("leaving siblings out") as on_step:
+
+        def on_sibling() -> None:
+            nonlocal done
+            done += 1
+            on_step(done, len(runs))
+
+        return build_line(calibrations, runs, on_sibling)
+
+
+def _runs(
+    calibrations: Sequence[CalibrationFile], campaigns: Sequence[Campaign], on_step: Steps
+) -> dict[str, tuple[KnownRun, ...]]:
+    """By calibration: the drives it was made from."""
+    runs = {}
+    for done, campaign in enumerate(campaigns):
+        made = _made_from(campaign, calibrations)
+        numbers = [run.number for run in made.provenance.runs]
+        inspection = inspect(campaign, batch_settings(None), numbers=numbers)
+        runs[made.id] = tuple(one.identification for one in inspection.usable)
+        on_step(done + 1, len(campaigns))
+    return runs
+
+
+def _made_from(campaign: Campaign, calibrations: Sequence[CalibrationFile]) -> CalibrationFile:
+    sha256 = file_sha256(campaign.path)
+    for one in calibrations:
+        if one.provenance.campaign_sha256 == sha256:
+            return one
+    raise CampaignError(
+        f"{campaign.path}: none of the calibrations was made from this campaign file as it is now: name the campaign "
+        "of each, unchanged since, or leave --logs out"
+    )
+
+
+def _require_place(output: Path) -> None:
+    if output.is_dir():
+        raise click.UsageError(f"--output {output}: is a folder, a file is wanted")
+    if not output.parent.is_dir():
+        raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")

@@ -1,0 +1,131 @@
+"""springscale line build and show, calibrate --like: what they write, what they say, what they refuse."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from support.calibrated import calibration_file
+from support.known_load_logs import write_known_loads
+
+from gateway.calibration.file import load_calibration, load_like
+from gateway.calibration.file.calibration_file import content_id
+from gateway.cli import springscale
+from gateway.errors import ConfigurationError
+
+FAST = ("--estimator", "cross_spectrum", "--window-s", "100")
+
+
+def run(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(springscale, [str(argument) for argument in arguments])
+
+
+def refused(*arguments: str | Path) -> str:
+    """What a person is told who made a mistake."""
+    ended = run(*arguments)
+    if isinstance(ended.exception, ConfigurationError):
+        return str(ended.exception)
+    assert ended.exit_code == 2
+    return ended.output
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Loads in four runs."""
+    return write_known_loads(tmp_path_factory.mktemp("drives"), identification_fraction=1.0)
+
+
+@pytest.fixture(scope="module")
+def sisters(drives: Path) -> list[Path]:
+    """Three calibrations, each of two of the drives; nobody minds that it is one van."""
+    files = []
+    for loaded in ("2", "3", "4"):
+        files.append(drives.parent / f"sister_{loaded}.json")
+        made = run("calibrate", drives, "--runs", f"1,{loaded}", "--output", files[-1], *FAST)
+        assert made.exit_code == 0, made.output
+    return files
+
+
+def test_one_empty_drive_and_a_sister_make_a_calibration(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
+    output = tmp_path / "van.json"
+    made = run("calibrate", drives, "--runs", "1", "--like", sisters[0], "--output", output, "--window-s", "100")
+    assert made.exit_code == 0, made.output
+    assert "inherited from 1 of its line" in made.stdout
+    assert "one_load_only" not in made.stdout
+    assert "warning: ratio_index: " in made.stdout
+    file, sister = load_calibration(output), load_calibration(sisters[0])
+    assert file.line is not None
+    assert file.line.members == (sister.id,)
+    assert file.estimators == ("cross_spectrum",)
+    assert f"--like {sister.id}" in file.provenance.command
+    assert file.seen.payload_kg == sister.seen.payload_kg
+    shown = run("calibration", "show", output).stdout
+    assert sister.id in shown
+    assert {"inherited", "its own"} <= {row[52:].strip() for row in shown.splitlines() if "±" in row}
+    verified = run("calibration", "verify", output, "--logs", drives)
+    assert verified.exit_code == 0
+    assert f"inherited from {sister.id}" in verified.stdout
+    told = run("calibration", "diff", sisters[0], output)
+    assert "line.members: absent -> " in told.stdout
+
+
+def test_a_line_is_built_shown_and_inherited_from(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
+    line, output = tmp_path / "line.json", tmp_path / "van.json"
+    built = run("line", "build", *sisters, "--output", line, "--json")
+    assert built.exit_code == 0, built.output
+    record = json.loads(built.stdout)
+    assert record["members"] == sorted(load_calibration(path).id for path in sisters)
+    assert (record["n_siblings"], record["warnings"]) == (3, ["siblings_not_left_out"])
+    assert load_like(line).id == record["line_id"]
+    shown = run("line", "show", line).stdout
+    assert "estimated from 3 of them" in shown
+    assert "spring_front_npm" in shown
+    made = run("calibrate", drives, "--runs", "1", "--like", line, "--output", output, *FAST)
+    assert made.exit_code == 0, made.output
+    held = load_calibration(output).line
+    assert held is not None
+    assert list(held.members) == record["members"]
+    assert held.n_siblings == 3
+
+
+def test_the_order_of_files_does_not_change_the_line(sisters: list[Path], tmp_path: Path) -> None:
+    for name, files in (("one", sisters), ("other", sisters[::-1])):
+        assert run("line", "build", *files, "--output", tmp_path / name).exit_code == 0
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "other").read_bytes()
+
+
+def test_what_is_no_line_is_refused_with_what_to_do(sisters: list[Path], tmp_path: Path) -> None:
+    ratio_index = tmp_path / "ratio_index.json"
+    ratio_index.write_text(calibration_file().to_json())
+    line, broken, newer = (tmp_path / name for name in ("line.json", "broken.json", "newer.json"))
+    assert run("line", "build", *sisters, "--output", line).exit_code == 0
+    content = json.loads(line.read_text())
+    broken.write_text(json.dumps(content | {"software": "another"}))
+    content["version"] = 2
+    newer.write_text(json.dumps(content | {"id": content_id(content)}))
+    for arguments, said in (
+        (("line", "build", ratio_index, "--output", line), "calibrate it again without --estimator"),
+        (("line", "build", line, "--output", line), "not a springscale calibration file"),
+        (("line", "build", tmp_path / "none.json", "--output", line), "no such calibration file"),
+        (("line", "build", sisters[0], "--output", tmp_path), "is a folder"),
+        (("line", "build", sisters[0], "--output", tmp_path / "no" / "line.json"), "make it first"),
+        (("line", "show", sisters[0]), "springscale calibration show"),
+        (("line", "show", broken), "does not match its id"),
+        (("line", "show", newer), "version 2"),
+    ):
+        assert said in refused(*arguments)
+
+
+def test_logs_that_no_calibration_was_made_from_are_refused(sisters: list[Path], tmp_path: Path) -> None:
+    other = write_known_loads(tmp_path, loads=((0.0, None),), duration_s=30.0)
+    said = refused("line", "build", *sisters, "--logs", other, "--output", tmp_path / "line.json")
+    assert "none of the calibrations was made from this campaign" in said
+
+
+def test_two_line_files_are_refused(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
+    lines = [tmp_path / "a.json", tmp_path / "b.json"]
+    for path, members in zip(lines, (sisters[:1], sisters[1:]), strict=True):
+        assert run("line", "build", *members, "--output", path).exit_code == 0
+    likes = [word for path in lines for word in ("--like", str(path))]
+    said = refused("calibrate", drives, "--runs", "1", *likes, "--output", tmp_path / "van.json", *FAST)
+    assert "two line files" in said
