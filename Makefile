@@ -125,9 +125,9 @@ docs: .venv/.development
 site: .venv/.development
 	$(BIN)/python docs/make_site.py
 
-# --no-emit-*: the lock names no package index, so it serves behind any mirror.
-COMPILE = CUSTOM_COMPILE_COMMAND="make lock" .venv-lock/bin/pip-compile --quiet --generate-hashes --strip-extras \
-	--allow-unsafe --no-annotate --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-emit-options
+# For Linux and Python 3.11 and later; the lock names no package index, so it serves behind any mirror.
+COMPILE = .venv-lock/bin/uv pip compile --quiet --python-platform linux --python-version 3.11 --generate-hashes \
+	--no-annotate --custom-compile-command "make lock, for Python 3.11" --constraint deploy/dist/constraints.txt
 GROUPS = import sys, tomllib; g = tomllib.load(open('pyproject.toml', 'rb'))['dependency-groups']; \
 	print(*(each for name in sys.argv[1:] for each in g[name]), sep='\n')
 
@@ -135,7 +135,7 @@ GROUPS = import sys, tomllib; g = tomllib.load(open('pyproject.toml', 'rb'))['de
 
 lock:
 	$(PYTHON) -m venv .venv-lock
-	.venv-lock/bin/pip install --quiet pip-tools
+	.venv-lock/bin/pip install --quiet uv
 	$(COMPILE) --output-file requirements.txt pyproject.toml
 	$(COMPILE) --extra workbench --constraint requirements.txt --output-file requirements-workbench.txt pyproject.toml
 	$(PYTHON) -c "$(GROUPS)" build | $(COMPILE) --constraint requirements-workbench.txt \
