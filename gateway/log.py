@@ -70,6 +70,7 @@ class Event(StrEnum):
     RECORD_RECOVERED = "frames recorded again"
     RECORD_MENDED = "unfinished block cut off"
     VERIFIED = "verified"
+    TREND_NOT_KEPT = "drift cannot be followed"
     HISTORY_SET_ASIDE = "broken history set aside"
     TARE_SET = "tare set"
     TARE_UNDONE = "tare undone"

@@ -18,8 +18,9 @@ from gateway.log import Event, log_event
 from gateway.service.changes import BatchLog, StateLog
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
-from gateway.service.parts import keeper_of, ring_log_of, source_of, store_of, uplink_of, verification_desk_of
+from gateway.service.parts import keeper_of, ring_log_of, source_of, store_of, uplink_of
 from gateway.service.pipeline import Pipeline
+from gateway.service.proving import Proving
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
 from gateway.service.tare_desk import Subject, TareDesk
@@ -107,7 +108,15 @@ class Gateway:
         )
         self.uplink = uplink_of(forwarding, setup, self.store)
         subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
-        self.verification = verification_desk_of(settings, subject, self.store)
+        self.tare = TareDesk(
+            settings.store.directory,
+            subject,
+            self.pipeline,
+            stale_after_s=settings.web.stale_after_s,
+            on_event=self.store.write_event,
+        )
+        self.proving = Proving(settings.store.directory, settings.verification, subject, self.store, self.tare.zeros)
+        self._beside = tuple(part for part in (self.keeper, self.proving, self.ring_log) if part is not None)
         self.status = StatusReport(
             settings,
             setup,
@@ -117,16 +126,9 @@ class Gateway:
             self.board,
             self.uplink,
             self.ring_log,
-            self.verification.status,
+            self.proving.verification.status,
             around=self.around,
             warnings=self._warnings,
-        )
-        self.tare = TareDesk(
-            settings.store.directory,
-            subject,
-            self.pipeline,
-            stale_after_s=settings.web.stale_after_s,
-            on_event=self.store.write_event,
         )
         app = create_app(
             self.board,
@@ -137,7 +139,8 @@ class Gateway:
             tare=self.tare,
             known_loads=known_loads,
             record=self.ring_log,
-            verification=self.verification,
+            verification=self.proving.verification,
+            trend=self.proving.trend,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = _Server(web)
@@ -155,7 +158,7 @@ class Gateway:
             self.pipeline.roll_rate_fault,
             self.keeper.fault,
             self.ring_log.fault if self.ring_log else None,
-            self.verification.fault,
+            *self.proving.faults,
         )
         return tuple(fault for fault in faults if fault)
 
@@ -199,9 +202,8 @@ class Gateway:
         loop.add_signal_handler(signal.SIGHUP, self._reload_told)
         bus = self._settings.bus
         log_event(Event.STARTED, version=self.status().version, interface=bus.interface, channel=bus.channel)
-        self.keeper.start()
-        if self.ring_log is not None:
-            self.ring_log.start()
+        for part in self._beside:
+            part.start()
         self.source.start()
         self.pipeline.start()
         if self.uplink is not None:
@@ -278,9 +280,8 @@ class Gateway:
         self.source.stop()
         self.around.stop()
         self.pipeline.stop()
-        self.keeper.stop()
-        if self.ring_log is not None:
-            self.ring_log.stop()
+        for part in self._beside:
+            part.stop()
         if self.uplink is not None:
             self.uplink.stop()
         self.board.close()

@@ -6,11 +6,8 @@ from gateway.bus.live import LiveSource, OpenReceiver
 from gateway.bus.ring import RingLimits, RingLog
 from gateway.calibration.kept import Shelf, ShelfLimits
 from gateway.calibration.kept.shelf import FOLDER
-from gateway.calibration.verification_file import VerificationRule
 from gateway.config import BusSection, KeepSection, Settings, StoreSection
 from gateway.service.keeper import BatchKeeper
-from gateway.service.proving.verification_desk import VerificationDesk
-from gateway.service.tare_desk import Subject
 from gateway.setup import Setup
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings
@@ -50,19 +47,6 @@ def store_of(wanted: StoreSection, forwarding: UplinkSettings | None) -> Store:
 def keeper_of(wanted: KeepSection, store: StoreSection, setup: Setup) -> BatchKeeper:
     limits = ShelfLimits(wanted.batches, round(wanted.size_mb * BYTES_PER_MB))
     return BatchKeeper(Shelf(store.directory / FOLDER, limits), setup.signal_map)
-
-
-def verification_desk_of(settings: Settings, subject: Subject, store: Store) -> VerificationDesk:
-    wanted = settings.verification
-    rule = VerificationRule(**wanted.model_dump(exclude={"every_days"}))
-    return VerificationDesk(
-        settings.store.directory,
-        subject,
-        store.reader().estimates,
-        rule,
-        every_days=wanted.every_days,
-        on_event=store.write_event,
-    )
 
 
 def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:

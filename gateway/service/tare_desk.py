@@ -87,6 +87,12 @@ class TareDesk:
             }
         )
 
+    def zeros(self) -> list[tuple[str, float]]:
+        """Every tare of the calibration and estimator in use, ended or not, oldest first: when, and kg taken off."""
+        own = (self._subject.calibration_id, self._subject.estimator)
+        entries = self._history.entries
+        return [(e.at, e.payload_kg) for e in entries if (e.calibration_id, e.estimator) == own]
+
     def tare(self, by: str, note: str | None) -> str:
         """Make the present weighing the zero -> the new entry as JSON. Raises TareRefusedError."""
         with self._lock:

@@ -30,9 +30,11 @@ from gateway.web.routes import (
     KnownLoads,
     NoFrameLog,
     NoTareDesk,
+    NoTrend,
     NoVerificationDesk,
     Scales,
     TareDesk,
+    TrendDesk,
     VerificationDesk,
     api_router,
     export_router,
@@ -45,6 +47,7 @@ from gateway.web.routes import (
     rfms_router,
     spectra_router,
     tare_router,
+    trend_router,
     vehicle_router,
     verification_router,
     vss_router,
@@ -69,6 +72,7 @@ def create_app(
     known_loads: KnownLoads | None = None,
     record: FrameLog | None = None,
     verification: VerificationDesk | None = None,
+    trend: TrendDesk | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the
@@ -105,6 +109,7 @@ def create_app(
     app.include_router(spectra_router(board, calibrated))
     app.include_router(tare_router(tare or NoTareDesk()))
     app.include_router(verification_router(verification or NoVerificationDesk()))
+    app.include_router(trend_router(trend or NoTrend()))
     app.include_router(export_router(reader))
     app.include_router(record_router(record or NoFrameLog()))
     app.include_router(weights_router(board, scales))

@@ -42,6 +42,7 @@ PATHS = [
     "/api/v1/weights/j1939",
     "/api/v1/vss",
     "/api/v1/calibration/tare",
+    "/api/v1/calibration/trend",
     "/api/v1/calibration/verifications",
     "/api/v1/calibration/verifications/{record_id}",
     "/api/v1/record",
@@ -99,7 +100,7 @@ def test_no_path_escapes(schema: BaseSchema) -> None:
 # OpenAPI cannot say that two parameters exclude one another, as rFMS has it.
 EXCLUDED = {"GET /rfms/vehiclestatuses": [positive_data_acceptance]}
 LABELS = [*(f"GET {path}" for path in PATHS), *CHANGES]
-WITHOUT_PARAMETERS = ("latest", "status", "reasons", "vehicle", "vss", "live", "ready", "metrics", "record")
+WITHOUT_PARAMETERS = ("latest", "status", "reasons", "vehicle", "vss", "live", "ready", "metrics", "record", "trend")
 WITHOUT_PARAMETERS += ("GET /api/v1/calibration/tare", "GET /api/v1/calibration/verifications")
 WITH_PARAMETERS = [label for label in LABELS if not label.endswith(WITHOUT_PARAMETERS)]
 

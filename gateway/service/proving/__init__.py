@@ -3,3 +3,7 @@
 A weight that somebody states comes in and is attached to the load epoch of its time, as the store has it; dated records
 go out, kept beside the database as tares are.
 """
+
+from gateway.service.proving.proving import Proving
+
+__all__ = ["Proving"]

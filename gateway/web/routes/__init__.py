@@ -6,10 +6,13 @@ puts together. Here an estimate becomes weights, metrics, and the words of rFMS,
 
 from gateway.web.routes.calibration import (
     NoTareDesk,
+    NoTrend,
     NoVerificationDesk,
     TareDesk,
+    TrendDesk,
     VerificationDesk,
     tare_router,
+    trend_router,
     verification_router,
 )
 from gateway.web.routes.estimates import api_router
@@ -34,9 +37,11 @@ __all__ = [
     "LatestWeights",
     "NoFrameLog",
     "NoTareDesk",
+    "NoTrend",
     "NoVerificationDesk",
     "Scales",
     "TareDesk",
+    "TrendDesk",
     "VerificationDesk",
     "api_router",
     "export_router",
@@ -49,6 +54,7 @@ __all__ = [
     "rfms_router",
     "spectra_router",
     "tare_router",
+    "trend_router",
     "vehicle_router",
     "verification_router",
     "vss_router",

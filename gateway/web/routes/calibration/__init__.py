@@ -5,13 +5,17 @@ thread of its own; its refusals go out as problems with a reason.
 """
 
 from gateway.web.routes.calibration.tare import NoTareDesk, TareDesk, tare_router
+from gateway.web.routes.calibration.trend import NoTrend, TrendDesk, trend_router
 from gateway.web.routes.calibration.verification import NoVerificationDesk, VerificationDesk, verification_router
 
 __all__ = [
     "NoTareDesk",
+    "NoTrend",
     "NoVerificationDesk",
     "TareDesk",
+    "TrendDesk",
     "VerificationDesk",
     "tare_router",
+    "trend_router",
     "verification_router",
 ]

@@ -1,0 +1,149 @@
+"""How a vehicle's own parameters drift over months: what its batches found of them, week by week, and a robust slope.
+
+Each batch finds its dampers and the scale of its delay beside the load (core.cross_spectrum.drift), held near the
+calibration by what the search believes: a real change is larger than what is found of it. Springs are not found
+batch by batch; what they change moves the zero, which each tare tells.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Final, Literal
+
+from pydantic import Field
+from scipy.stats import theilslopes
+
+from gateway.calibration.file.parts import Part
+from gateway.estimate import Estimate
+from gateway.records import Why
+from gateway.units import NS_PER_S
+
+FILE_NAME: Final = "trend.json"
+MOST_WEEKS: Final = 520  # of all calibrations together, the newest
+LEAST_POINTS: Final = {"week": 8, "tare": 5}
+CONFIDENCE: Final = 0.99  # of a change's interval
+DAMPER_CHANGE_PCT: Final = 5.0  # chosen: the search's own belief lets a damper go 3 % (core.cross_spectrum.drift)
+DELAY_CHANGE_PCT: Final = 1.0  # likewise; it believes in 0.3 %
+ZERO_CHANGE_SHARE: Final = 0.01  # of the empty mass; likewise
+
+_FOUND: Final = {"damper_front_ratio": "damper_front", "damper_rear_ratio": "damper_rear", "delay_scale": "delay"}
+
+
+class Week(Part):
+    """The sums of what the batches of one week found, in percent off the calibration."""
+
+    monday: str
+    calibration_id: str
+    n: int
+    sums_pct: dict[str, float]
+
+
+class TrendHistory(Part):
+    """Everything up to ``cursor`` in the store's history, oldest week first."""
+
+    format: Literal["springscale-trend"] = "springscale-trend"
+    version: Literal[1] = 1
+    cursor: str | None = None
+    weeks: tuple[Week, ...] = Field((), max_length=MOST_WEEKS)
+
+    def with_batches(self, estimates: Iterable[Estimate], cursor: str | None) -> "TrendHistory":
+        """With more batches, in any order; those that found no parameters are passed over."""
+        weeks = {(week.monday, week.calibration_id): week for week in self.weeks}
+        for estimate in estimates:
+            if (found := found_pct(estimate)) is None or estimate.calibration_id is None:
+                continue
+            key = (monday_of(estimate.t_end_ns), estimate.calibration_id)
+            before = weeks.get(key, Week(monday=key[0], calibration_id=key[1], n=0, sums_pct={}))
+            sums = {name: before.sums_pct.get(name, 0.0) + pct for name, pct in found.items()}
+            weeks[key] = before.model_copy(update={"n": before.n + 1, "sums_pct": sums})
+        kept = tuple(weeks[key] for key in sorted(weeks))[-MOST_WEEKS:]
+        return self.model_copy(update={"cursor": cursor, "weeks": kept})
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One mean: when, what, and of how many."""
+
+    t: str
+    number: float
+    n: int
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """A parameter's course and its change from the first point to the last; None where there are too few points.
+
+    ``interval99`` is of the change; it drifts where this excludes 0 and the change is not small.
+    """
+
+    name: str
+    unit: str
+    points: tuple[Point, ...]
+    change: float | None = None
+    interval99: tuple[float, float] | None = None
+    is_drifting: bool = False
+
+    def sentence(self) -> str | None:
+        """The warning of one that drifts."""
+        if not self.is_drifting or self.change is None or self.interval99 is None:
+            return None
+        low, high = self.interval99
+        return (
+            f"{self.name.replace('_', ' ')} has drifted by {self.change:+.1f} {self.unit} ({low:+.1f} to {high:+.1f}, "
+            f"99 %) since {self.points[0].t[:10]}: verify with a known load, and look at the vehicle"
+        )
+
+
+def found_pct(estimate: Estimate) -> dict[str, float] | None:
+    """What a batch found of the vehicle, in percent off its calibration; None where it found nothing.
+
+    A vehicle that drifts far is refused as a misfit: what such a batch found counts too.
+    """
+    is_heard = estimate.counted or estimate.rejected == (Why.MODEL_MISFIT,)
+    ratios = {name: estimate.diagnostics.get(key, math.nan) for key, name in _FOUND.items()}
+    if not is_heard or not all(math.isfinite(ratio) and ratio > 0.0 for ratio in ratios.values()):
+        return None
+    return {name: 100.0 * math.log(ratio) for name, ratio in ratios.items()}
+
+
+def monday_of(t_ns: int) -> str:
+    """The week of a stamp, as the date of its Monday."""
+    day = datetime.fromtimestamp(t_ns // NS_PER_S, UTC).date()
+    return (day - timedelta(days=day.weekday())).isoformat()
+
+
+def trends_of(
+    weeks: Sequence[Week], zeros: Sequence[tuple[str, float]], calibration_id: str | None, empty_mass_kg: float
+) -> tuple[Trend, ...]:
+    """Of the calibration in use; ``zeros`` are its tares, when and how much each took off in kg."""
+    own = [week for week in weeks if week.calibration_id == calibration_id and week.n]
+    least = {"damper_front": DAMPER_CHANGE_PCT, "damper_rear": DAMPER_CHANGE_PCT, "delay": DELAY_CHANGE_PCT}
+    found = [
+        trend_of(
+            name,
+            "%",
+            tuple(Point(week.monday, week.sums_pct[name] / week.n, week.n) for week in own if name in week.sums_pct),
+            LEAST_POINTS["week"],
+            least_change,
+        )
+        for name, least_change in least.items()
+    ]
+    tares = tuple(Point(at, payload_kg, 1) for at, payload_kg in zeros)
+    return (*found, trend_of("zero", "kg", tares, LEAST_POINTS["tare"], ZERO_CHANGE_SHARE * empty_mass_kg))
+
+
+def trend_of(name: str, unit: str, points: tuple[Point, ...], least_points: int, least_change: float) -> Trend:
+    """The median of the slopes between any two points, with its interval by Kendall's tau.
+
+    P. K. Sen, J. Am. Stat. Assoc. 63, 1968: a few odd points move it little. Over the span from the first point to the
+    last it is a change.
+    """
+    days = [datetime.fromisoformat(point.t).replace(tzinfo=UTC).timestamp() / 86_400.0 for point in points]
+    if len(points) < least_points or days[-1] <= days[0]:
+        return Trend(name, unit, points)
+    slope, _, low, high = theilslopes([point.number for point in points], days, alpha=CONFIDENCE)
+    span = days[-1] - days[0]
+    change, interval = float(slope) * span, (float(low) * span, float(high) * span)
+    is_clear = interval[0] > 0.0 or interval[1] < 0.0
+    return Trend(name, unit, points, change, interval, is_clear and abs(change) >= least_change)

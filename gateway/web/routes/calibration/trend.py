@@ -1,0 +1,66 @@
+"""/api/v1/calibration/trend: how the vehicle's own parameters have changed since it was calibrated."""
+
+from typing import Final, Literal, Protocol
+
+from fastapi import APIRouter, Request
+from pydantic import BaseModel, Field
+from starlette.responses import Response
+
+from gateway.records import json_line
+from gateway.web.routes.calibration.asking import answered
+
+TREND_PATH: Final = "/calibration/trend"
+
+
+class TrendDesk(Protocol):
+    """Who follows them."""
+
+    def told(self) -> str:
+        """A TrendState."""
+        ...
+
+
+class NoTrend:
+    """Where nobody follows them."""
+
+    def told(self) -> str:
+        """Nothing."""
+        return json_line({"calibration_id": None, "parameters": []})
+
+
+class PointTold(BaseModel):
+    """A week's mean, by the date of its Monday, or one tare."""
+
+    t: str
+    number: float
+    n: int = Field(description="batches in it")
+
+
+class ParameterTrend(BaseModel):
+    """Off the calibration: percent; the zero in kg."""
+
+    name: str = Field(examples=["damper_rear"])
+    unit: Literal["%", "kg"]
+    points: list[PointTold]
+    change: float | None = Field(description="from the first point to the last; null: too few points")
+    interval99: tuple[float, float] | None = Field(description="of the change")
+    is_drifting: bool
+
+
+class TrendState(BaseModel):
+    """Of the calibration in use."""
+
+    calibration_id: str | None
+    parameters: list[ParameterTrend]
+
+
+def trend_router(desk: TrendDesk) -> APIRouter:
+    """The route of the trend."""
+    router = APIRouter(prefix="/api/v1", tags=["calibration"])
+
+    @router.get(TREND_PATH, response_model=TrendState)
+    async def parameter_trend(request: Request) -> Response:
+        """Dampers, the delay's scale and the zero over the months, and whether they drift."""
+        return await answered(request, desk.told)
+
+    return router

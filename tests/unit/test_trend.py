@@ -1,0 +1,152 @@
+"""Parameters that drift: told in time, and not where they only scatter."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.calibrated import calibration_file
+from support.epochs import drive_of, stored
+from support.patience import PATIENCE_S
+
+from gateway.calibration.trend import TrendHistory, Week, found_pct, monday_of, trends_of
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Why
+from gateway.service.proving.trend_keeper import TrendKeeper
+from gateway.service.tare_desk import Subject
+from gateway.units import NS_PER_S
+
+MONDAY_NS = 1_790_035_200 * NS_PER_S  # 2026-09-22 is a Tuesday
+WEEK_NS = 7 * 86_400 * NS_PER_S
+CALIBRATED = calibration_file().for_core()
+
+
+def batch(t_end_ns: int, front: float = 1.0, rear: float = 1.0, *rejected: Why, calibration_id: str = "a") -> Estimate:
+    return Estimate(
+        t_start_ns=t_end_ns - 300 * NS_PER_S,
+        t_end_ns=t_end_ns,
+        estimator="cross_spectrum",
+        calibration_id=calibration_id,
+        rejected=rejected,
+        diagnostics={"damper_front_ratio": front, "damper_rear_ratio": rear, "delay_scale": 1.0},
+    )
+
+
+def weeks(rear_pct: "np.ndarray", calibration_id: str = "a") -> list[Week]:
+    """One mean a week."""
+    return [
+        Week(
+            monday=monday_of(MONDAY_NS + n * WEEK_NS),
+            calibration_id=calibration_id,
+            n=10,
+            sums_pct={"damper_front": 0.0, "damper_rear": 10.0 * float(pct), "delay": 0.0},
+        )
+        for n, pct in enumerate(rear_pct)
+    ]
+
+
+def rear_of(pct: "np.ndarray") -> tuple[bool, str | None]:
+    (trend,) = [one for one in trends_of(weeks(pct), [], "a", 1240.0) if one.name == "damper_rear"]
+    return trend.is_drifting, trend.sentence()
+
+
+def test_a_damper_that_wears_is_told_with_how_much_and_since_when() -> None:
+    wears = -0.5 * np.arange(26) + np.random.default_rng(1).normal(0.0, 1.0, 26)
+    is_drifting, sentence = rear_of(wears)
+    assert is_drifting
+    assert sentence is not None
+    assert sentence.startswith("damper rear has drifted by -1")
+    assert "since 2026-09-2" in sentence
+
+
+def test_a_few_odd_weeks_are_no_drift_and_hide_none() -> None:
+    quiet = np.zeros(26)
+    quiet[[20, 23, 25]] = -30.0
+    assert rear_of(quiet) == (False, None)
+    wears = -0.5 * np.arange(26)
+    wears[[3, 11, 24]] = 30.0
+    assert rear_of(wears)[0]
+
+
+@pytest.mark.parametrize("n_weeks", [0, 1, 7])
+def test_too_few_weeks_tell_nothing(n_weeks: int) -> None:
+    assert rear_of(-3.0 * np.arange(n_weeks)) == (False, None)
+
+
+def test_a_sure_but_small_change_is_no_warning() -> None:
+    assert not rear_of(-0.05 * np.arange(52))[0]
+
+
+def test_scatter_alone_seldom_warns() -> None:
+    """A hundred years of weeks of one vehicle that stays as it is, a year at a time: 2 % of scatter."""
+    rng = np.random.default_rng(2)
+    n_warned = sum(rear_of(rng.normal(0.0, 2.0, 52))[0] for _ in range(100))
+    assert n_warned == 0
+
+
+def test_a_zero_that_creeps_is_told_in_kg() -> None:
+    zeros = [(f"2026-{month:02d}-01T00:00:00.000000Z", 4.0 * month) for month in range(1, 8)]
+    trend = trends_of([], zeros, "a", 1240.0)[-1]
+    assert (trend.name, trend.unit, trend.is_drifting) == ("zero", "kg", True)
+    assert trend.change == pytest.approx(24.0, abs=0.5)
+
+
+def test_another_calibration_begins_anew() -> None:
+    assert all(not one.points for one in trends_of(weeks(-np.arange(20.0)), [], "b", 1240.0))
+
+
+def test_batches_are_gathered_by_week_in_whatever_pieces_they_come() -> None:
+    batches = [batch(MONDAY_NS + n * WEEK_NS // 4, rear=math.exp(0.01 * n)) for n in range(12)]
+    whole = TrendHistory().with_batches(batches, "c")
+    pieces = TrendHistory()
+    for one in batches[::-1]:
+        pieces = pieces.with_batches([one], "c")
+    assert [(week.monday, week.n) for week in whole.weeks] == [(week.monday, week.n) for week in pieces.weeks]
+    assert sum(week.n for week in whole.weeks) == 12
+    assert sum(week.sums_pct["damper_rear"] for week in whole.weeks) == pytest.approx(66.0)
+    assert whole.cursor == "c"
+
+
+def test_what_found_nothing_is_passed_over() -> None:
+    assert found_pct(batch(0, 1.1, 1.0, Why.GAP)) is None
+    assert found_pct(replace(batch(0), diagnostics={})) is None
+    assert found_pct(batch(0, float("nan"))) is None
+    misfit = found_pct(batch(0, 1.1, 1.0, Why.MODEL_MISFIT))  # a vehicle that drifted far is refused so
+    assert misfit is not None
+    assert misfit["damper_front"] == pytest.approx(100.0 * math.log(1.1))
+
+
+def test_the_keeper_goes_on_where_it_was_and_counts_nothing_twice(tmp_path: Path) -> None:
+    store = stored(tmp_path / "store", drive_of(2, 100.0))
+    subject = Subject(CALIBRATED, "cross_spectrum", "van-17")
+    for n in range(3):
+        for i in range(4):
+            one = batch(
+                MONDAY_NS + (4 * n + i) * WEEK_NS, rear=math.exp(-0.02 * (4 * n + i)), calibration_id=CALIBRATED.id
+            )
+            store.write_estimate(estimate_to_json(one))
+        assert store.flush(PATIENCE_S)
+        keeper = TrendKeeper(tmp_path, subject, store.reader().estimates, lambda: [])  # a restart
+        keeper.catch_up()
+        keeper.catch_up()
+    told = json.loads(keeper.told())
+    (rear,) = [one for one in told["parameters"] if one["name"] == "damper_rear"]
+    assert [point["n"] for point in rear["points"]] == [1] * 12
+    assert rear["is_drifting"] is True
+    assert "damper rear has drifted by -22.0 %" in str(keeper.fault)
+    store.close()
+
+
+def test_a_file_that_cannot_be_believed_is_set_aside_and_made_anew(tmp_path: Path) -> None:
+    (tmp_path / "trend.json").write_text("{")
+    store = stored(tmp_path / "store", [batch(MONDAY_NS, calibration_id=CALIBRATED.id)])
+    subject = Subject(CALIBRATED, "cross_spectrum", "van-17")
+    keeper = TrendKeeper(tmp_path, subject, store.reader().estimates, lambda: [])
+    assert "set aside" in str(keeper.fault)
+    keeper.catch_up()
+    assert keeper.fault is None
+    assert json.loads(keeper.told())["parameters"][0]["points"][0]["n"] == 1
+    store.close()
