@@ -95,6 +95,18 @@ def rows_of(dataset: Place, slot: Slot, wanted: Sequence[str] | None = None) -> 
     return rows
 
 
+def table_rows(file: io.BytesIO, where: str) -> list[dict[str, Any]]:
+    """The rows of any Parquet file. Raises ConfigurationError naming ``where`` for what is none."""
+    pa = _pyarrow()
+    import pyarrow.parquet as pq  # noqa: PLC0415 - an extra; _pyarrow() has told if it is missing
+
+    try:
+        rows: list[dict[str, Any]] = pq.read_table(file).to_pylist()
+    except (pa.ArrowException, OSError) as fault:
+        raise ConfigurationError(f"{where}: not a Parquet file: {str(fault).partition(chr(10))[0]}") from None
+    return rows
+
+
 def schema() -> "pa.Schema":
     """The table's schema in Arrow's terms; its version is in the metadata."""
     pa = _pyarrow()

@@ -6,6 +6,7 @@ place.create("a/b.json", b"...")      # False where it is already there: the sto
 
 import functools
 import hashlib
+import os
 import re
 import tempfile
 from collections.abc import Iterator
@@ -53,6 +54,9 @@ class Place:
 
     def at(self, path: str) -> "Place":
         """A folder inside it."""
+        here = self.local(path)
+        if here is not None:
+            return place_of(here)
         return Place(f"{self.url}/{path.strip('/')}") if path.strip("/") else self
 
     def local(self, path: str) -> Path | None:
@@ -147,7 +151,7 @@ def place_of(named: str | Path) -> Place:
     """The place that a person means: a URL or a folder's path. Raises ConfigurationError for another scheme."""
     text = str(named)
     if not _URL.match(text):
-        return Place(Path(text).absolute().as_uri())
+        return Place(Path(os.path.normpath(Path(text).absolute())).as_uri())
     scheme = urlsplit(text).scheme
     if scheme not in SCHEMES:
         raise ConfigurationError(f"{text}: {scheme}:// is not read here; there are {', '.join(SCHEMES)}, and paths")

@@ -71,6 +71,12 @@ def slots_failed(dataset: Place) -> list[Slot]:
     return [slot for slot in _slots(dataset.items(FAILED)) if "-" not in slot.job]
 
 
+def failure_files(dataset: Place) -> list[tuple[Slot, str]]:
+    """Every file that tells of a failure, and of which job."""
+    named = ((_NAME.search(item.path), item.path) for item in dataset.items(FAILED))
+    return [(Slot(one["vehicle"], one["month"], one["job"].partition("-")[0]), path) for one, path in named if one]
+
+
 def trusted_tables(dataset: Place | Path | str, is_wanted: Wanted = every) -> list[str]:
     """The Parquet files that receipts vouch for, as paths or URLs that polars, DuckDB and pyarrow open."""
     place = _place(dataset)

@@ -121,11 +121,17 @@ def entry_of(
 def load_tares(path: Path) -> TareHistory:
     """The history in ``path``, empty where there is none yet. Raises ConfigurationError for a file that is none."""
     try:
-        history = TareHistory.model_validate_json(KeptFiles(path.parent).read(path.name))
+        return history_of(KeptFiles(path.parent).read(path.name), path)
     except FileNotFoundError:
         return TareHistory()
     except OSError as fault:
         raise ConfigurationError(f"{path}: cannot be read: {fault.strerror or fault}") from None
+
+
+def history_of(content: bytes, path: Path | str) -> TareHistory:
+    """What such a file holds. Raises ConfigurationError, naming ``path``, where it cannot be believed."""
+    try:
+        history = TareHistory.model_validate_json(content)
     except ValidationError as fault:
         raise ConfigurationError(f"{describe_faults(path, fault)}: {_MEND}") from None
     changed = [entry.id for entry in history.entries if entry.id != entry.content_id()]

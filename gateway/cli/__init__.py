@@ -26,6 +26,7 @@ _COMMANDS = {
     "look": "What an unknown log holds, and a first signal map from it.",
     "record": "Frames on disk: list and fetch those of a service, or record from a bus.",
     "replay": "Send a log to a bus, paced by its time stamps.",
+    "reprocess": "Weigh a fleet's archive of logs anew, on all cores or a cluster.",
     "reproduce": "Repeat the paper's section 4 in the simulator, as a report.",
     "run": "Run the service.",
     "simulate": "Simulate drives, as log files or onto a bus.",

@@ -65,13 +65,14 @@ class Flow:
 
     def feed(self, motion: Motion) -> Iterator[Estimate]:
         """Estimates and rejections of the batches that end with these rows, provisional ones among them."""
-        return map(self._estimate, self.scheduler.feed(motion))
+        return map(self.weigh, self.scheduler.feed(motion))
 
     def flush(self) -> Iterator[Estimate]:
         """The stream has ended: what the open window still tells."""
-        return map(self._estimate, self.scheduler.flush())
+        return map(self.weigh, self.scheduler.flush())
 
-    def _estimate(self, batch: Batch) -> Estimate:
+    def weigh(self, batch: Batch) -> Estimate:
+        """What a batch of ``scheduler`` taught; they come in order, each once. :meth:`feed` and :meth:`flush` do it."""
         rows = self.scheduler.take_rows()
         shown = self._answer(batch)
         self.on_batch(batch, shown, rows)

@@ -20,6 +20,14 @@ CANDUMP_SUFFIXES: Final = (".log", ".txt", ".candump", "")
 BULK_READERS: Final = {".blf": read_blf, ".mf4": read_mf4}
 
 
+UNMISTAKABLE: Final = frozenset({".log", ".candump", *MESSAGE_SUFFIXES} - {".csv", ".db"})
+
+
+def is_named_as_log(path: Path | str) -> bool:
+    """Whether a file's name alone says that it is a log; .txt, .csv and .db may be anything."""
+    return unpacked_suffix(Path(path)) in UNMISTAKABLE
+
+
 def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames], LogReport]:
     """The map's frames of a log in order of arrival, and a report that fills while they are read.
 

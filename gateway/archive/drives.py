@@ -1,0 +1,121 @@
+"""A job's logs through the pipeline: a drive goes on across the border of two logs where the recording does.
+
+Elsewhere a log begins anew, as a gateway that starts with the ignition, and as `springscale estimate` on that log.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from gateway.archive.jobs import Job, JobLog
+from gateway.archive.places import PlaceError
+from gateway.bus.logs import LogReport, motion_of_log
+from gateway.core.flow import Flow
+from gateway.core.settings import BatchSettings
+from gateway.errors import LogUnreadableError
+from gateway.estimate import Estimate
+from gateway.records import Batch
+from gateway.units import NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class LogRead:
+    """What a log gave: estimates of the batches that ended in it, and its reader's report."""
+
+    estimates: list[Estimate]
+    report: LogReport
+
+
+class Drives:
+    """Takes a job's logs in order."""
+
+    def __init__(self, job: Job) -> None:
+        """Goes on where the logs that lead in have left off."""
+        self._job = job
+        self._open: Flow | None = None  # what the log before has left under way
+        self._lead_in()
+
+    def take(self, one: JobLog, next_ns: int | None) -> LogRead:
+        """The next log; ``next_ns`` is the first frame of the one after it.
+
+        Raises PlaceError where it cannot be reached now, LogUnreadableError where nothing can be made of it; then
+        nothing goes on into the next one.
+        """
+        flow, self._open = self._open or self._flow(), None
+        with one.log.place.fetched(one.log.path) as fetched:
+            if fetched.sha256 != one.facts.sha256:
+                raise PlaceError(f"{one.log.name}: was changed while the archive was read; run again")
+            try:
+                motions, report, _ = motion_of_log(fetched.path, self._job.setup.signal_map)
+                estimates, newest_ns = [], None
+                for motion in motions:
+                    if len(motion):
+                        newest_ns = max(int(motion.t_ns.max()), newest_ns or 0)
+                        estimates += self._weighed(flow, flow.scheduler.feed(motion))
+                report.require_frames()
+            except Exception as fault:
+                raise _of_the_log(fault, one, str(fetched.path)) from fault
+        if goes_on(newest_ns, next_ns, self._job.settings):
+            self._open = flow
+        else:
+            estimates += self._weighed(flow, flow.scheduler.flush())
+        return LogRead(estimates, report)
+
+    def _flow(self) -> Flow:
+        setup, job = self._job.setup, self._job
+        return Flow(job.settings, setup.signal_map.traits, setup.calibrated, setup.estimator, job.identity)
+
+    def _weighed(self, flow: Flow, batches: Iterable[Batch]) -> list[Estimate]:
+        found = []
+        for batch in batches:
+            flow.tare = self._job.tare_at(batch.t_end_ns)
+            found.append(flow.weigh(batch))
+        return found
+
+    def _lead_in(self) -> None:
+        """Leave open what the logs before the job leave open; their own estimates are of the job before."""
+        before, first_ns = readable(self._job.lead_in), next((one.facts.first_ns for one in self._job.logs), None)
+        if not before or not self._leads_on(before[-1], first_ns):
+            return
+        for one, next_ns in followed(before, first_ns):
+            try:
+                self.take(one, next_ns)
+            except LogUnreadableError:  # it is told where it is a job's own
+                continue
+
+    def _leads_on(self, one: JobLog, first_ns: int | None) -> bool:
+        """Whether the last log before the job is under way when it begins. Decoding tells; nothing is weighed."""
+        with one.log.place.fetched(one.log.path) as fetched:
+            try:
+                motions, _, _ = motion_of_log(fetched.path, self._job.setup.signal_map)
+                newest_ns = max((int(motion.t_ns.max()) for motion in motions if len(motion)), default=None)
+            except Exception:  # noqa: BLE001 - a log that cannot be read leads nowhere; it is told where it is a job's own
+                return False
+        return goes_on(newest_ns, first_ns, self._job.settings)
+
+
+def readable(logs: Sequence[JobLog]) -> list[JobLog]:
+    """Those with a frame in them."""
+    return [one for one in logs if one.facts.first_ns is not None]
+
+
+def followed(logs: Sequence[JobLog], next_ns: int | None) -> Iterator[tuple[JobLog, int | None]]:
+    """Each log with the first frame of the one after it; ``next_ns`` is that after the last."""
+    return zip(logs, [*(one.facts.first_ns for one in logs[1:]), next_ns], strict=True)
+
+
+def goes_on(newest_ns: int | None, next_ns: int | None, settings: BatchSettings) -> bool:
+    """Whether a log that ends with a row at ``newest_ns`` and one that begins at ``next_ns`` are one recording."""
+    if newest_ns is None or next_ns is None:
+        return False
+    return -settings.clock_step_s * NS_PER_S <= next_ns - newest_ns <= settings.silence_s * NS_PER_S
+
+
+def _of_the_log(fault: Exception, one: JobLog, path: str) -> Exception:
+    """What a fault while reading means: the place's, to be tried again, or the log's, for good."""
+    if isinstance(fault, MemoryError):
+        return fault
+    if isinstance(fault, OSError) and fault.errno is not None:
+        return PlaceError(f"{one.log.name}: {fault.strerror}")
+    if isinstance(fault, LogUnreadableError):
+        return LogUnreadableError(str(fault).replace(path, one.log.name))
+    return LogUnreadableError(f"{one.log.name}: cannot be read: {fault!r}")

@@ -1,0 +1,171 @@
+"""What an archive holds and what of it is done: the look before the work, and all of it where only that was asked."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from gateway.archive.drives import Drives
+from gateway.archive.jobs import Job, plan
+from gateway.archive.manifest import Manifest
+from gateway.archive.places import Place, PlaceError
+from gateway.archive.receipts import Slot, receipts, slots_done, slots_failed
+from gateway.archive.survey import Facts, LogFile, keep_facts, known_facts, logs_of, survey
+from gateway.errors import ConfigurationError, SpringscaleError
+
+RECEIPTS_ASKED: Final = 20  # for how fast it went before
+WORTH_TIMING: Final = 1_000_000  # bytes of a log
+
+
+@dataclass(slots=True)
+class Inventory:
+    """Every vehicle's logs, and what is known of their content."""
+
+    manifest: Manifest
+    dataset: Place
+    logs: list[list[LogFile]]  # by assignment
+    facts: dict[str, Facts]  # by vehicle
+    lost: dict[str, str] = field(default_factory=dict)  # what could not be reached, and why
+
+    @property
+    def all_logs(self) -> list[LogFile]:
+        """Of all vehicles, each once: a folder may be one vehicle's by one calibration, and later by another."""
+        return list({log.key: log for group in self.logs for log in group}.values())
+
+    @property
+    def size(self) -> int:
+        """Their bytes."""
+        return sum(log.size for log in self.all_logs)
+
+    @property
+    def n_vehicles(self) -> int:
+        """That the manifest names."""
+        return len(self.facts)
+
+    def unknown(self) -> Iterator[tuple[str, list[LogFile]]]:
+        """By vehicle: the logs that nobody has looked into yet."""
+        logs: dict[str, dict[str, LogFile]] = {vehicle: {} for vehicle in self.facts}
+        for assignment, group in zip(self.manifest.assignments, self.logs, strict=True):
+            facts = self.facts[assignment.vehicle]
+            logs[assignment.vehicle] |= {log.key: log for log in group if log.key not in facts}
+        return ((vehicle, list(new.values())) for vehicle, new in logs.items() if new)
+
+    def learn(self, vehicle: str, facts: Facts) -> None:
+        """What was found, kept in the data set for the next run."""
+        self.facts[vehicle] |= facts
+        keep_facts(self.dataset, vehicle, self.facts[vehicle])
+
+    def jobs(self) -> list[Job]:
+        """Of every vehicle of which all is known: without one of its logs a job would be another. Largest first."""
+        found: list[Job] = []
+        for assignment, group in zip(self.manifest.assignments, self.logs, strict=True):
+            facts = self.facts[assignment.vehicle]
+            is_whole = str(assignment.logs) not in self.lost and all(log.key in facts for log in group)
+            if is_whole:
+                found += plan(self.dataset, assignment, group, facts, self.manifest.settings)
+        return sorted(found, key=lambda job: (-job.size, job.slot))
+
+
+def look(manifest: Manifest, dataset: Place) -> Inventory:
+    """List every vehicle's logs. Raises ConfigurationError where there is not one."""
+    lost: dict[str, str] = {}
+    logs: list[list[LogFile]] = []
+    for assignment in manifest.assignments:
+        try:
+            logs.append(logs_of(manifest, assignment))
+        except PlaceError as fault:
+            lost[str(assignment.logs)] = str(fault)
+            logs.append([])
+    vehicles = {assignment.vehicle for assignment in manifest.assignments}
+    facts = {vehicle: known_facts(dataset, vehicle) for vehicle in sorted(vehicles)}
+    if not any(logs) and not lost:
+        folder = manifest.assignments[0].logs if manifest.assignments else "no vehicle"
+        raise ConfigurationError(
+            f"{manifest.where}: not one log in the folders of its vehicles, the first of which is {folder}; "
+            "see logs and pattern there"
+        )
+    return Inventory(manifest, dataset, logs, facts, lost)
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """How much there is to do, and how long it will take; seconds are None where nothing tells them.
+
+    ``n_new_logs`` were never looked into, so that their jobs are not among ``n_jobs`` yet.
+    """
+
+    n_vehicles: int
+    n_logs: int
+    size: int
+    n_new_logs: int
+    n_jobs: int
+    n_done: int
+    n_failed: int
+    size_to_do: int
+    rate: float | None  # bytes a second of one worker
+    n_workers: int
+    is_timed_before: bool  # by receipts; else on one log, just now
+
+    @property
+    def remaining_s(self) -> float | None:
+        """On so many workers."""
+        return 0.0 if not self.size_to_do else self.size_to_do / (self.rate * self.n_workers) if self.rate else None
+
+    def to_json(self) -> dict[str, Any]:
+        """For machines."""
+        told = {
+            name: getattr(self, name) for name in ("n_vehicles", "n_logs", "n_new_logs", "n_jobs", "n_done", "n_failed")
+        }
+        rate = {"bytes_per_s_and_worker": self.rate, "n_workers": self.n_workers, "remaining_s": self.remaining_s}
+        return {**told, "bytes": self.size, "bytes_to_do": self.size_to_do, **rate}
+
+
+def forecast(inventory: Inventory, n_workers: int) -> Forecast:
+    """What a run would do. Nothing is written; without receipts to tell how fast it goes, one log is timed."""
+    dataset, jobs = inventory.dataset, inventory.jobs()
+    done, failed = set(slots_done(dataset)), set(slots_failed(dataset))
+    to_do = [job for job in jobs if job.slot not in done | failed]
+    seen = {one.log.key for job in jobs for one in job.logs}
+    size_to_do = sum(job.size for job in to_do)
+    size_to_do += sum(log.size for log in inventory.all_logs if log.key not in seen)
+    rate = rate_before(dataset, sorted(done))
+    return Forecast(
+        n_vehicles=inventory.n_vehicles,
+        n_logs=len(inventory.all_logs),
+        size=inventory.size,
+        n_new_logs=sum(len(logs) for _, logs in inventory.unknown()),
+        n_jobs=len(jobs),
+        n_done=sum(job.slot in done for job in jobs),
+        n_failed=sum(job.slot in failed for job in jobs),
+        size_to_do=size_to_do,
+        rate=rate or (rate_of_one_log(inventory) if size_to_do else None),
+        n_workers=n_workers,
+        is_timed_before=rate is not None,
+    )
+
+
+def rate_before(dataset: Place, done: list[Slot]) -> float | None:
+    """Bytes a second of one worker, as some receipts tell it; None without any."""
+    asked = set(done[:: max(1, len(done) // RECEIPTS_ASKED)])
+    told = [receipt["run"] for receipt in receipts(dataset, lambda slot: slot in asked)]
+    took_s = sum(run["took_s"] for run in told)
+    return sum(run["bytes"] for run in told) / took_s if took_s > 0.0 else None
+
+
+def rate_of_one_log(inventory: Inventory) -> float | None:
+    """Bytes a second with which one log is surveyed and weighed here; None where it cannot be."""
+    pairs = [(log, i) for i, group in enumerate(inventory.logs) for log in group if log.size]
+    worth = [pair for pair in pairs if pair[0].size >= WORTH_TIMING]
+    if not pairs:
+        return None
+    log, i = min(worth, key=lambda pair: pair[0].size) if worth else max(pairs, key=lambda pair: pair[0].size)
+    begun_s = time.monotonic()
+    facts = survey([log]).facts
+    try:
+        for job in plan(
+            inventory.dataset, inventory.manifest.assignments[i], [log], facts, inventory.manifest.settings
+        ):
+            Drives(job).take(job.logs[0], None)
+    except SpringscaleError:
+        return None
+    return log.size / (time.monotonic() - begun_s)

@@ -1,0 +1,161 @@
+"""Which logs make which jobs: one vehicle's drives of one month in order, by one calibration, named by their inputs.
+
+Where a log goes on where the one before it ended, the drive goes on: its window, its load epoch and its tare. So a job
+begins as the last logs before it leave the pipeline (``lead_in``), and leaves a window open that the next job ends.
+"""
+
+import hashlib
+import json
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from itertools import groupby
+from typing import Any, Final
+
+from gateway.archive.dataset import SCHEMA_VERSION
+from gateway.archive.manifest import FOREVER_NS, Assignment
+from gateway.archive.places import Place
+from gateway.archive.receipts import Slot
+from gateway.archive.software import software
+from gateway.archive.survey import Facts, LogFacts, LogFile
+from gateway.calibration.tare_file import TareHistory
+from gateway.core.flow import Identity
+from gateway.core.settings import BatchSettings
+from gateway.core.tare import Tare
+from gateway.estimate_json import INSTANT
+from gateway.setup import Setup
+from gateway.units import NS_PER_S
+
+LEAD_IN_NS: Final = 25 * 3600 * NS_PER_S
+"""Logs that began so long before a job's first may still be under way in its first drive: a day's log, and an hour."""
+UNKNOWN_MONTH: Final = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class TareSpan:
+    """A tare and when it was in use."""
+
+    tare: Tare
+    since_ns: int
+    until_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class JobLog:
+    """A log of a job: where it lies, what the survey found, and when it begins or, without a frame, belongs."""
+
+    log: LogFile
+    facts: LogFacts
+    start_ns: int
+
+    @property
+    def month(self) -> str:
+        """By which it is filed, UTC."""
+        return f"{datetime.fromtimestamp(self.start_ns // NS_PER_S, UTC):%Y-%m}" if self.start_ns else UNKNOWN_MONTH
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """All that a worker needs, and all that its result follows from.
+
+    ``next_ns`` is the first frame of the log that follows in another job; None where none does.
+    """
+
+    dataset: Place
+    slot: Slot
+    identity: Identity
+    setup: Setup
+    settings: BatchSettings
+    tares: tuple[TareSpan, ...]
+    lead_in: tuple[JobLog, ...]
+    logs: tuple[JobLog, ...]
+    next_ns: int | None
+    inputs: Mapping[str, Any]
+
+    @property
+    def size(self) -> int:
+        """Bytes of its own logs."""
+        return sum(one.log.size for one in self.logs)
+
+    def tare_at(self, t_ns: int) -> Tare | None:
+        """The tare in use when a batch ended."""
+        return next((span.tare for span in reversed(self.tares) if span.since_ns < t_ns <= span.until_ns), None)
+
+
+def plan(
+    dataset: Place, assignment: Assignment, logs: Sequence[LogFile], facts: Facts, settings: BatchSettings
+) -> Iterator[Job]:
+    """The jobs of one assignment, month by month. Logs without facts are left out."""
+    setup = assignment.setup
+    common = {
+        "schema": SCHEMA_VERSION,
+        "software": software(),
+        "vehicle": assignment.vehicle,
+        "vin": assignment.vin,
+        "estimator": setup.estimator,
+        "calibration": setup.calibration.id if setup.calibration else None,
+        "signals": signals_id(setup),
+        "settings": asdict(settings),
+    }
+    identity = Identity(assignment.vehicle, assignment.vin)
+    for month, lead_in, own, next_ns in _months(_in_order(logs, facts, assignment.span_ns)):
+        start_ns, end_ns = (lead_in or own)[0].start_ns, FOREVER_NS if next_ns is None else next_ns
+        tares = _spans(assignment.tares, setup, start_ns, end_ns)
+        inputs = {
+            **common,
+            "tares": [[span.tare.id, span.since_ns, span.until_ns] for span in tares],
+            "lead_in": [one.facts.sha256 for one in lead_in],
+            "logs": [[one.log.name, one.facts.sha256] for one in own],
+            "next_ns": next_ns,
+        }
+        slot = Slot(assignment.vehicle, month, hash_of(inputs))
+        yield Job(dataset, slot, identity, setup, settings, tares, tuple(lead_in), tuple(own), next_ns, inputs)
+
+
+def _months(logs: Sequence[JobLog]) -> Iterator[tuple[str, Sequence[JobLog], Sequence[JobLog], int | None]]:
+    """Month by month: the logs that lead in, those of the month, and when the next one begins."""
+    end = 0
+    for month, group in groupby(logs, key=lambda one: one.month):
+        begin, end = end, end + len(list(group))
+        first = bisect_left(logs, logs[begin].start_ns - LEAD_IN_NS, key=lambda one: one.start_ns)
+        yield month, logs[first:begin], logs[begin:end], logs[end].start_ns if end < len(logs) else None
+
+
+def _in_order(logs: Sequence[LogFile], facts: Facts, span_ns: tuple[int, int]) -> list[JobLog]:
+    """The logs of a span of time by first frame; one without a frame keeps its place among the names."""
+    known = [(log, facts[log.key]) for log in sorted(logs, key=lambda log: log.name) if log.key in facts]
+    start_ns = next((told.first_ns for _, told in known if told.first_ns is not None), 0)
+    found = []
+    for log, told in known:
+        start_ns = start_ns if told.first_ns is None else told.first_ns
+        found.append(JobLog(log, told, start_ns))
+    return sorted((one for one in found if span_ns[0] <= one.start_ns < span_ns[1]), key=lambda one: one.start_ns)
+
+
+def hash_of(inputs: Mapping[str, Any]) -> str:
+    """The same for the same inputs, on any computer: a job's name."""
+    text = json.dumps(inputs, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def signals_id(setup: Setup) -> str:
+    """Hash of what a signal map says, its databases resolved; not of its name or its comments."""
+    held = setup.signal_map
+    content = repr((held.channel, held.j1939, [(m, sorted(m.fields.items())) for m in held.messages]))
+    return "sha256:" + hashlib.sha256(content.encode()).hexdigest()
+
+
+def _spans(history: TareHistory, setup: Setup, start_ns: int, end_ns: int) -> tuple[TareSpan, ...]:
+    """The tares that were in use within a span of time, oldest first: they lie one on the other."""
+    calibration_id = setup.calibration.id if setup.calibration else None
+    spans = (
+        TareSpan(
+            entry.for_core(),
+            INSTANT.read(entry.at),
+            FOREVER_NS if entry.ended is None else INSTANT.read(entry.ended.at),
+        )
+        for entry in history.entries
+        if (entry.calibration_id, entry.estimator) == (calibration_id, setup.estimator)
+    )
+    return tuple(span for span in spans if span.since_ns < end_ns and span.until_ns >= start_ns)

@@ -1,0 +1,256 @@
+"""The manifest of an archive: whose logs lie where, and by which signal map, calibration and tare they are read, when.
+
+TOML, or Parquet with one row for each entry of ``[[vehicles]]``. Paths in it are relative to the manifest, which may
+lie in an object store like everything else.
+"""
+
+import fnmatch
+import io
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime, time
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from gateway.archive.dataset import table_rows
+from gateway.archive.places import Place, place_of
+from gateway.bus.logs import is_named_as_log
+from gateway.calibration.tare_file import TareHistory, history_of
+from gateway.config import BatchSection, EstimatorName
+from gateway.core.settings import BatchSettings
+from gateway.errors import ConfigurationError
+from gateway.setup import Setup, load_setup
+from gateway.toml_file import checked
+from gateway.units import NS_PER_S
+
+NAMES: Final = ("archive.toml", "archive.parquet")  # what a folder's own manifest is called
+FOREVER_NS: Final = (1 << 63) - 1
+
+
+def _instant(told: Any) -> Any:
+    """A day means its first instant, UTC."""
+    if isinstance(told, date) and not isinstance(told, datetime):
+        return datetime.combine(told, time(), UTC)
+    return told
+
+
+Instant = Annotated[AwareDatetime, BeforeValidator(_instant)]
+
+
+class Table(BaseModel):
+    """Of the file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Means(Table):
+    """By what logs are read: at the top for every vehicle, in an entry for this one."""
+
+    signals: str | None = Field(None, description="signal map: a TOML file, or springscale:NAME")
+    calibration: str | None = Field(None, description="calibration file; without it batches carry reasons only")
+    estimator: EstimatorName | None = Field(None, description="which estimator answers [default: the file's first]")
+
+
+class VehicleEntry(Means):
+    """[[vehicles]]: one vehicle, for all time or from one instant to another. Several may be of one vehicle."""
+
+    id: str | None = Field(
+        None, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}$", description="the vehicle's name [default: its VIN]"
+    )
+    vin: str | None = Field(None, pattern=r"^[A-HJ-NPR-Z0-9]{17}$", description="vehicle identification number")
+    logs: str | None = Field(None, description="folder of its logs, below the top's, or a URL [default: its id]")
+    since: Instant | None = Field(None, description="counts for logs that begin then or later; a day, or with a zone")
+    until: Instant | None = Field(None, description="counts for logs that begin earlier than that")
+    tare: str | None = Field(None, description="tare.json of its gateway: each tare counts while it was in use")
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> "VehicleEntry":
+        if self.id is None and self.vin is None:
+            raise ValueError("give id or vin: nothing tells whose logs these are")
+        if self.since and self.until and self.since >= self.until:
+            raise ValueError("since must be before until")
+        return self
+
+    @property
+    def name(self) -> str:
+        """Under which the data set knows the vehicle."""
+        return self.id or self.vin or ""
+
+    def covers(self, other: "VehicleEntry") -> bool:
+        """Whether both count at some instant."""
+        mine, theirs = self.span_ns, other.span_ns
+        return mine[0] < theirs[1] and theirs[0] < mine[1]
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """First instant at which it counts, and the first at which it no longer does."""
+        since_ns = -FOREVER_NS if self.since is None else _ns(self.since)
+        return since_ns, FOREVER_NS if self.until is None else _ns(self.until)
+
+
+class ManifestFile(Means):
+    """The whole file."""
+
+    logs: str = Field(".", description="folder below which the vehicles' folders are, or a URL")
+    pattern: str | None = Field(
+        None, description="which files are logs, e.g. *.txt.gz [default: those whose suffix says so, packed or not]"
+    )
+    batch: BatchSection = BatchSection()
+    vehicles: list[VehicleEntry] | str = Field(description="entries, or the name of a Parquet file of entries")
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """One vehicle's logs for a span of time, and what they are read by."""
+
+    vehicle: str
+    vin: str | None
+    logs: Place
+    shown: str  # of its folder, as the data set names its logs
+    span_ns: tuple[int, int]
+    setup: Setup
+    tares: TareHistory
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """An archive, checked: every signal map, calibration and tare of it could be loaded."""
+
+    where: str
+    assignments: tuple[Assignment, ...]
+    settings: BatchSettings
+    pattern: str | None
+
+    def is_log(self, path: str) -> bool:
+        """Whether a file in a vehicle's folder is one of its logs."""
+        name = path.rpartition("/")[2]
+        if self.pattern is not None:
+            return fnmatch.fnmatchcase(name, self.pattern)
+        return not name.startswith(".") and is_named_as_log(name)
+
+
+def load_manifest(named: str) -> Manifest:
+    """The manifest ``named``, or the one in the folder ``named``. Raises ConfigurationError naming every fault."""
+    base, name, content = _found(named)
+    where = base.local(name) or Path(f"{base.url}/{name}")
+    if name.endswith(".parquet"):
+        told = checked({"vehicles": _entries(content, where)}, where, ManifestFile)
+    else:
+        told = checked(_tables(content, where), where, ManifestFile)
+    entries = told.vehicles
+    if isinstance(entries, str):
+        other = base.local(entries) or Path(f"{base.url}/{entries}")
+        rows = _entries(_read(base, entries), other)
+        entries = checked({"vehicles": rows}, other, _Entries).vehicles
+        where = other
+    _require_distinct(entries, where)
+    load = lru_cache(maxsize=None)(_Loader(base).setup)
+    found = tuple(_assignment(base, told, entry, load, f"{where}: vehicles[{i}]") for i, entry in enumerate(entries, 1))
+    return Manifest(str(where), found, told.batch.for_core(), told.pattern)
+
+
+class _Entries(Table):
+    """A Parquet file of entries."""
+
+    vehicles: list[VehicleEntry]
+
+
+@dataclass(frozen=True)
+class _Loader:
+    """Loads what the manifest names from where the manifest lies."""
+
+    base: Place
+
+    def path(self, named: str) -> Path:
+        """As messages show it; :meth:`read` finds the file by it."""
+        return self.base.local(named) or Path(f"{self.base.url}/{named}")
+
+    def read(self, path: Path) -> bytes:
+        """What a file beside the manifest holds. Raises FileNotFoundError."""
+        if self.base.local("") is not None:
+            return path.read_bytes()
+        return self.base.read(Path(path).relative_to(Path(self.base.url)).as_posix())
+
+    def setup(self, signals: str, calibration: str | None, estimator: str | None) -> Setup:
+        """One for all vehicles that share it."""
+        named = signals if signals.startswith("springscale:") else self.path(signals)
+        return load_setup(named, self.path(calibration) if calibration else None, estimator, read=self.read)
+
+
+def _assignment(base: Place, told: ManifestFile, entry: VehicleEntry, load: Any, where: str) -> Assignment:
+    signals = entry.signals or told.signals
+    if signals is None:
+        raise ConfigurationError(f"{where}.signals: missing; give it here, or at the top for every vehicle")
+    setup = load(signals, entry.calibration or told.calibration, entry.estimator or told.estimator)
+    folder = entry.logs or entry.name
+    tares = history_of(_read(base, entry.tare), f"{base}/{entry.tare}") if entry.tare else TareHistory()
+    place = _below(_below(base, told.logs), folder)
+    return Assignment(entry.name, entry.vin, place, folder.rstrip("/"), entry.span_ns, setup, tares)
+
+
+def _found(named: str) -> tuple[Place, str, bytes]:
+    """Folder, name and content of the manifest."""
+    if named.endswith((".toml", ".parquet")):
+        folder, _, name = named.rpartition("/")
+        base = place_of(folder or (Path("/") if named.startswith("/") else Path()))
+        return base, name, _read(base, name)
+    base = place_of(named)
+    for name in NAMES:
+        try:
+            return base, name, base.read(name)
+        except FileNotFoundError:
+            continue
+    raise ConfigurationError(
+        f"{base}: has neither {' nor '.join(NAMES)}, which tells whose logs lie where; write one, or name yours"
+    )
+
+
+def _read(base: Place, name: str) -> bytes:
+    try:
+        return base.read(name)
+    except FileNotFoundError as fault:
+        raise ConfigurationError(str(fault)) from None
+
+
+def _below(base: Place, named: str) -> Place:
+    """A folder that a manifest names: another place where it is a URL or an absolute path."""
+    return place_of(named) if "://" in named or named.startswith("/") else base.at(_plain(named))
+
+
+def _plain(named: str) -> str:
+    return "" if named in (".", "./") else named.removeprefix("./")
+
+
+def _tables(content: bytes, where: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(content.decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as fault:
+        raise ConfigurationError(f"{where}: not valid TOML: {fault}") from None
+
+
+def _entries(content: bytes, where: Path) -> list[dict[str, Any]]:
+    """Rows of a Parquet file; null is what was not given."""
+    rows = table_rows(io.BytesIO(content), str(where))
+    return [{key: cell for key, cell in row.items() if cell is not None} for row in rows]
+
+
+def _require_distinct(entries: Sequence[VehicleEntry], where: Path) -> None:
+    """No instant of a vehicle, and none of a folder, belongs to two entries."""
+    by_key: dict[str, list[tuple[int, VehicleEntry]]] = {}
+    for i, entry in enumerate(entries, 1):
+        for key in {f"vehicle {entry.name}", f"folder {(entry.logs or entry.name).strip('/')}"}:
+            for j, other in by_key.get(key, []):
+                if entry.covers(other):
+                    raise ConfigurationError(
+                        f"{where}: vehicles[{i}]: {key} is in vehicles[{j}] too, at the same time; "
+                        "part them by since and until"
+                    )
+            by_key.setdefault(key, []).append((i, entry))
+
+
+def _ns(instant: datetime) -> int:
+    return round(instant.timestamp()) * NS_PER_S

@@ -1,0 +1,128 @@
+"""All cores of this computer: an executor of single processes, of which a killed one costs what it was doing.
+
+The standard library's pool of processes breaks as a whole when one of them dies; here each stands alone.
+"""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from multiprocessing.connection import Connection
+from typing import Any, Final, TypeVar
+
+from gateway.errors import SpringscaleError
+
+Answer = TypeVar("Answer")
+
+MOST_DEATHS: Final = 3  # of workers over one job: more, and it is the job that kills them
+ONE_THREAD: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_STARTING: Final = multiprocessing.get_context("spawn")  # a fork would copy the driver's threads and connections
+
+
+class WorkerKilledError(SpringscaleError):
+    """A job's workers die, again and again, without a word."""
+
+
+class Processes(Executor):
+    """As concurrent.futures has executors; a function and its arguments must be importable by name and picklable."""
+
+    def __init__(self, n_workers: int | None = None) -> None:
+        """``n_workers`` processes, or one for each core that this one may use."""
+        self.n_workers = n_workers or len(os.sched_getaffinity(0))
+        self._own = threading.local()
+        self._workers: set[_Worker] = set()
+        self._is_over = False
+        self._threads = ThreadPoolExecutor(self.n_workers, thread_name_prefix="worker")
+
+    def submit(self, fn: Callable[..., Answer], /, *args: Any, **kwargs: Any) -> Future[Answer]:
+        """Have it done by the next free process."""
+        return self._threads.submit(self._done_by_worker, fn, args, kwargs)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End every process; with ``cancel_futures`` at once, whatever it is doing."""
+        if not cancel_futures:
+            self._threads.shutdown(wait=wait)
+        self._is_over = True
+        for worker in list(self._workers):
+            worker.end()
+        self._threads.shutdown(wait=wait, cancel_futures=True)
+
+    def _done_by_worker(self, fn: Callable[..., Answer], args: Any, kwargs: Any) -> Answer:
+        for _ in range(MOST_DEATHS):
+            worker = self._worker()
+            try:
+                is_good, answer = worker.ask((fn, args, kwargs))
+            except (EOFError, OSError):  # the other end is gone
+                self._bury(worker)
+                continue
+            if is_good:
+                result: Answer = answer
+                return result
+            raise answer
+        raise WorkerKilledError(
+            f"{MOST_DEATHS} processes died over it without a word: out of memory, or killed; "
+            "see the system's log, and try fewer workers"
+        )
+
+    def _worker(self) -> "_Worker":
+        """This thread's own process."""
+        worker: _Worker | None = getattr(self._own, "worker", None)
+        if worker is None:
+            if self._is_over:
+                raise WorkerKilledError("the work was stopped")
+            worker = self._own.worker = _Worker()
+            self._workers.add(worker)
+        return worker
+
+    def _bury(self, worker: "_Worker") -> None:
+        self._workers.discard(worker)
+        self._own.worker = None
+        worker.end()
+
+
+class _Worker:
+    """A process that answers one question after the other."""
+
+    def __init__(self) -> None:
+        for name in ONE_THREAD:
+            os.environ.setdefault(name, "1")  # a core has one worker; more threads would only fight for it
+        self._pipe, theirs = _STARTING.Pipe()
+        self._process = _STARTING.Process(target=_answer, args=(theirs,), daemon=True)
+        self._process.start()
+        theirs.close()
+
+    def ask(self, question: Any) -> tuple[bool, Any]:
+        """Whether it went well, and what came of it. Raises EOFError or OSError where the process has died."""
+        self._pipe.send(question)
+        answer: tuple[bool, Any] = self._pipe.recv()
+        return answer
+
+    def end(self) -> None:
+        """At once."""
+        self._process.kill()
+        self._process.join()
+        self._pipe.close()
+
+
+def _answer(pipe: "Connection[Any, Any]") -> None:
+    """What a process does all its life. The driver alone hears Ctrl-C, and ends it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    while True:
+        try:
+            fn, args, kwargs = pipe.recv()
+        except EOFError:
+            return
+        try:
+            answer = (True, fn(*args, **kwargs))
+        except Exception as fault:  # noqa: BLE001 - it belongs to who asked
+            answer = (False, fault)
+        _send(pipe, answer)
+
+
+def _send(pipe: "Connection[Any, Any]", answer: tuple[bool, Any]) -> None:
+    try:
+        pipe.send(answer)
+    except (TypeError, AttributeError, ValueError) as fault:  # what cannot be pickled
+        pipe.send((False, RuntimeError(f"{answer[1]!r} cannot be sent back: {fault}")))

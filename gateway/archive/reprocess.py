@@ -1,0 +1,183 @@
+"""A whole archive: look what there is, plan, do what has no receipt, and tell how it went.
+
+with Processes() as workers:
+    summary = reprocess(load_manifest("fleet/archive.toml"), place_of("DATASET"), workers)
+"""
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from typing import Any
+
+from gateway.archive.inventory import Inventory, look
+from gateway.archive.jobs import Job
+from gateway.archive.manifest import Manifest
+from gateway.archive.places import Place
+from gateway.archive.processes import WorkerKilledError
+from gateway.archive.receipts import Slot, failure_files, slots_done, slots_failed
+from gateway.archive.run import Outcome, Status, fail, run
+from gateway.archive.survey import Facts, LogFile, Surveyed, in_goes, survey
+from gateway.archive.turns import OnProgress, Progress, Workers, done_by
+from gateway.errors import ConfigurationError
+
+
+def unseen(progress: Progress) -> None:
+    """Nobody looks."""
+
+
+@dataclass(slots=True)
+class Summary:
+    """How a run went. ``outcomes`` are of the jobs that it tried; ``n_already`` had a receipt before."""
+
+    n_vehicles: int
+    n_logs: int
+    size: int
+    n_jobs: int
+    n_already: int
+    n_failed_before: int
+    outcomes: list[Outcome] = field(default_factory=list)
+    lost: dict[str, str] = field(default_factory=dict)  # logs and jobs that were not done, and why: try again
+    took_s: float = 0.0
+
+    def count(self, status: Status) -> int:
+        """Jobs of this run that ended so."""
+        return sum(outcome.status is status for outcome in self.outcomes)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Jobs by what became of them."""
+        return {
+            "done": self.count(Status.DONE),
+            "already": self.n_already + self.count(Status.ALREADY),
+            "failed": self.count(Status.FAILED),
+            "failed_before": self.n_failed_before,
+            "lost": self.count(Status.LOST),
+        }
+
+    @property
+    def n_failed_logs(self) -> int:
+        """Logs that this run could make nothing of."""
+        return sum(outcome.n_failed_logs for outcome in self.outcomes)
+
+    @property
+    def is_good(self) -> bool:
+        """Nothing failed in this run, and nothing is left to do."""
+        return not (self.count(Status.FAILED) or self.n_failed_logs or self.lost)
+
+    def to_json(self) -> dict[str, Any]:
+        """For machines."""
+        return {
+            "n_vehicles": self.n_vehicles,
+            "n_logs": self.n_logs,
+            "bytes": self.size,
+            "n_jobs": self.n_jobs,
+            "jobs": self.counts,
+            "n_batches": sum(outcome.n_batches for outcome in self.outcomes),
+            "n_weighed": sum(outcome.n_weighed for outcome in self.outcomes),
+            "n_failed_logs": self.n_failed_logs,
+            "failures": [reason for outcome in self.outcomes for reason in outcome.failures],
+            "lost": self.lost,
+            "took_s": round(self.took_s, 3),
+        }
+
+
+def reprocess(
+    manifest: Manifest,
+    dataset: Place,
+    workers: Workers,
+    on_progress: OnProgress = unseen,
+    *,
+    retry_failed: bool = False,
+) -> Summary:
+    """Do every job of the archive that has no receipt.
+
+    Raises PlaceError where the data set cannot be reached, ConfigurationError where there is no log at all, or where a
+    worker runs another springscale.
+    """
+    begun_s = time.monotonic()
+    inventory = look(manifest, dataset)
+    _survey(inventory, workers, on_progress)
+    jobs = inventory.jobs()
+    done, failed = set(slots_done(dataset)), set(slots_failed(dataset))
+    skipped = done if retry_failed else done | failed
+    to_do = [job for job in jobs if job.slot not in skipped]
+    summary = Summary(
+        n_vehicles=inventory.n_vehicles,
+        n_logs=len(inventory.all_logs),
+        size=inventory.size,
+        n_jobs=len(jobs),
+        n_already=sum(job.slot in done for job in jobs),
+        n_failed_before=sum(job.slot in failed - done for job in jobs),
+        lost=dict(inventory.lost),
+    )
+    _weigh(to_do, workers, summary, on_progress)
+    _retire(dataset, jobs)
+    summary.took_s = time.monotonic() - begun_s
+    return summary
+
+
+def _survey(inventory: Inventory, workers: Workers, on_progress: OnProgress) -> None:
+    """Look into every log that nobody has looked into; each vehicle's findings are kept when it is through."""
+    goes = [(vehicle, go) for vehicle, logs in inventory.unknown() for go in in_goes(logs)]
+    total, done, begun_s = sum(log.size for _, go in goes for log in go), 0, time.monotonic()
+    left = Counter(vehicle for vehicle, _ in goes)
+    found: defaultdict[str, Facts] = defaultdict(dict)
+    for n, ((vehicle, go), answer) in enumerate(done_by(workers, _surveyed, goes), 1):
+        told = _of_survey(go, answer)
+        found[vehicle] |= told.facts
+        inventory.lost |= told.lost
+        left[vehicle] -= 1
+        if not left[vehicle]:
+            inventory.learn(vehicle, found.pop(vehicle))
+        done += sum(log.size for log in go)
+        on_progress(Progress("looking", done, total, n, len(goes), time.monotonic() - begun_s))
+
+
+def _surveyed(go: tuple[str, tuple[LogFile, ...]]) -> Surveyed:
+    return survey(go[1])
+
+
+def _of_survey(go: tuple[LogFile, ...], answer: "Future[Surveyed]") -> Surveyed:
+    try:
+        return answer.result()
+    except Exception as fault:  # noqa: BLE001 - whatever happened to a worker, the other vehicles go on
+        return Surveyed({}, {log.name: str(fault) or repr(fault) for log in go})
+
+
+def _weigh(jobs: Sequence[Job], workers: Workers, summary: Summary, on_progress: OnProgress) -> None:
+    total, done, begun_s = sum(job.size for job in jobs), 0, time.monotonic()
+    for n, (job, answer) in enumerate(done_by(workers, run, jobs), 1):
+        outcome = _outcome(job, answer)
+        summary.outcomes.append(outcome)
+        if outcome.status is Status.LOST:
+            summary.lost[f"{job.slot.folder}/{job.slot.job}"] = outcome.failures[0]
+        done += job.size
+        on_progress(Progress("weighing", done, total, n, len(jobs), time.monotonic() - begun_s))
+
+
+def _outcome(job: Job, answer: "Future[Outcome]") -> Outcome:
+    try:
+        return answer.result()
+    except WorkerKilledError as fault:
+        return fail(job, str(fault))
+    except ConfigurationError:  # nothing would go better elsewhere: a library or another springscale
+        raise
+    except Exception as fault:  # noqa: BLE001 - a store, a cluster or a bug: the other jobs go on, this one is told
+        return Outcome(job.slot, Status.LOST, job.size, failures=(str(fault) or repr(fault),))
+
+
+def _retire(dataset: Place, jobs: Sequence[Job]) -> None:
+    """Take back what stands for a month whose inputs have changed, once all of its new jobs have receipts."""
+    planned: defaultdict[str, set[Slot]] = defaultdict(set)
+    for job in jobs:
+        planned[job.slot.folder].add(job.slot)
+    done = set(slots_done(dataset))
+    whole = {folder for folder, slots in planned.items() if slots <= done}
+    for slot in done:
+        if slot.folder in whole and slot not in planned[slot.folder]:
+            dataset.remove(slot.receipt)
+    for slot, path in failure_files(dataset):
+        if slot.folder in whole and slot.job not in {job.job for job in planned[slot.folder]}:
+            dataset.remove(path)

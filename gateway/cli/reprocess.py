@@ -1,0 +1,70 @@
+"""springscale reprocess: a fleet's archive of logs to a data set of estimates, on all cores or on a cluster."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import click
+
+from gateway.archive.cluster import Cluster, cluster
+from gateway.archive.inventory import forecast, look
+from gateway.archive.manifest import load_manifest
+from gateway.archive.places import place_of
+from gateway.archive.processes import Processes
+from gateway.archive.reprocess import reprocess as reprocess_archive
+from gateway.cli.options import as_json
+from gateway.cli.text.progress import StatusLine
+from gateway.cli.text.reprocess import forecast_in_words, how_far, summary_in_words
+from gateway.records import json_line
+
+
+@click.command("reprocess")
+@click.argument("archive")
+@click.option(
+    "--output", required=True, help="folder of the data set, here or in an object store (s3://, gs://, az://)"
+)
+@click.option("--scheduler", default=None, help="address of a Dask scheduler, tcp://HOST:PORT [default: this computer]")
+@click.option("--workers", type=click.IntRange(1), default=None, help="processes on this computer [default: its cores]")
+@click.option("--dry-run", is_flag=True, help="tell how much there is and how long it will take; write nothing")
+@click.option("--retry-failed", is_flag=True, help="try those jobs again, too, of which nothing could be made")
+@as_json
+def reprocess(
+    archive: str,
+    output: str,
+    scheduler: str | None,
+    workers: int | None,
+    dry_run: bool,
+    retry_failed: bool,
+    as_json: bool,
+) -> None:
+    """Weighs every log of ARCHIVE anew: a manifest (.toml or .parquet), or a folder with an archive.toml in it.
+
+    What has a receipt is not done again, so that a run that was stopped goes on where it was. See docs/archive.md.
+    """
+    if scheduler is not None and workers is not None:
+        raise click.UsageError("give --scheduler ADDRESS or --workers N, not both")
+    dataset, manifest = place_of(output), load_manifest(archive)
+    with _workers(scheduler, workers) as at_work:
+        if dry_run:
+            ahead = forecast(look(manifest, dataset), at_work.n_workers)
+            click.echo(json_line(ahead.to_json()) if as_json else forecast_in_words(ahead))
+            return
+        with StatusLine() as line:
+            summary = reprocess_archive(
+                manifest, dataset, at_work, lambda progress: line.show(how_far(progress)), retry_failed=retry_failed
+            )
+    click.echo(json_line(summary.to_json()) if as_json else summary_in_words(summary, output))
+    if not summary.is_good:
+        sys.exit(1)
+
+
+@contextmanager
+def _workers(scheduler: str | None, n_workers: int | None) -> Iterator[Processes | Cluster]:
+    """Who does the work; stopped at once where the command is."""
+    workers = Processes(n_workers) if scheduler is None else cluster(scheduler)
+    try:
+        yield workers
+    except BaseException:
+        workers.shutdown(wait=False, cancel_futures=True)
+        raise
+    workers.shutdown()

@@ -1,0 +1,84 @@
+"""What `springscale reprocess` says to people: how far, how much, how it went."""
+
+from typing import Final
+
+from gateway.archive.inventory import Forecast
+from gateway.archive.reprocess import Summary
+from gateway.archive.run import Status
+from gateway.archive.turns import Progress
+
+MOST_TOLD: Final = 10  # failures, one line each; the data set has them all
+
+
+def how_far(progress: Progress) -> str:
+    """ "weighing: 12 of 340 jobs, 1.2 of 34.0 GB, 52 MB/s, 11 min left" """
+    pieces = "jobs" if progress.what == "weighing" else "groups of logs"
+    share = f"{progress.n_done} of {progress.n_total} {pieces}, {size(progress.done)} of {size(progress.total)}"
+    left = "" if progress.remaining_s is None else f", {duration(progress.remaining_s)} left"
+    return f"{progress.what}: {share}, {size(progress.rate)}/s{left}"
+
+
+def forecast_in_words(ahead: Forecast) -> str:
+    """What a run would do."""
+    lines = [
+        f"{ahead.n_vehicles} vehicles, {ahead.n_logs} logs, {size(ahead.size)}",
+        f"{ahead.n_jobs} jobs: {ahead.n_done} done, {ahead.n_failed} failed before, "
+        f"{ahead.n_jobs - ahead.n_done - ahead.n_failed} to do",
+    ]
+    if ahead.n_new_logs:
+        lines.append(f"{ahead.n_new_logs} logs were never looked into; which jobs they make is known after that")
+    lines.append(f"to read: {size(ahead.size_to_do)}")
+    if ahead.rate is not None and ahead.remaining_s is not None and ahead.size_to_do:
+        source = "as earlier jobs went" if ahead.is_timed_before else "as one log went just now"
+        lines.append(
+            f"about {duration(ahead.remaining_s)} on {ahead.n_workers} workers, at {size(ahead.rate)}/s each ({source})"
+        )
+    return "\n".join(lines)
+
+
+def summary_in_words(summary: Summary, output: str) -> str:
+    """What a run has done."""
+    batches = sum(outcome.n_batches for outcome in summary.outcomes)
+    weighed = sum(outcome.n_weighed for outcome in summary.outcomes)
+    counts = summary.counts
+    lines = [
+        f"{summary.n_vehicles} vehicles, {summary.n_logs} logs, {size(summary.size)}: {summary.n_jobs} jobs",
+        f"{counts['done']} done now with {batches} batches, {weighed} of them weighed; "
+        f"{counts['already']} were done before",
+        f"took {duration(summary.took_s)}; the data set is in {output}",
+    ]
+    if counts["failed_before"]:
+        lines.append(f"{counts['failed_before']} jobs failed in an earlier run: --retry-failed tries them again")
+    failures = [
+        reason for outcome in summary.outcomes for reason in outcome.failures if outcome.status is not Status.LOST
+    ]
+    if failures:
+        lines.append(f"{counts['failed']} jobs failed, {summary.n_failed_logs} logs could not be read:")
+        lines += _some(failures)
+    if summary.lost:
+        lines.append(f"{len(summary.lost)} were not done; run again to try them:")
+        lines += _some([f"{what}: {why}" for what, why in summary.lost.items()])
+    return "\n".join(lines)
+
+
+def size(n_bytes: float) -> str:
+    """In the unit that suits: 999 B, 1.2 kB, 52.0 MB, ..."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if n_bytes < 1000.0:
+            return f"{n_bytes:.0f} {unit}" if unit == "B" else f"{n_bytes:.1f} {unit}"
+        n_bytes /= 1000.0
+    return f"{n_bytes:.1f} TB"
+
+
+def duration(seconds: float) -> str:
+    """In the unit that suits: 42 s, 11 min, 3.5 h, 2.1 days."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    if seconds < 6000.0:
+        return f"{seconds / 60.0:.0f} min"
+    return f"{seconds / 3600.0:.1f} h" if seconds < 48 * 3600.0 else f"{seconds / 86400.0:.1f} days"
+
+
+def _some(lines: list[str]) -> list[str]:
+    rest = len(lines) - MOST_TOLD
+    return [*(f"  {line}" for line in lines[:MOST_TOLD]), *([f"  and {rest} more"] if rest > 0 else [])]
