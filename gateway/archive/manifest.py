@@ -100,7 +100,8 @@ class ManifestFile(Means):
         None, description="which files are logs, e.g. *.txt.gz [default: those whose suffix says so, packed or not]"
     )
     batch: BatchSection = BatchSection()
-    vehicles: list[VehicleEntry] | str = Field(description="entries, or the name of a Parquet file of entries")
+    vehicles: tuple[VehicleEntry, ...] = Field((), description="one table a vehicle and span of time")
+    vehicles_in: str | None = Field(None, description="a Parquet file of such tables, one row each, in their stead")
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,21 +143,18 @@ def load_manifest(named: str) -> Manifest:
     else:
         told = checked(_tables(content, where), where, ManifestFile)
     entries = told.vehicles
-    if isinstance(entries, str):
-        other = base.local(entries) or Path(f"{base.url}/{entries}")
-        rows = _entries(_read(base, entries), other)
-        entries = checked({"vehicles": rows}, other, _Entries).vehicles
-        where = other
+    if told.vehicles_in is not None:
+        if entries:
+            raise ConfigurationError(f"{where}: vehicles and vehicles_in: give one of them")
+        where = base.local(told.vehicles_in) or Path(f"{base.url}/{told.vehicles_in}")
+        rows = {"vehicles": _entries(_read(base, told.vehicles_in), where)}
+        entries = checked(rows, where, ManifestFile).vehicles
+    if not entries:
+        raise ConfigurationError(f"{where}: names no vehicle; write [[vehicles]] with id or vin for each")
     _require_distinct(entries, where)
     load = lru_cache(maxsize=None)(_Loader(base).setup)
     found = tuple(_assignment(base, told, entry, load, f"{where}: vehicles[{i}]") for i, entry in enumerate(entries, 1))
     return Manifest(str(where), found, told.batch.for_core(), told.pattern)
-
-
-class _Entries(Table):
-    """A Parquet file of entries."""
-
-    vehicles: list[VehicleEntry]
 
 
 @dataclass(frozen=True)

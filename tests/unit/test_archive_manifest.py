@@ -1,0 +1,135 @@
+"""The manifest of an archive: what it may say, and that every fault in it is told with where and how to mend it."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from support.archive import MANIFEST, MIDNIGHT_NS, object_store, uploaded, write_manifest
+
+from gateway.archive import place_of
+from gateway.archive.manifest import FOREVER_NS, load_manifest
+from gateway.errors import ConfigurationError
+
+NOVEMBER = datetime(2026, 11, 1, tzinfo=UTC)
+
+
+def test_a_manifest_maps_folders_to_vehicles_and_shares_what_they_share(tmp_path: Path) -> None:
+    path = write_manifest(tmp_path, "van-1", 'vin = "WF0XXXTTGXJK12345"', 'id = "van-3"\nlogs = "/elsewhere/3"')
+    manifest = load_manifest(str(path))
+    assert manifest.where == load_manifest(str(tmp_path)).where == str(path)
+    assert [one.vehicle for one in manifest.assignments] == ["van-1", "WF0XXXTTGXJK12345", "van-3"]
+    assert [str(one.logs) for one in manifest.assignments] == [
+        str(tmp_path / "van-1"),
+        str(tmp_path / "WF0XXXTTGXJK12345"),
+        "/elsewhere/3",
+    ]
+    assert manifest.assignments[1].vin == "WF0XXXTTGXJK12345"
+    assert manifest.assignments[0].setup is manifest.assignments[2].setup
+    assert (manifest.settings.window_s, manifest.settings.provisional_every_s) == (20.0, 0.0)
+
+
+def test_validity_in_time_is_a_day_or_an_instant(tmp_path: Path) -> None:
+    path = write_manifest(
+        tmp_path, 'id = "v"\nuntil = 2026-11-01', 'id = "v"\nsince = 2026-11-01T00:00:00Z\nestimator = "ratio_index"'
+    )
+    assert [one.span_ns for one in load_manifest(str(path)).assignments] == [
+        (-FOREVER_NS, MIDNIGHT_NS),
+        (MIDNIGHT_NS, FOREVER_NS),
+    ]
+
+
+def test_a_parquet_manifest_says_the_same(tmp_path: Path) -> None:
+    write_manifest(tmp_path)
+    rows = [
+        {"id": "van-1", "since": None, "signals": "springscale:reference", "calibration": "vehicle.json"},
+        {"id": "van-2", "since": NOVEMBER, "signals": "springscale:reference", "calibration": None},
+    ]
+    pq.write_table(pa.Table.from_pylist(rows), tmp_path / "archive.parquet")
+    (tmp_path / "archive.toml").unlink()
+    one, other = load_manifest(str(tmp_path)).assignments
+    assert (one.vehicle, one.span_ns[0], other.span_ns[0]) == ("van-1", -FOREVER_NS, MIDNIGHT_NS)
+    assert one.setup.calibration is not None
+    assert other.setup.calibration is None
+
+
+def test_a_toml_manifest_may_name_a_parquet_file_of_vehicles(tmp_path: Path) -> None:
+    write_manifest(tmp_path)
+    (tmp_path / "archive.toml").write_text('vehicles_in = "fleet.parquet"\n' + MANIFEST)
+    pq.write_table(pa.Table.from_pylist([{"id": "van-1"}, {"id": "van-2"}]), tmp_path / "fleet.parquet")
+    assert [one.vehicle for one in load_manifest(str(tmp_path)).assignments] == ["van-1", "van-2"]
+    pq.write_table(pa.Table.from_pylist([{"id": "van-1", "sinse": "x"}]), tmp_path / "fleet.parquet")
+    with pytest.raises(ConfigurationError, match=r"fleet\.parquet: vehicles\[1\]\.sinse: unknown key"):
+        load_manifest(str(tmp_path))
+
+
+def test_a_manifest_lies_in_an_object_store_with_all_it_names(tmp_path: Path) -> None:
+    write_manifest(tmp_path, "van-1")
+    with object_store() as bucket:
+        uploaded(tmp_path, place_of(f"{bucket}/archive"))
+        [one] = load_manifest(f"{bucket}/archive").assignments
+        assert one.logs.url == f"{bucket}/archive/van-1"
+        assert one.setup.calibration is not None
+        with pytest.raises(ConfigurationError, match=r"s3:.*/nothing: has neither archive\.toml nor archive\.parquet"):
+            load_manifest(f"{bucket}/nothing")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            'signals = "springscale:reference"',
+            r"archive\.toml: names no vehicle; write \[\[vehicles\]\] with id or vin",
+        ),
+        ('vehicles_in = "x"\nvehicles = [{id = "a"}]', r"vehicles and vehicles_in: give one of them"),
+        ("signals = 1\nvehicles = []", r"archive\.toml: signals: Input should be a valid string \(it says 1\)"),
+        ("vehicles = [{}]", r"vehicles\[1\]: give id or vin: nothing tells whose logs these are"),
+        ('vehicles = [{id = "a", vins = "x"}]', r"vehicles\[1\]\.vins: unknown key"),
+        ('vehicles = [{id = "../a"}]', r"vehicles\[1\]\.id: String should match pattern"),
+        ('vehicles = [{id = "a"}]', r"vehicles\[1\]\.signals: missing; give it here, or at the top for every vehicle"),
+        (
+            'vehicles = [{id = "a", since = 2026-11-02, until = 2026-11-01}]',
+            r"vehicles\[1\]: since must be before until",
+        ),
+        ('vehicles = [{id = "a", since = 2026-11-02T10:00:00}]', r"vehicles\[1\]\.since: .*timezone"),
+        (
+            'signals = "springscale:reference"\nvehicles = [{id = "a"}, {id = "a", logs = "b", since = 2026-11-01}]',
+            r"vehicles\[2\]: vehicle a is in vehicles\[1\] too, at the same time; part them by since and until",
+        ),
+        (
+            'signals = "springscale:reference"\nvehicles = [{id = "a"}, {id = "b", logs = "a"}]',
+            r"vehicles\[2\]: folder a is in vehicles\[1\] too",
+        ),
+        ('signals = "none.toml"\nvehicles = [{id = "a"}]', r"none\.toml: no such file"),
+        (
+            'signals = "springscale:reference"\nvehicles = [{id = "a", calibration = "none.json"}]',
+            r"none\.json: no such calibration file",
+        ),
+        (
+            'signals = "springscale:reference"\nvehicles = [{id = "a", tare = "none.json"}]',
+            r"none\.json: no such file",
+        ),
+        ("batch.window_s = 5\nvehicles = []", r"batch\.window_s: 5 is below 20"),
+        ('vehicles_in = "none.parquet"', r"none\.parquet: no such file"),
+        ('vehicles_in = "archive.toml"', r"archive\.toml: not a Parquet file"),
+        ("vehicles = [", r"archive\.toml: not valid TOML"),
+    ],
+)
+def test_a_fault_is_told_with_its_place_and_how_to_mend_it(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "archive.toml").write_text(text)
+    with pytest.raises(ConfigurationError, match=told):
+        load_manifest(str(tmp_path))
+
+
+def test_names_and_pattern_tell_what_is_a_log(tmp_path: Path) -> None:
+    manifest = load_manifest(str(write_manifest(tmp_path, "van-1")))
+    names = ("a.log", "b/c.LOG.gz", "d.mf4", "truth.csv", "notes.txt", ".e.log")
+    assert [name for name in names if manifest.is_log(name)] == [
+        "a.log",
+        "b/c.LOG.gz",
+        "d.mf4",
+    ]
+    manifest = load_manifest(str(write_manifest(tmp_path, "van-1", more='pattern = "*.txt"\n')))
+    assert manifest.is_log("day/1.txt")
+    assert not manifest.is_log("a.log")
