@@ -183,7 +183,10 @@ def _assignment(base: Place, told: ManifestFile, entry: VehicleEntry, load: Any,
     signals = entry.signals or told.signals
     if signals is None:
         raise ConfigurationError(f"{where}.signals: missing; give it here, or at the top for every vehicle")
-    setup = load(signals, entry.calibration or told.calibration, entry.estimator or told.estimator)
+    try:
+        setup = load(signals, entry.calibration or told.calibration, entry.estimator or told.estimator)
+    except ConfigurationError as fault:
+        raise ConfigurationError(f"{where}: {fault}") from None
     folder = entry.logs or entry.name
     tares = history_of(_read(base, entry.tare), f"{base}/{entry.tare}") if entry.tare else TareHistory()
     place = _below(_below(base, told.logs), folder)

@@ -18,7 +18,8 @@ Answer = TypeVar("Answer")
 
 MOST_DEATHS: Final = 3  # of workers over one job: more, and it is the job that kills them
 ONE_THREAD: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-_STARTING: Final = multiprocessing.get_context("spawn")  # a fork would copy the driver's threads and connections
+_STARTING: Final = multiprocessing.get_context("forkserver")  # a plain fork would copy our threads and connections
+_STARTING.set_forkserver_preload(["gateway.archive.run"])  # once for all of them
 
 
 class WorkerKilledError(SpringscaleError):
@@ -34,6 +35,7 @@ class Processes(Executor):
         self._own = threading.local()
         self._workers: set[_Worker] = set()
         self._is_over = False
+        self._lock = threading.Lock()
         self._threads = ThreadPoolExecutor(self.n_workers, thread_name_prefix="worker")
 
     def submit(self, fn: Callable[..., Answer], /, *args: Any, **kwargs: Any) -> Future[Answer]:
@@ -44,9 +46,10 @@ class Processes(Executor):
         """End every process; with ``cancel_futures`` at once, whatever it is doing."""
         if not cancel_futures:
             self._threads.shutdown(wait=wait)
-        self._is_over = True
-        for worker in list(self._workers):
-            worker.end()
+        with self._lock:
+            self._is_over = True
+            for worker in self._workers:
+                worker.end()
         self._threads.shutdown(wait=wait, cancel_futures=True)
 
     def _done_by_worker(self, fn: Callable[..., Answer], args: Any, kwargs: Any) -> Answer:
@@ -70,16 +73,18 @@ class Processes(Executor):
         """This thread's own process."""
         worker: _Worker | None = getattr(self._own, "worker", None)
         if worker is None:
-            if self._is_over:
-                raise WorkerKilledError("the work was stopped")
-            worker = self._own.worker = _Worker()
-            self._workers.add(worker)
+            with self._lock:
+                if self._is_over:
+                    raise WorkerKilledError("the work was stopped")
+                worker = self._own.worker = _Worker()
+                self._workers.add(worker)
         return worker
 
     def _bury(self, worker: "_Worker") -> None:
-        self._workers.discard(worker)
-        self._own.worker = None
-        worker.end()
+        with self._lock:
+            self._workers.discard(worker)
+            self._own.worker = None
+            worker.end()
 
 
 class _Worker:

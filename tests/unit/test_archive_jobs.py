@@ -1,0 +1,163 @@
+"""Which logs make which jobs, and that a job's name is the hash of all that its rows follow from."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.archive import MIDNIGHT_NS, S, write_manifest
+from support.calibrated import calibration_file
+
+from gateway.archive import Place, place_of
+from gateway.archive.jobs import Job, hash_of, plan
+from gateway.archive.manifest import Assignment, Manifest, load_manifest
+from gateway.archive.software import code_id, software
+from gateway.archive.survey import LogFacts, LogFile, in_goes
+from gateway.calibration.tare_file import TareEntry, TareHistory
+from gateway.core.settings import BatchSettings
+from gateway.records import iso_utc
+
+HOUR = 3600 * S
+DATASET = place_of("/dataset")
+
+
+@pytest.fixture(name="manifest")
+def _manifest(tmp_path: Path) -> Manifest:
+    return load_manifest(str(write_manifest(tmp_path, "van")))
+
+
+@pytest.fixture(name="van")
+def _van(manifest: Manifest) -> Assignment:
+    return manifest.assignments[0]
+
+
+def jobs_of(van: Assignment, starts: Sequence[int | None], settings: BatchSettings | None = None) -> list[Job]:
+    """Of logs 0.log, 1.log, ... that begin then; None: without a readable frame."""
+    logs = [LogFile(van.logs, f"{n}.log", f"van/{n}.log", 100, "x") for n in range(len(starts))]
+    facts = {log.key: LogFacts(f"sha{n}", starts[n], None if starts[n] else "bad") for n, log in enumerate(logs)}
+    return list(plan(DATASET, van, logs, facts, settings or BatchSettings()))
+
+
+def names(jobs: Sequence[Job]) -> list[tuple[str, list[str], list[str]]]:
+    return [(job.slot.month, [one.log.path for one in job.lead_in], [one.log.path for one in job.logs]) for job in jobs]
+
+
+def test_a_job_is_a_month_and_begins_as_the_day_before_it_ended(van: Assignment) -> None:
+    starts = [MIDNIGHT_NS + hours * HOUR for hours in (-60, -24, -1, 0, 5, 29 * 24)]
+    jobs = jobs_of(van, starts)
+    assert names(jobs) == [
+        ("2026-10", [], ["0.log", "1.log", "2.log"]),
+        ("2026-11", ["1.log", "2.log"], ["3.log", "4.log", "5.log"]),
+    ]
+    assert [job.next_ns for job in jobs] == [MIDNIGHT_NS, None]
+
+
+def test_logs_are_in_the_order_of_their_frames_whatever_their_names(van: Assignment) -> None:
+    assert names(jobs_of(van, [MIDNIGHT_NS + 2 * S, MIDNIGHT_NS + 1 * S])) == [("2026-11", [], ["1.log", "0.log"])]
+
+
+def test_a_log_without_a_frame_belongs_where_its_name_does(van: Assignment) -> None:
+    assert names(jobs_of(van, [MIDNIGHT_NS - S, None, MIDNIGHT_NS])) == [
+        ("2026-10", [], ["0.log", "1.log"]),
+        ("2026-11", ["0.log", "1.log"], ["2.log"]),
+    ]
+    assert names(jobs_of(van, [None, MIDNIGHT_NS])) == [("2026-11", [], ["0.log", "1.log"])]
+    assert names(jobs_of(van, [None, None])) == [("unknown", [], ["0.log", "1.log"])]
+
+
+def test_validity_in_time_parts_logs_by_their_first_frame(van: Assignment) -> None:
+    old, new = replace(van, span_ns=(0, MIDNIGHT_NS)), replace(van, span_ns=(MIDNIGHT_NS, 2 * MIDNIGHT_NS))
+    starts = [MIDNIGHT_NS - S, MIDNIGHT_NS]
+    assert names(jobs_of(old, starts)) == [("2026-10", [], ["0.log"])]
+    assert names(jobs_of(new, starts)) == [("2026-11", [], ["1.log"])]
+
+
+def test_the_name_of_a_job_follows_from_its_inputs_alone(van: Assignment, tmp_path: Path) -> None:
+    """Written down once: another computer, process or order of keys names it the same."""
+    [job], [again] = jobs_of(van, [MIDNIGHT_NS]), jobs_of(van, [MIDNIGHT_NS])
+    assert job.slot == again.slot
+    assert (
+        hash_of({"b": [1, None], "a": "ö"}) == hash_of({"a": "ö", "b": [1, None]}) == "5b45036fb0a18fa979611680b3f65b1a"
+    )
+    elsewhere = load_manifest(str(write_manifest(tmp_path / "elsewhere", "van"))).assignments[0]
+    assert jobs_of(elsewhere, [MIDNIGHT_NS])[0].slot == job.slot
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        'id = "other"',
+        'id = "van"\nvin = "WF0XXXTTGXJK12345"',
+        'id = "van"\nsignals = "springscale:canmod_gps"',
+        'id = "van"\ncalibration = "other.json"',
+    ],
+)
+def test_another_input_makes_another_job(van: Assignment, tmp_path: Path, entry: str) -> None:
+    path = write_manifest(tmp_path / "changed", entry)
+    (path.parent / "other.json").write_text(calibration_file(payload_kg=201.0).to_json())
+    other = load_manifest(str(path)).assignments[0]
+    assert jobs_of(other, [MIDNIGHT_NS])[0].slot.job != jobs_of(van, [MIDNIGHT_NS])[0].slot.job
+
+
+def test_settings_content_and_neighbours_make_another_job(van: Assignment) -> None:
+    jobs = [
+        jobs_of(van, [MIDNIGHT_NS])[0],
+        jobs_of(van, [MIDNIGHT_NS], BatchSettings(window_s=60.0))[0],
+        jobs_of(van, [MIDNIGHT_NS, MIDNIGHT_NS + S])[0],
+        jobs_of(van, [MIDNIGHT_NS - HOUR, MIDNIGHT_NS])[1],
+        jobs_of(van, [MIDNIGHT_NS - HOUR, MIDNIGHT_NS])[0],
+    ]
+    assert len({job.slot.job for job in jobs}) == len(jobs)
+
+
+def tare(at_ns: int, calibration_id: str, ended_ns: int | None = None, **changed: Any) -> TareEntry:
+    end = None if ended_ns is None else {"at": iso_utc(ended_ns), "by": "x", "why": "undone"}
+    told = {
+        **{"id": "", "at": iso_utc(at_ns), "by": "x", "note": None, "vehicle_id": None, "estimator": "ratio_index"},
+        **{"calibration_id": calibration_id, "payload_kg": 1.0, "payload_std_kg": 1.0, "front_share_pct": 0.1},
+        **{"front_share_std_pct": 0.1, "n_batches": 1, "batch_ids": (), "t_start": "", "t_end": "", "ended": end},
+    }
+    entry = TareEntry.model_validate({**told, **changed})
+    return entry.model_copy(update={"id": entry.content_id()})
+
+
+def test_a_tare_counts_while_it_was_in_use_and_for_its_calibration_alone(van: Assignment) -> None:
+    assert van.setup.calibration is not None
+    mine = van.setup.calibration.id
+    first, second = tare(MIDNIGHT_NS - HOUR, mine), tare(MIDNIGHT_NS + HOUR, mine, MIDNIGHT_NS + 2 * HOUR)
+    later, foreign = tare(MIDNIGHT_NS + 40 * 24 * HOUR, mine), tare(MIDNIGHT_NS - HOUR, "sha256:other")
+    tared = replace(van, tares=TareHistory(entries=(first, foreign, second, later)))
+    november, december = jobs_of(tared, [MIDNIGHT_NS, MIDNIGHT_NS + 31 * 24 * HOUR])
+    in_use = {hours: november.tare_at(MIDNIGHT_NS + hours * HOUR) for hours in (-2, 0, 1, 2, 3)}
+    assert {hours: found and found.id for hours, found in in_use.items()} == {
+        -2: None,
+        0: first.id,
+        1: first.id,  # made at this instant: it counts from the next batch on
+        2: second.id,
+        3: first.id,
+    }
+    assert [span.tare.id for span in december.tares] == [first.id, later.id]
+
+
+def test_a_tare_made_later_leaves_earlier_months_as_they_are(van: Assignment) -> None:
+    assert van.setup.calibration is not None
+    starts = [MIDNIGHT_NS - HOUR, MIDNIGHT_NS]
+    later = replace(van, tares=TareHistory(entries=(tare(MIDNIGHT_NS + HOUR, van.setup.calibration.id),)))
+    before, after = jobs_of(van, starts), jobs_of(later, starts)
+    assert before[0].slot == after[0].slot
+    assert before[1].slot != after[1].slot
+
+
+def test_the_software_is_the_code_that_weighs() -> None:
+    assert software().endswith(f" code {code_id()}")
+    assert len(code_id()) == 12
+
+
+def test_logs_are_surveyed_in_groups_worth_a_turn() -> None:
+    def logs(*sizes: int) -> list[LogFile]:
+        return [LogFile(Place("file:///x"), f"{n}", f"{n}", size, "") for n, size in enumerate(sizes)]
+
+    assert [len(go) for go in in_goes(logs(*[1] * 70))] == [32, 32, 6]
+    assert [len(go) for go in in_goes(logs(60_000_000, 60_000_000, 1))] == [2, 1]
+    assert list(in_goes([])) == []
