@@ -9,8 +9,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
-import gateway
-
 WEIGHING: Final = (
     "archive/dataset.py",
     "archive/drives.py",
@@ -35,7 +33,7 @@ def software() -> str:
 
 def code_id() -> str:
     """Hash of those files as they are installed."""
-    package = Path(gateway.__file__).parent
+    package = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in sorted(found for named in WEIGHING for found in _sources(package / named)):
         digest.update(f"{path.relative_to(package).as_posix()}\0".encode())
