@@ -69,6 +69,25 @@ class Scale:
         return float(driving["share_at_peak"]) / float(driving["window_s"])
 
     @property
+    def report_cpu_s(self) -> float:
+        """Of a vehicle more in the report of a fleet."""
+        return self._of_report("cpu_s")
+
+    @property
+    def report_memory_bytes(self) -> float:
+        return 1e6 * self._of_report("peak_mb")
+
+    @property
+    def report_page_bytes(self) -> float:
+        return 1e3 * self._of_report("page_kb")
+
+    def _of_report(self, what: str) -> float:
+        """What the vehicles beyond the first tenth added, each."""
+        told = self.measured["report"]
+        n_more = int(told["vehicles"]) - max(1, int(told["vehicles"]) // 10)
+        return float(told["whole"][what] - told["tenth"][what]) / n_more
+
+    @property
     def objects(self) -> float:
         return 2.0 * self._jobs
 
@@ -119,6 +138,25 @@ def limits_of(scale: Scale) -> list[Limit]:
                 machine["cores"] * machine["night_hours"] / scale.weighing_core_hours,
                 f"{figure(scale.weighing_core_hours)} core hours a vehicle",
                 "more machines by `--scheduler`; weigh anew only what a change touches, which the receipts tell",
+            ),
+            Limit(
+                "The fleet's report on one page",
+                1e6 * scale.assumed["report"]["most_page_mb"] / scale.report_page_bytes,
+                f"{in_bytes(scale.report_page_bytes)} a vehicle, a browser opens "
+                f"{figure(scale.assumed['report']['most_page_mb'])} MB",
+                "a report for each depot; report.json and the data set itself for more",
+            ),
+            Limit(
+                "The fleet's report in the memory of one machine",
+                GB * machine["memory_gb"] / scale.report_memory_bytes,
+                f"{in_bytes(scale.report_memory_bytes)} a vehicle of {figure(machine['memory_gb'])} GB",
+                "a report for each depot",
+            ),
+            Limit(
+                "The fleet's report in a night, one process",
+                3600.0 * machine["night_hours"] / scale.report_cpu_s,
+                f"{figure(scale.report_cpu_s)} core seconds a vehicle",
+                "a report for each depot, side by side",
             ),
             Limit(
                 "The broker's open files, at a system's usual limit",

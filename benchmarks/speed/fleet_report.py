@@ -1,6 +1,6 @@
 """The fleet's report over a year: how long it takes, how much memory, and how large its pages are.
 
-    python -m benchmarks.speed.fleet_report [--vehicles 100] [--days 365] [--hours 2] [--json] [--keep DIR]
+    python -m benchmarks.speed.fleet_report [--vehicles 100] [--days 365] [--hours 2] [--output FILE] [--keep DIR]
 
 Makes a data set as `springscale reprocess` leaves it, with numbers drawn at random: a batch every five minutes of
 driving, seasons that move the dampers of all vehicles, a few vehicles that drift by themselves, a few whose sensor
@@ -128,6 +128,7 @@ def main() -> None:
     parser.add_argument("--days", type=int, default=365)
     parser.add_argument("--hours", type=float, default=2.0, help="of driving a day")
     parser.add_argument("--json", action="store_true", help="print the figures for machines")
+    parser.add_argument("--output", type=Path, help="JSON file for the figures, such as docs/fleet_report.json")
     parser.add_argument("--keep", type=Path, help="directory in which data set and report stay")
     parser.add_argument("--write", type=Path, help=argparse.SUPPRESS)
     asked = parser.parse_args()
@@ -141,6 +142,8 @@ def main() -> None:
             dataset = folder / f"dataset-{name}"
             n_batches = _written_in_own_process(dataset, n_vehicles, asked)
             figures[name] = {"batches": n_batches, **report(dataset, folder / f"report-{name}")}
+    if asked.output:
+        asked.output.write_text(json.dumps(figures, indent=1) + "\n")
     if asked.json:
         print(json.dumps(figures))
         return
