@@ -1,4 +1,4 @@
-"""Writes docs/settings.md from gateway/config.py; with --check only tells whether it is up to date."""
+"""Writes docs/settings.md from gateway/config/; with --check only tells whether it is up to date."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ PAGE = Path(__file__).with_name("settings.md")
 INTRODUCTION = """\
 # Settings of springscale.toml
 
-Generated from `gateway/config.py` by `python docs/make_settings.py`; do not edit by hand.
+Generated from `gateway/config/` by `python docs/make_settings.py`; do not edit by hand.
 
 Paths are relative to the file. An unknown key is an error that names it. An environment variable wins over the file.
 """
@@ -52,7 +52,7 @@ def _table(title: str, fields: dict[str, FieldInfo], *, prefix: str) -> str:
 
 def main() -> None:
     """Write the page, or compare it."""
-    keep_up_to_date(PAGE, settings_page(), "gateway/config.py")
+    keep_up_to_date(PAGE, settings_page(), "gateway/config/")
 
 
 if __name__ == "__main__":

@@ -49,6 +49,14 @@ class WeightRefusedError(SpringscaleError):
         self.reason = reason
 
 
+class CommissioningRefusedError(SpringscaleError):
+    """A step of a commissioning cannot be done now. ``reason`` is for programs; the message says what to do."""
+
+    def __init__(self, reason: str, message: str) -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
 class CalibrationImpossibleError(SpringscaleError):
     """The known-load drives do not carry enough to calibrate from."""
 

@@ -11,7 +11,7 @@ from drawings.canvas import Canvas, Point
 PYPROJECT: Final = Path(__file__).parents[2] / "pyproject.toml"
 PACKAGE: Final = "gateway"
 MODULES: Final = ("setup", "config")  # single files that are drawn like rooms; others are small and shared
-SHARED: Final = frozenset({"estimate_json", "files"})  # folders that are small and shared like those
+SHARED: Final = frozenset({"estimate_json", "files", "stated"})  # folders that are small and shared like those
 WIDTH: Final = 840
 MIDDLES: Final = {
     **{"cli": 420.0, "service": 220.0, "reports": 620.0, "archive": 390.0, "offline": 570.0, "workbench": 750.0},

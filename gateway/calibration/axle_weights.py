@@ -6,12 +6,10 @@ sprung.vehicle_keys()                                    # the keys of the campa
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 from gateway.calibration.half_car.prior import ESTIMATED_UNSPRUNG_STD, UNSPRUNG_SHARE, WEIGHED_STD
 from gateway.errors import CampaignError
-
-DIVISION_KG: Final = 20.0  # of a weighbridge for trucks; a reading is rounded to it
+from gateway.stated import DIVISION_KG
 
 
 @dataclass(frozen=True, slots=True)

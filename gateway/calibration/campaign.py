@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -18,15 +18,10 @@ from gateway.core.vehicle import (
     sensor_offset_left,
 )
 from gateway.errors import CampaignError
+from gateway.stated import Kilograms, Metres, MetresLeft, Percent
 from gateway.toml_file import checked, read_toml
 
 OnRun = Callable[[int, int], None]  # (runs done, runs in all)
-
-# Bounds that no road vehicle reaches, so that a fraction for percent, millimetres or tonnes are named at once
-Percent = Annotated[float, Field(ge=1.0, le=99.0)]
-Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0)]
-Metres = Annotated[float, Field(ge=-10.0, le=30.0)]
-MetresLeft = Annotated[float, Field(ge=-2.0, le=2.0)]
 
 LEAST_PAYLOAD_SHARE: Final = 0.004
 """Of the empty mass. No vehicle carries four times its own, so that a load in tonnes reads less than this in kg."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from gateway.calibration.axle_weights import DIVISION_KG, AxleWeights, sprung_of
+from gateway.calibration.axle_weights import AxleWeights, sprung_of
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file import (
     CalibrationFile,
@@ -23,6 +23,7 @@ from gateway.cli.options import FILE, as_json
 from gateway.cli.text.axle_weights import vehicle_block
 from gateway.cli.text.calibration import calibration_text
 from gateway.records import json_line
+from gateway.stated import DIVISION_KG
 
 
 @click.group("calibration")

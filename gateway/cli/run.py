@@ -10,8 +10,7 @@ import click
 from gateway.cli.options import FILE, trusted_keys
 from gateway.config import load_settings
 from gateway.log import set_up_log
-from gateway.service.gateway import Gateway
-from gateway.service.last_good import setup_or_last_good
+from gateway.service.life import live
 
 
 @click.command("run")
@@ -23,5 +22,4 @@ def run(config_path: Path, trusted_keys: Path | None) -> None:
     settings = load()
     faulthandler.enable()  # systemd's watchdog ends a hung process with SIGABRT: every stack goes to the journal
     set_up_log(settings.log.level, under_journald="JOURNAL_STREAM" in os.environ)
-    setup, setup_fault = setup_or_last_good(settings)
-    Gateway(settings, setup, load=load, setup_fault=setup_fault).run()
+    live(settings, load)

@@ -52,6 +52,11 @@ class Scheduler:
         """Of the drive that is under way; None between drives. Safe from any thread."""
         return None if self._newest_ns is None else self._drive_start_ns
 
+    @property
+    def newest_ns(self) -> int | None:
+        """The newest stamp of the drive that is under way; None between drives. Safe from any thread."""
+        return self._newest_ns
+
     def take_rows(self) -> Motion:
         """Those that the batch yielded last was made of, and maybe some beyond its window; given once."""
         rows, self._rows_of_last = self._rows_of_last, None

@@ -4,11 +4,9 @@ import asyncio
 import contextlib
 import logging
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
-
-import uvicorn
 
 from gateway.bus.live import OpenReceiver, around_of
 from gateway.bus.signals import Decoder
@@ -18,12 +16,13 @@ from gateway.log import Event, log_event
 from gateway.service.changes import BatchLog, StateLog
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
-from gateway.service.parts import keeper_of, ring_log_of, source_of, store_of, uplink_of
+from gateway.service.parts import commissioning_of, keeper_of, ring_log_of, source_of, store_of, uplink_of
 from gateway.service.pipeline import Pipeline
 from gateway.service.proving import Proving
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
 from gateway.service.tare_desk import Subject, TareDesk
+from gateway.service.web_server import WebServer
 from gateway.setup import Setup
 from gateway.status import State
 from gateway.uplink import uplink_settings
@@ -45,15 +44,6 @@ OnStarted = Callable[["Gateway"], None]
 
 class GatewayFailedError(SpringscaleError):
     """A part of the running service died; the process ends so that systemd starts it anew."""
-
-
-class _Server(uvicorn.Server):
-    """uvicorn without its own signal handling: it would raise the signal again after stopping."""
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        """Signals are the gateway's."""
-        yield
 
 
 class Gateway:
@@ -83,8 +73,8 @@ class Gateway:
         self.store = store_of(settings.store, forwarding)
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
-        if setup.calibration is not None and setup_fault is None:
-            keep_copy(settings, setup.calibration)
+            if setup_fault is None:
+                keep_copy(settings, setup.calibration)
         if setup_fault is not None:
             log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=setup_fault)
             self.store.write_event("setup_fault", {"fault": setup_fault})
@@ -94,7 +84,7 @@ class Gateway:
         self.around = around_of(settings.bus.interface, settings.bus.channel, settings.bus.options)
         flow = setup.flow(settings.batch.for_core(is_live=True))
         self.keeper = keeper_of(settings.keep, settings.store, setup)
-        flow.on_batch = self.keeper.keep
+        self.commissioning = commissioning_of(settings, setup, self.keeper, flow, self.store)
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
         self.pipeline = Pipeline(
@@ -137,17 +127,19 @@ class Gateway:
             calibrated=setup.calibrated,
             tokens=token_file,
             tare=self.tare,
+            commissioning=self.commissioning,
             known_loads=known_loads,
             record=self.ring_log,
             verification=self.proving.verification,
             trend=self.proving.trend,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
-        self._server = _Server(web)
+        self._server = WebServer(web)
         self._reload = Reloader(settings, load or (lambda: settings), web, setup, setup_fault)
         self._notifier = Notifier()
         self._stopping = asyncio.Event()
         self._failure: str | None = None
+        self.is_to_start_anew = False  # with the calibration that was made meanwhile; see life.py
 
     def _warnings(self) -> tuple[str, ...]:
         """What is broken beside the weighing, as people read it."""
@@ -159,6 +151,7 @@ class Gateway:
             self.keeper.fault,
             self.ring_log.fault if self.ring_log else None,
             *self.proving.faults,
+            self.commissioning.fault,
         )
         return tuple(fault for fault in faults if fault)
 
@@ -202,6 +195,7 @@ class Gateway:
         loop.add_signal_handler(signal.SIGHUP, self._reload_told)
         bus = self._settings.bus
         log_event(Event.STARTED, version=self.status().version, interface=bus.interface, channel=bus.channel)
+        self.commissioning.start()
         for part in self._beside:
             part.start()
         self.source.start()
@@ -247,6 +241,9 @@ class Gateway:
             now = self.status()
             log_state(now)
             self._look_around(now.state)
+            if self.commissioning.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
+                self.is_to_start_anew = True
+                self.request_stop()
             if (told := now.sentence()) != sentence:
                 sentence = told
                 self._notifier.send(STATUS=told)
@@ -276,9 +273,13 @@ class Gateway:
 
     def _stop_parts(self) -> None:
         """Bus first, then what it fed; every accepted estimate reaches the disk."""
-        self._notifier.send(STOPPING="1", STATUS="Stopping.")
+        if self.is_to_start_anew:
+            self._notifier.send_reloading()
+        else:
+            self._notifier.send(STOPPING="1", STATUS="Stopping.")
         self.source.stop()
         self.around.stop()
+        self.commissioning.stop()  # what the end cuts short is no end of a window
         self.pipeline.stop()
         for part in self._beside:
             part.stop()

@@ -4,10 +4,10 @@ import logging
 import queue
 import threading
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 from gateway.bus.signals import SignalMap
-from gateway.calibration.kept import Shelf, kept_batch_of
+from gateway.calibration.kept import KeptBatch, Shelf, kept_batch_of
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.records import Batch, Motion
@@ -23,11 +23,37 @@ class _Handed:
     rows: Motion
 
 
+class Listener(Protocol):
+    """Who hears of batches after those that count are kept, in the keeper's thread."""
+
+    @property
+    def wants_all(self) -> bool:
+        """Whether provisional and rejected ones are heard of too. Safe from any thread."""
+        ...
+
+    def hear(self, kept: KeptBatch) -> None:
+        """Of one batch."""
+        ...
+
+
+class Nobody:
+    """Hears nothing."""
+
+    wants_all = False
+
+    def hear(self, kept: KeptBatch) -> None:
+        """And says nothing."""
+
+
 class BatchKeeper:
-    """Puts every batch that any estimator could use on ``shelf``. ``fault`` says what the disk refused last, if so."""
+    """Puts every batch that any estimator could use on ``shelf``, and tells ``listener``.
+
+    ``fault`` says what the disk refused last, if so.
+    """
 
     def __init__(self, shelf: Shelf, signal_map: SignalMap) -> None:
         self.shelf = shelf
+        self.listener: Listener = Nobody()
         self.fault: str | None = None
         self.n_lost = 0  # batches that should have been kept and were not
         self._signal_map = signal_map
@@ -40,12 +66,13 @@ class BatchKeeper:
 
     def keep(self, batch: Batch, found: Estimate, rows: Motion) -> None:
         """Take a batch over, from the pipeline's thread; one too many is lost and counted."""
-        if batch.is_provisional or batch.rejected:
+        if (batch.is_provisional or batch.rejected) and not self.listener.wants_all:
             return
         try:
             self._waiting.put_nowait(_Handed(found.id, batch, rows))
         except queue.Full:
-            self._lose(f"{MOST_WAITING} batches wait for the disk already")
+            if not (batch.is_provisional or batch.rejected):
+                self._lose(f"{MOST_WAITING} batches wait for the disk already")
 
     def flush(self) -> None:
         """Wait until all that was handed over is kept or lost."""
@@ -71,12 +98,16 @@ class BatchKeeper:
 
     def _put(self, handed: _Handed) -> None:
         signal_map = self._signal_map
-        try:
-            self.shelf.add(kept_batch_of(handed.batch_id, signal_map.id, handed.batch, handed.rows, signal_map.traits))
-        except OSError as refusal:
-            self._lose(str(refusal))
-        else:
+        kept = kept_batch_of(handed.batch_id, signal_map.id, handed.batch, handed.rows, signal_map.traits)
+        if not (kept.batch.is_provisional or kept.batch.rejected):
+            try:
+                self.shelf.add(kept)
+            except OSError as refusal:
+                self._lose(str(refusal))
+                return
             self.fault = None
+        if self.listener.wants_all:
+            self.listener.hear(kept)
 
     def _lose(self, why: str) -> None:
         self.n_lost += 1

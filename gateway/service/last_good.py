@@ -36,7 +36,7 @@ def setup_or_last_good(settings: Settings) -> tuple[Setup, str | None]:
 
 def keep_copy(settings: Settings, calibration: CalibrationFile) -> None:
     """Keep it for later starts; a disk that refuses is told and keeps nobody from weighing."""
-    if settings.calibration is None:
+    if settings.calibration is None or settings.calibration.parent == settings.store.directory:  # it lies there already
         return
     files, name, path = KeptFiles(settings.store.directory), _name_of(settings.calibration), settings.calibration
     try:

@@ -6,7 +6,10 @@ from gateway.bus.live import LiveSource, OpenReceiver
 from gateway.bus.ring import RingLimits, RingLog
 from gateway.calibration.kept import Shelf, ShelfLimits
 from gateway.calibration.kept.shelf import FOLDER
-from gateway.config import BusSection, KeepSection, Settings, StoreSection
+from gateway.config import BusSection, Settings, StoreSection
+from gateway.config.sections import KeepSection
+from gateway.core.flow import Flow
+from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle, why_not_allowed
 from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
 from gateway.store import Retention, Store
@@ -47,6 +50,28 @@ def store_of(wanted: StoreSection, forwarding: UplinkSettings | None) -> Store:
 def keeper_of(wanted: KeepSection, store: StoreSection, setup: Setup) -> BatchKeeper:
     limits = ShelfLimits(wanted.batches, round(wanted.size_mb * BYTES_PER_MB))
     return BatchKeeper(Shelf(store.directory / FOLDER, limits), setup.signal_map)
+
+
+def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow: Flow, store: Store) -> Commissioning:
+    """Which hears of every batch that the flow hands to the keeper."""
+    own_name = settings.vehicle.calibrated_as
+    directory = settings.store.directory
+    desk = Commissioning(
+        Jobs(directory, settings.commissioning, settings.batch.for_core()),
+        Lines(directory, settings.commissioning.lines, settings.trust.for_reading()),
+        keeper.shelf,
+        flow.scheduler,
+        Vehicle(
+            name=own_name or settings.vehicle.id,
+            signals_id=setup.signal_map.id,
+            is_calibrated=setup.calibration is not None,
+            why_not_allowed=why_not_allowed(settings),
+            is_name_fixed=own_name is not None,
+        ),
+        on_event=store.write_event,
+    )
+    flow.on_batch, keeper.listener = keeper.keep, desk
+    return desk
 
 
 def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:

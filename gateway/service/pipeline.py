@@ -108,6 +108,11 @@ class Pipeline:
         weighed, found_s = self._weighed_at
         return None if weighed is None else boot_clock_s() - found_s
 
+    def is_between_drives(self, silence_s: float) -> bool:
+        """Whether what comes next is another drive: this one is over, or its bus is silent. From any thread."""
+        newest_s = max(self.watch.last_heard.values(), default=0.0)
+        return self.flow.scheduler.drive_start_ns is None or time.monotonic() - newest_s > silence_s
+
     def is_alive(self) -> bool:
         """True while the thread runs."""
         return self._thread.is_alive()

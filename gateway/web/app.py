@@ -26,8 +26,10 @@ from gateway.web.live import Board, LatestFirst
 from gateway.web.reader import Reader
 from gateway.web.routes import (
     KNOWN_LOADS_PATH,
+    CommissioningDesk,
     FrameLog,
     KnownLoads,
+    NoCommissioningDesk,
     NoFrameLog,
     NoTareDesk,
     NoTrend,
@@ -37,6 +39,7 @@ from gateway.web.routes import (
     TrendDesk,
     VerificationDesk,
     api_router,
+    commissioning_router,
     export_router,
     health_router,
     j1939_router,
@@ -69,6 +72,7 @@ def create_app(
     calibrated: CalibratedVehicle | None = None,
     tokens: TokenFile | None = None,
     tare: TareDesk | None = None,
+    commissioning: CommissioningDesk | None = None,
     known_loads: KnownLoads | None = None,
     record: FrameLog | None = None,
     verification: VerificationDesk | None = None,
@@ -110,6 +114,7 @@ def create_app(
     app.include_router(tare_router(tare or NoTareDesk()))
     app.include_router(verification_router(verification or NoVerificationDesk()))
     app.include_router(trend_router(trend or NoTrend()))
+    app.include_router(commissioning_router(commissioning or NoCommissioningDesk()))
     app.include_router(export_router(reader))
     app.include_router(record_router(record or NoFrameLog()))
     app.include_router(weights_router(board, scales))

@@ -14,6 +14,7 @@ from schemathesis import GenerationMode
 from schemathesis.schemas import APIOperation, BaseSchema
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 from support.calibrated import calibration_file
+from support.commissioning import Bench
 from support.estimates import make_estimate
 from support.patience import PATIENCE_S
 from support.tare import FakePipeline
@@ -23,10 +24,15 @@ from gateway.records import Why
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.web import Scope, TokenFile, WebSettings
 
+COMMISSIONING = "/api/v1/calibration/commissioning"
+STEPS = ("lines", "line", "vehicle", "empty", "fit", "undo")
 CHANGES = [
     "POST /api/v1/calibration/tare",
     "DELETE /api/v1/calibration/tare",
     "POST /api/v1/calibration/verifications",
+    f"POST {COMMISSIONING}",
+    f"DELETE {COMMISSIONING}",
+    *(f"POST {COMMISSIONING}/{step}" for step in STEPS),
 ]
 PATHS = [
     "/api/v1/estimates/latest",
@@ -45,6 +51,8 @@ PATHS = [
     "/api/v1/calibration/trend",
     "/api/v1/calibration/verifications",
     "/api/v1/calibration/verifications/{record_id}",
+    COMMISSIONING,
+    f"{COMMISSIONING}/lines",
     "/api/v1/record",
     "/api/v1/record/{name}",
     "/rfms/vehicles",
@@ -81,7 +89,9 @@ def tare_desk(directory: Path) -> TareDesk:
 def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
     with (
         tempfile.TemporaryDirectory() as directory,
-        Gateway(Path(directory), PATIENT, token_file, tare_desk(Path(directory))) as gateway,
+        Gateway(
+            Path(directory), PATIENT, token_file, tare_desk(Path(directory)), Bench(Path(directory)).desk
+        ) as gateway,
     ):
         gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
         assert gateway.store.flush(PATIENCE_S)
@@ -102,6 +112,8 @@ EXCLUDED = {"GET /rfms/vehiclestatuses": [positive_data_acceptance]}
 LABELS = [*(f"GET {path}" for path in PATHS), *CHANGES]
 WITHOUT_PARAMETERS = ("latest", "status", "reasons", "vehicle", "vss", "live", "ready", "metrics", "record", "trend")
 WITHOUT_PARAMETERS += ("GET /api/v1/calibration/tare", "GET /api/v1/calibration/verifications")
+WITHOUT_PARAMETERS += (f"GET {COMMISSIONING}", f"GET {COMMISSIONING}/lines")
+WITHOUT_PARAMETERS += (f"DELETE {COMMISSIONING}", f"POST {COMMISSIONING}/fit")
 WITH_PARAMETERS = [label for label in LABELS if not label.endswith(WITHOUT_PARAMETERS)]
 
 

@@ -1,4 +1,4 @@
-"""docs/settings.md says what gateway/config.py does."""
+"""docs/settings.md says what gateway/config/ does."""
 
 from pathlib import Path
 

@@ -19,6 +19,7 @@ from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
+from gateway.web.routes import CommissioningDesk
 from gateway.web.routes.calibration import TareDesk, VerificationDesk
 from gateway.web.routes.record import FrameLog
 from support.patience import PATIENCE_S
@@ -33,6 +34,7 @@ class Gateway:
         settings: WebSettings | None = None,
         tokens: TokenFile | None = None,
         tare: TareDesk | None = None,
+        commissioning: CommissioningDesk | None = None,
         calibrated: CalibratedVehicle | None = None,
         known_loads: KnownLoads | None = None,
         record: FrameLog | None = None,
@@ -46,6 +48,7 @@ class Gateway:
         self._known: dict[str, Any] = {
             "tokens": tokens,
             "tare": tare,
+            "commissioning": commissioning,
             "calibrated": calibrated,
             "known_loads": known_loads,
             "record": record,

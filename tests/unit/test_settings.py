@@ -9,7 +9,8 @@ import pytest
 from support.drives import drive
 from support.patience import PATIENCE_S
 
-from gateway.config import ESTIMATOR_NAMES, Section, Settings, load_settings
+from gateway.config import ESTIMATOR_NAMES, Settings, load_settings
+from gateway.config.sections import Section
 from gateway.core.estimator import ESTIMATORS
 from gateway.core.scheduler import Scheduler
 from gateway.errors import ConfigurationError, SignalMapError

@@ -16,6 +16,7 @@ from typing import Final
 from gateway.calibration.kept.batch_file import KeptBatch, packed, unpacked
 from gateway.errors import KeptBatchError
 from gateway.files.kept import MOST_BYTES, KeptFiles
+from gateway.units import NS_PER_S
 
 FOLDER: Final = "batches"
 HOLDS: Final = "holds.json"
@@ -44,6 +45,11 @@ class Entry:
     def t_end_ns(self) -> int:
         """As the id begins."""
         return int(self.id.partition("-")[0])
+
+    @property
+    def duration_s(self) -> float:
+        """Of its window."""
+        return (self.t_end_ns - self.t_start_ns) / NS_PER_S
 
     @property
     def file_name(self) -> str:
@@ -95,6 +101,16 @@ class Shelf:
             self._files.write(entry.file_name, content)
             self._entries[entry.id] = entry
             return True
+
+    def path(self, entry: Entry) -> Path:
+        """Its file, for another process to read."""
+        return self._files.directory / entry.file_name
+
+    def remove(self, batch_id: str) -> None:
+        """Whoever holds it."""
+        with self._lock:
+            if (entry := self._entries.get(batch_id)) is not None:
+                self._remove(entry)
 
     def hold(self, owner: str, batch_ids: Collection[str]) -> bool:
         """Keep these for ``owner``, in place of what it held before, until it lets go; on disk when this returns.

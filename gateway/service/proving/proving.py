@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from gateway.calibration.verification_file import VerificationRule
-from gateway.config import VerificationSection
+from gateway.config.sections import VerificationSection
 from gateway.service.proving.trend_keeper import TrendKeeper, Zeros
 from gateway.service.proving.verification_desk import VerificationDesk
 from gateway.service.tare_desk import Subject

@@ -14,6 +14,8 @@ from gateway.web.door.problems import problem_response
 REQUEST_S: Final = 10.0  # from a connection's or a request's first byte to its last
 HEAD_BYTES: Final = 32_768  # request line and headers
 BODY_BYTES: Final = 32_768  # no route needs a tenth of it
+UPLOADS: Final = frozenset({b"/api/v1/calibration/commissioning/lines"})  # but this one: whole files come
+UPLOAD_BYTES: Final = 1_572_864  # of JSON, in which a file's line ends and quotes take two bytes
 LINGER_S: Final = 1.0  # for a refused client to read why; closed at once, its unread bytes would reset the answer away
 UNREAD_S: Final = 20.0  # in which a client must read some more of what waits for it
 UNREAD_BYTES: Final = 16_384  # that wait for one client before the answer itself has to
@@ -102,10 +104,11 @@ class GuardedConnection(HttpToolsProtocol):
 
     def on_body(self, body: bytes) -> None:
         self._n_body_bytes += len(body)
-        if self._n_body_bytes > BODY_BYTES and self.cycle.response_complete:
+        most = UPLOAD_BYTES if self.url.partition(b"?")[0] in UPLOADS else BODY_BYTES
+        if self._n_body_bytes > most and self.cycle.response_complete:
             self._hear_no_more()  # it was answered before its end
-        elif self._n_body_bytes > BODY_BYTES:
-            self._refuse(413, "the body of a request may not be longer than 32 KiB")
+        elif self._n_body_bytes > most:
+            self._refuse(413, f"the body of a request may not be longer than {most // 1024} KiB")
         if not self._is_refused:
             super().on_body(body)
 

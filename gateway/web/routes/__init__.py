@@ -15,6 +15,7 @@ from gateway.web.routes.calibration import (
     trend_router,
     verification_router,
 )
+from gateway.web.routes.commissioning import CommissioningDesk, NoCommissioningDesk, commissioning_router
 from gateway.web.routes.estimates import api_router
 from gateway.web.routes.export import export_router
 from gateway.web.routes.health import health_router
@@ -31,10 +32,12 @@ from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest, weig
 
 __all__ = [
     "KNOWN_LOADS_PATH",
+    "CommissioningDesk",
     "FrameLog",
     "KnownLoad",
     "KnownLoads",
     "LatestWeights",
+    "NoCommissioningDesk",
     "NoFrameLog",
     "NoTareDesk",
     "NoTrend",
@@ -44,6 +47,7 @@ __all__ = [
     "TrendDesk",
     "VerificationDesk",
     "api_router",
+    "commissioning_router",
     "export_router",
     "health_router",
     "j1939_router",

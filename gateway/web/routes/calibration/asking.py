@@ -7,21 +7,21 @@ from typing import Any, Final
 from fastapi import Request
 from starlette.responses import Response
 
-from gateway.errors import TareRefusedError, WeightRefusedError
+from gateway.errors import CommissioningRefusedError, TareRefusedError, WeightRefusedError
 from gateway.web.door.problems import problem_response
 from gateway.web.schemas import problem_responses
 
 LOCAL: Final = "local"  # who asks where no tokens are in use
 REFUSALS: Final = problem_responses(409, 503)
-_NO_ROOM: Final = "not_stored"  # the one refusal that the disk causes
+_CODES: Final = {"not_stored": 503, "not_allowed": 403, "no_such_line": 404}  # of reasons; else 409
 
 
 async def answered(request: Request, ask: Callable[[], str], status: int = 200) -> Response:
     """What ``ask`` answers, or the problem with which it refuses."""
     try:
         return json_response(await asyncio.to_thread(ask), status)
-    except (TareRefusedError, WeightRefusedError) as refusal:
-        code = 503 if refusal.reason == _NO_ROOM else 409
+    except (CommissioningRefusedError, TareRefusedError, WeightRefusedError) as refusal:
+        code = _CODES.get(refusal.reason, 409)
         return problem_response(code, str(refusal), request.url.path, reason=refusal.reason)
 
 

@@ -1,11 +1,15 @@
-"""springscale.toml and SPRINGSCALE_* variables -> frozen settings. An unknown key is an error that names it."""
+"""springscale.toml and SPRINGSCALE_* variables -> frozen settings. An unknown key is an error that names it.
+
+Tables about what a service keeps, and how it is calibrated and verified, are in ``sections``.
+"""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
+from gateway.config.sections import CommissioningSection, KeepSection, RecordSection, Section, VerificationSection
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.files.signed import PublicKey, Trust, load_public_keys
@@ -16,12 +20,6 @@ Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
 EstimatorName = Literal["cross_spectrum", "ratio_index"]  # those of core.estimator, which loads too much for this
 ESTIMATOR_NAMES: tuple[EstimatorName, ...] = get_args(EstimatorName)
-
-
-class Section(BaseModel):
-    """A table of the file."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class VehicleSection(Section):
@@ -124,39 +122,6 @@ class StoreSection(Section):
     max_size_mb: float = Field(512.0, ge=4.0, le=1e9, description="the oldest records are removed beyond this size")
 
 
-class KeepSection(Section):
-    """What is kept of the batches themselves, for calibrations to come: no log is asked of anybody."""
-
-    batches: int = Field(256, ge=0, le=100_000, description="batches kept at most, the newest (0: none)")
-    size_mb: float = Field(128.0, ge=1.0, le=100_000.0, description="disk space they may take; the oldest give way")
-
-
-class RecordSection(Section):
-    """The ring log: the mapped frames themselves, kept on disk as long as there is room."""
-
-    enabled: bool = Field(False, description="whether frames are recorded")
-    directory: Path | None = Field(None, description="folder of the segments [default: `record` in that of the store]")
-    max_size_mb: float = Field(1024.0, ge=16.0, le=1e9, description="the oldest segments are removed beyond this size")
-    max_daily_mb: float = Field(512.0, gt=0.0, le=1e9, description="no more than this is written in a day (UTC)")
-    free_mb: float = Field(256.0, ge=0.0, le=1e9, description="with less room left on the disk nothing is recorded")
-    block_s: float = Field(
-        120.0, ge=1.0, le=3600.0, description="frames are written together so often; a power cut costs as much"
-    )
-
-
-class VerificationSection(Section):
-    """What a verification with known loads asks for, and how often: choose what your law or your customer asks for."""
-
-    permitted_error_pct: float = Field(
-        5.0, gt=0.0, le=100.0, description="largest error of the gross weight, in percent of the known one"
-    )
-    permitted_axle_error_pct: float | None = Field(
-        None, gt=0.0, le=100.0, description="likewise of each axle's [default: axles are told and not judged]"
-    )
-    loads: int = Field(1, ge=1, le=10, description="least number of known loads for a record to pass")
-    every_days: float = Field(0.0, ge=0.0, le=36_500.0, description="due so long after the last that passed (0: never)")
-
-
 class UplinkSection(Section):
     """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that nobody can ask."""
 
@@ -236,6 +201,7 @@ class Settings(BaseSettings):
     keep: KeepSection = KeepSection()
     record: RecordSection = RecordSection()
     verification: VerificationSection = VerificationSection()
+    commissioning: CommissioningSection = CommissioningSection()
     uplink: UplinkSection = UplinkSection()
     trust: TrustSection = TrustSection()
     log: LogSection = LogSection()
@@ -279,6 +245,9 @@ def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:
     changed["web"] = settings.web.model_copy(update={key: folder / path for key, path in tls.items() if path})
     files = settings.uplink.model_dump(include={"ca", "certificate", "key", "password_file"}, exclude_none=True)
     changed["uplink"] = settings.uplink.model_copy(update={name: folder / path for name, path in files.items()})
+    if settings.commissioning.lines is not None:
+        lines = folder / settings.commissioning.lines
+        changed["commissioning"] = settings.commissioning.model_copy(update={"lines": lines})
     if settings.calibration is not None:
         changed["calibration"] = folder / settings.calibration
     if not settings.signals.startswith("springscale:"):

@@ -1,0 +1,94 @@
+"""What the service asks of the process that fits, and what that finds: two JSON files in a folder of their own."""
+
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from gateway.calibration.campaign import VehicleTable
+
+JOB: Final = "job.json"
+RESULT: Final = "result.json"
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Drive(_Table):
+    """Kept batches that were driven with one known load."""
+
+    name: str
+    payload_kg: float = 0.0
+    front_share_pct: float
+    payload_left_m: float | None = None
+    batches: tuple[Path, ...] = Field(min_length=1, description="files of kept batches")
+
+
+class Job(_Table):
+    """Look at the drives, and fit them too where ``is_fit``; ``like`` are files of sister vehicles or of their line."""
+
+    vehicle: VehicleTable
+    drives: tuple[Drive, ...] = Field(min_length=1)
+    settings: dict[str, float]
+    like: tuple[Path, ...] = ()
+    is_fit: bool = True
+    goal_std_share: float = Field(gt=0.0, description="of the largest payload: the standard deviation that is aimed at")
+    most_memory_mb: float = Field(gt=0.0)
+    command: str
+
+
+class Found(_Table):
+    """One finding of the inspection, in words."""
+
+    kind: str
+    severity: Literal["fault", "warning", "note"]
+    text: str
+    advice: str
+
+
+class Learned(_Table):
+    """How well loads would be weighed with what is known now: standard deviations over the loads it may carry."""
+
+    payload_std_kg: float
+    front_share_std_pct: float
+    needed_std_kg: float = Field(
+        description="what is aimed at, or where another hour of such driving would help no more"
+    )
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether to stop driving."""
+        return self.payload_std_kg <= self.needed_std_kg
+
+    @property
+    def share(self) -> float:
+        """0..1 of what is to be learned."""
+        return min(1.0, self.needed_std_kg / self.payload_std_kg)
+
+
+class Result(_Table):
+    """What came of a job. ``fault`` says in words why there is no calibration; its text is that of the file."""
+
+    findings: tuple[Found, ...] = ()
+    refusal: str | None = None
+    learned: Learned | None = None
+    calibration: str | None = None
+    calibration_id: str | None = None
+    warnings: tuple[str, ...] = ()
+    fault: str | None = None
+    seconds: float = 0.0
+    most_memory_mb: float = 0.0
+
+
+def to_file(table: BaseModel, path: Path) -> None:
+    """For the folder of a job, which nobody needs after a power cut."""
+    path.write_text(table.model_dump_json(), encoding="utf-8")
+
+
+def findings_of(findings: Any) -> tuple[Found, ...]:
+    """The gravest first; each once."""
+    told = dict.fromkeys((one.kind, one.severity, one.text, one.advice) for one in findings)
+    order = ("fault", "warning", "note")
+    found = [Found(kind=str(k), severity=str(s), text=t, advice=a) for k, s, t, a in told]
+    return tuple(sorted(found, key=lambda one: order.index(one.severity)))

@@ -1,0 +1,109 @@
+"""The process that inspects and fits: ``python -m gateway.calibration.commissioning.work FOLDER``.
+
+Lowest priority, one thread, bounded memory: weighing goes on beside it. What goes wrong with the drives is part of the
+result; a process that leaves no result was ended from outside, or ran out of memory.
+"""
+
+import contextlib
+import os
+import resource
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from gateway.calibration.calibrate import Outcome, calibrate_inspected
+from gateway.calibration.campaign import Campaign, CampaignTable, RunTable
+from gateway.calibration.commissioning.job import JOB, RESULT, Job, Result, findings_of, to_file
+from gateway.calibration.commissioning.learned import learned_by
+from gateway.calibration.inspection import Finding, Inspection
+from gateway.calibration.kept import KnownDrive, inspect_kept, unpacked
+from gateway.calibration.kept.drive import ESTIMATORS
+from gateway.core.settings import BatchSettings
+from gateway.errors import SpringscaleError
+
+LOWEST: Final = 19
+BYTES_PER_MB: Final = 1_000_000
+
+
+def main(folder: Path) -> None:
+    """Do the job that lies in ``folder``."""
+    begun_s = time.monotonic()
+    job = Job.model_validate_json((folder / JOB).read_bytes())
+    _take_little(job.most_memory_mb)
+    try:
+        result = done(folder / JOB, job)
+    except SpringscaleError as fault:
+        result = Result(fault=str(fault))
+    except MemoryError:
+        result = Result(fault=f"the fit needs more than {job.most_memory_mb:g} MB")
+    most_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    took = {"seconds": time.monotonic() - begun_s, "most_memory_mb": most_kb * 1024 / BYTES_PER_MB}
+    fresh = folder / f".{RESULT}"
+    to_file(result.model_copy(update=took), fresh)
+    fresh.rename(folder / RESULT)
+
+
+def done(path: Path, job: Job) -> Result:
+    """What comes of it. Raises SpringscaleError where nothing can be told at all."""
+    campaign = _campaign(path, job)
+    inspection = inspect_kept(campaign, tuple(_drives(job)), BatchSettings(**job.settings))
+    looked = Result(findings=findings_of(_findings(inspection)), refusal=inspection.refusal)
+    if not job.is_fit or inspection.refusal is not None:
+        return looked
+    outcome = calibrate_inspected(campaign, inspection, estimators=ESTIMATORS, command=job.command)
+    return looked.model_copy(update=_made(outcome, campaign, job))
+
+
+def _made(outcome: Outcome, campaign: Campaign, job: Job) -> dict[str, object]:
+    return {
+        "learned": learned_by(outcome, campaign.vehicle, job.goal_std_share),
+        "calibration": outcome.file.to_json(),
+        "calibration_id": outcome.file.id,
+        "warnings": outcome.file.warnings,
+    }
+
+
+def _campaign(path: Path, job: Job) -> Campaign:
+    """As from a file of drives: its hash in the calibration is that of the job."""
+    runs = tuple(
+        RunTable(
+            log=Path(drive.name),
+            payload_kg=drive.payload_kg,
+            front_share_pct=drive.front_share_pct,
+            payload_left_m=drive.payload_left_m,
+            split="identification",
+        )
+        for drive in job.drives
+    )
+    return Campaign(path, CampaignTable(signals="of the vehicle", vehicle=job.vehicle, runs=runs))
+
+
+def _drives(job: Job) -> Iterator[KnownDrive]:
+    for number, drive in enumerate(job.drives, 1):
+        yield KnownDrive(
+            number=number,
+            name=drive.name,
+            payload_kg=drive.payload_kg,
+            front_share_pct=drive.front_share_pct,
+            batches=tuple(unpacked(path.read_bytes()) for path in drive.batches),
+            payload_left_m=drive.payload_left_m,
+        )
+
+
+def _findings(inspection: Inspection) -> Iterator[Finding]:
+    yield from (finding for verdict in inspection.verdicts for finding in verdict.findings)
+    yield from inspection.findings
+
+
+def _take_little(most_memory_mb: float) -> None:
+    """Priority and memory; a service manager that forbids the first has seen to the processor itself."""
+    with contextlib.suppress(OSError):
+        os.nice(LOWEST)
+    most = round(most_memory_mb * BYTES_PER_MB)
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

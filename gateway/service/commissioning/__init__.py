@@ -1,0 +1,27 @@
+"""A vehicle is commissioned on its own machine: which line, what it weighs, an empty drive, the fit, and what it made.
+
+``Commissioning`` is the desk that everybody asks: the web for its steps, the batch keeper with every batch, the gateway
+whether another calibration is due. It owns ``commissioning.json`` (``Record``), the calibrations named there, and the
+folder ``lines``; the fit runs in a process of its own (``Worker``).
+"""
+
+from gateway.service.commissioning.book import OnEvent
+from gateway.service.commissioning.desk import Commissioning, Drives
+from gateway.service.commissioning.drive import Vehicle
+from gateway.service.commissioning.jobs import Jobs
+from gateway.service.commissioning.lines import Lines
+from gateway.service.commissioning.start import commissioned, why_not_allowed, with_commissioned
+from gateway.service.commissioning.worker import Worker
+
+__all__ = [
+    "Commissioning",
+    "Drives",
+    "Jobs",
+    "Lines",
+    "OnEvent",
+    "Vehicle",
+    "Worker",
+    "commissioned",
+    "why_not_allowed",
+    "with_commissioned",
+]

@@ -1,0 +1,77 @@
+"""The book of commissionings: the one owner of commissioning.json and of the files named in it."""
+
+import logging
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from gateway.errors import CommissioningRefusedError, ConfigurationError
+from gateway.files.kept import KeptFiles
+from gateway.log import Event, log_event
+from gateway.records import iso_utc
+from gateway.service.commissioning.record import FILE_NAME, Record, Underway, load_record, save_record
+
+OnEvent = Callable[[str, Mapping[str, Any]], object]
+
+
+class Book:
+    """Every change is on disk before it is in ``record``. Whoever reads and then changes holds ``lock`` meanwhile."""
+
+    def __init__(self, directory: Path, on_event: OnEvent, clock_ns: Callable[[], int]) -> None:
+        """Reads the file; one that cannot be believed is set aside, and ``fault`` says so."""
+        self.directory = directory
+        self.lock = threading.RLock()
+        self.fault: str | None = None
+        self._on_event = on_event
+        self._clock_ns = clock_ns
+        self.record = self._believed()
+
+    def keep(self, underway: Underway | None) -> None:
+        """As :meth:`save`, all else being as it was."""
+        self.save(self.record.model_copy(update={"underway": underway}))
+
+    def save(self, record: Record) -> None:
+        """On disk, then in use. Raises CommissioningRefusedError where the disk refuses; then nothing has changed."""
+        try:
+            save_record(self.directory, record)
+        except OSError as fault:
+            raise CommissioningRefusedError(
+                "not_stored", f"{self.directory / FILE_NAME} cannot be written, so nothing has changed: {fault}"
+            ) from None
+        self.record = record
+        self.fault = None
+
+    def write(self, name: str, content: bytes) -> None:
+        """A file beside it, whole or not at all. Raises CommissioningRefusedError."""
+        try:
+            KeptFiles(self.directory).write(name, content)
+        except OSError as fault:
+            raise CommissioningRefusedError("not_stored", f"{name} cannot be written: {fault}") from None
+
+    def cannot_store(self, refusal: Exception) -> None:
+        """What nobody asked for could not be kept: told, and tried again with the next."""
+        self.fault = f"the commissioning cannot be kept: {refusal}"
+        log_event(Event.COMMISSIONING_NOT_KEPT, level=logging.WARNING, fault=str(refusal))
+
+    def tell(self, event: Event, fields: Mapping[str, Any], level: int = logging.INFO) -> None:
+        """To the log, and to whoever keeps what happened."""
+        log_event(event, level=level, **fields)
+        self._on_event(event.value.replace(" ", "_"), fields)
+
+    def now(self) -> str:
+        """By the wall clock."""
+        return iso_utc(self._clock_ns())
+
+    def _believed(self) -> Record:
+        try:
+            return load_record(self.directory)
+        except ConfigurationError as broken:
+            fault = str(broken)
+        try:
+            aside = f"is set aside as {KeptFiles(self.directory).set_aside(FILE_NAME)}"
+        except OSError as refusal:
+            aside = f"cannot be set aside: {refusal}"
+        self.fault = f"{fault} (it {aside}): calibrations made on the vehicle are not in use"
+        self.tell(Event.COMMISSIONING_SET_ASIDE, {"fault": fault, "set_aside": aside}, level=logging.ERROR)
+        return Record()

@@ -1,0 +1,224 @@
+"""The desk at which a vehicle is commissioned: every step, each on disk before it is answered."""
+
+import time
+from collections.abc import Callable
+from typing import Final, Protocol
+
+from gateway.calibration.commissioning import vehicle_table
+from gateway.calibration.kept import KeptBatch, Shelf
+from gateway.errors import CampaignError, CommissioningRefusedError
+from gateway.log import Event
+from gateway.records import json_line
+from gateway.service.commissioning.book import Book, OnEvent
+from gateway.service.commissioning.drive import EmptyDrive, MakeWorker, Vehicle
+from gateway.service.commissioning.jobs import Jobs
+from gateway.service.commissioning.lines import Lines
+from gateway.service.commissioning.record import EmptyClaim, Ended, LineChoice, Source, Underway
+from gateway.service.commissioning.steps import Present, Step, lines_told, step_of, told
+from gateway.service.commissioning.worker import Worker
+from gateway.stated import VehicleAnswers
+
+UPLOADED: Final = "uploaded"
+
+
+class Drives(Protocol):
+    """Where the bus is: the scheduler, as far as an empty drive needs it. Safe from any thread."""
+
+    @property
+    def drive_start_ns(self) -> int | None:
+        """Of the drive under way."""
+        ...
+
+    @property
+    def newest_ns(self) -> int | None:
+        """The newest stamp of that drive."""
+        ...
+
+
+class Commissioning:
+    """Thread-safe; a call may wait for the disk. Nothing is answered that a power cut could take back."""
+
+    def __init__(
+        self,
+        jobs: Jobs,
+        lines: Lines,
+        shelf: Shelf,
+        drives: Drives,
+        vehicle: Vehicle,
+        *,
+        on_event: OnEvent,
+        clock_ns: Callable[[], int] = time.time_ns,
+        make_worker: MakeWorker | None = None,
+    ) -> None:
+        """Reads what was under way, to go on with it. ``make_worker`` stands in for the process that fits."""
+        self._lines, self._drives, self._vehicle = lines, drives, vehicle
+        self._book = Book(jobs.directory, on_event, clock_ns)
+        active = self._book.record.active
+        self._started_with = active.id if active else None
+        self._drive = EmptyDrive(
+            self._book, jobs, shelf, vehicle, make_worker or (lambda on_result: Worker(jobs.directory, on_result))
+        )
+
+    @property
+    def fault(self) -> str | None:
+        """What is wrong with the book, for people."""
+        return self._book.fault
+
+    @property
+    def is_due(self) -> bool:
+        """Whether another calibration than at the start waits for the next drive."""
+        active = self._book.record.active
+        return (active.id if active else None) != self._started_with
+
+    @property
+    def wants_all(self) -> bool:
+        """Whether batches are heard of that do not count, too."""
+        return self._book.record.underway is not None
+
+    def start(self) -> None:
+        """Go on with the fit that a stop or a power cut interrupted."""
+        with self._book.lock:
+            self._drive.fit()
+
+    def stop(self) -> None:
+        """Hear and do nothing more; what is on disk is gone on with at the next start."""
+        self._drive.stop()
+
+    def hear(self, kept: KeptBatch) -> None:
+        """Of every batch, provisional and rejected ones too; those that count lie on the shelf already."""
+        self._drive.hear(kept)
+
+    def told(self) -> str:
+        """JSON: a CommissioningState."""
+        with self._book.lock:
+            return json_line(told(self._book.record, self._present()))
+
+    def lines(self) -> str:
+        """JSON: the LinesFound."""
+        return json_line(lines_told(tuple(self._lines.found())))
+
+    def upload(self, name: str, content: str, signature: str | None) -> str:
+        """Keep a line's file -> the LinesFound with it. Raises CommissioningRefusedError."""
+        self._require_allowed()
+        with self._book.lock:
+            self._lines.upload(name, content, signature)
+        return self.lines()
+
+    def begin(self, by: str, note: str | None) -> str:
+        """Begin anew. Raises CommissioningRefusedError, as all that follow."""
+        self._require_allowed()
+        with self._book.lock:
+            if self._book.record.underway is not None:
+                raise CommissioningRefusedError(
+                    "already_begun", "a commissioning is under way: cancel it to begin anew"
+                )
+            begun = Underway(begun_at=self._book.now(), by=by, note=note, signals_id=self._vehicle.signals_id)
+            self._drive.forget()
+            self._book.keep(begun)
+            self._book.tell(Event.COMMISSIONING, {"step": Step.LINE, "by": by})
+            return self.told()
+
+    def choose_line(self, name: str | None, source: Source | None) -> str:
+        """One of ``lines``; None for no line: what is usual of any vehicle."""
+        with self._book.lock:
+            underway = self._underway()
+            choice = LineChoice(name="")
+            if name is not None:
+                choice, content = self._lines.choose(name, source or "uploaded")
+                self._book.write(str(choice.copy_name), content)
+            self._book.keep(underway.model_copy(update={"line": choice, "learned": None, "fault": None}))
+            self._drive.fit()
+            return self.told()
+
+    def state_vehicle(self, answers: VehicleAnswers) -> str:
+        """What was typed."""
+        with self._book.lock:
+            underway = self._underway(Step.VEHICLE)
+            try:
+                vehicle_table(answers, self._vehicle.name)
+            except CampaignError as fault:
+                raise CommissioningRefusedError("vehicle_unusable", str(fault)) from None
+            self._book.keep(underway.model_copy(update={"vehicle": answers, "learned": None, "fault": None}))
+            self._drive.fit()
+            return self.told()
+
+    def is_empty(self, by: str) -> str:
+        """From now on it is driven empty."""
+        with self._book.lock:
+            underway = self._underway(Step.EMPTY)
+            if self._drive.looked is not None and self._drive.looked.has_fault:
+                raise CommissioningRefusedError(
+                    "inspection_fault",
+                    "the first minutes show a fault: " + "; ".join(
+                        f"{one.text}: {one.advice}" for one in self._drive.looked.findings if one.severity == "fault"
+                    ),
+                )  # fmt: skip
+            claim = EmptyClaim(
+                at=self._book.now(), by=by, drive_start_ns=self._drives.drive_start_ns, newest_ns=self._drives.newest_ns
+            )
+            if underway.empty is None:
+                self._book.keep(underway.model_copy(update={"empty": claim}))
+                self._book.tell(Event.COMMISSIONING, {"step": Step.DRIVE, "by": by})
+            return self.told()
+
+    def fit_now(self, by: str) -> str:
+        """Make a calibration of what there is, enough or not."""
+        with self._book.lock:
+            underway = self._underway(Step.DRIVE)
+            if not underway.batches:
+                raise CommissioningRefusedError(
+                    "no_batch",
+                    "no batch of the empty drive has counted yet: drive on until one has",
+                )
+            self._book.keep(underway.model_copy(update={"is_fit_asked": True, "fault": None}))
+            self._book.tell(Event.COMMISSIONING, {"step": Step.FIT, "by": by})
+            self._drive.fit()
+            return self.told()
+
+    def cancel(self, by: str) -> str:
+        """Forget what is under way; calibrations made before stay."""
+        with self._book.lock:
+            self._underway()
+            self._book.keep(None)
+            self._drive.forget()
+            self._book.tell(Event.COMMISSIONING_CANCELLED, {"by": by})
+            return self.told()
+
+    def undo(self, by: str, *, to_factory: bool) -> str:
+        """Take the last calibration made here out of use, or all: the one before it counts from the next drive on."""
+        with self._book.lock:
+            standing = tuple(one for one in self._book.record.made if one.ended is None)
+            if not standing:
+                raise CommissioningRefusedError("nothing_made", "no calibration made on the vehicle is in use")
+            chosen = standing if to_factory else standing[-1:]
+            end = Ended(at=self._book.now(), by=by, why="back_to_factory" if to_factory else "undone")
+            self._book.save(self._book.record.ended(chosen, end))
+            self._book.tell(Event.COMMISSIONING_UNDONE, {"calibration_ids": [one.id for one in chosen], "by": by})
+            return self.told()
+
+    def _present(self) -> Present:
+        return Present(
+            why_not_allowed=self._vehicle.why_not_allowed,
+            is_calibrated=self._vehicle.is_calibrated,
+            is_busy=self._drive.is_busy,
+            driven_s=self._drive.driven_s,
+            looked=self._drive.looked,
+            started_with=self._started_with,
+        )
+
+    def _underway(self, least: Step = Step.LINE) -> Underway:
+        """Raises CommissioningRefusedError where none has come as far as ``least``."""
+        self._require_allowed()
+        underway = self._book.record.underway
+        if underway is None:
+            raise CommissioningRefusedError("not_begun", "no commissioning is under way: begin one")
+        step, order = step_of(underway), list(Step)
+        if order.index(step) < order.index(least):
+            raise CommissioningRefusedError("wrong_step", f"{step} is still to be answered before {least}")
+        if step is Step.FIT:
+            raise CommissioningRefusedError("fitting", "the calibration is being made: wait for it, or cancel")
+        return underway
+
+    def _require_allowed(self) -> None:
+        if self._vehicle.why_not_allowed is not None:
+            raise CommissioningRefusedError("not_allowed", self._vehicle.why_not_allowed)

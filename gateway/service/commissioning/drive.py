@@ -1,0 +1,218 @@
+"""The empty drive: batches are counted, looked at and fitted, until enough is known of the vehicle."""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Final
+
+from gateway.calibration.campaign import VehicleTable
+from gateway.calibration.commissioning import Job, Result, vehicle_table
+from gateway.calibration.file import load_calibration
+from gateway.calibration.kept import KeptBatch, Shelf, packed
+from gateway.errors import CalibrationFileError, CommissioningRefusedError
+from gateway.log import Event
+from gateway.service.commissioning.book import Book
+from gateway.service.commissioning.jobs import BatchFile, Jobs
+from gateway.service.commissioning.record import LineChoice, Made, Underway, save_record
+from gateway.service.commissioning.steps import Looked
+from gateway.service.commissioning.worker import Worker
+from gateway.stated import VehicleAnswers
+
+OWNER: Final = "commissioning"  # of the batches that the shelf must not give away
+LEAST_BATCHES: Final = 2  # one may be an odd one; whoever asks for the fit may have it of one
+LOOKED_AT: Final = "looked-at.batch"
+
+MakeWorker = Callable[[Callable[[Job, Result], None]], Worker]
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """Whose service this is, and whether anything may be made here."""
+
+    name: str
+    signals_id: str
+    is_calibrated: bool
+    why_not_allowed: str | None = None
+    is_name_fixed: bool = False
+
+
+class EmptyDrive:
+    """Hears every batch, and what the process that fits found. Thread-safe by the book's lock."""
+
+    def __init__(self, book: Book, jobs: Jobs, shelf: Shelf, vehicle: Vehicle, make_worker: MakeWorker) -> None:
+        """Takes up what was under way."""
+        self.looked: Looked | None = None
+        self._book, self._jobs, self._shelf, self._vehicle = book, jobs, shelf, vehicle
+        self._worker = make_worker(self._on_result)
+        self._job: Job | None = None
+        self._is_over = False
+        self._take_up()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a fit or an inspection is under way."""
+        return self._worker.is_busy
+
+    @property
+    def driven_s(self) -> float:
+        """Of the windows that count, the open one as far as it has come."""
+        underway = self._book.record.underway
+        if underway is None:
+            return 0.0
+        mine = {*underway.batches, *([underway.open_batch] if underway.open_batch else [])}
+        return sum(entry.duration_s for entry in self._shelf.entries() if entry.id in mine)
+
+    def stop(self) -> None:
+        """Hear and do nothing more."""
+        with self._book.lock:
+            self._is_over = True
+        self._worker.end()
+
+    def forget(self) -> None:
+        """Nothing is under way any more."""
+        self._worker.end()
+        self._job = self.looked = None
+        with suppress(OSError):
+            self._shelf.let_go(OWNER)
+
+    def hear(self, kept: KeptBatch) -> None:
+        """Of every batch, provisional and rejected ones too; those that count lie on the shelf already."""
+        with self._book.lock:
+            underway = self._book.record.underway
+            if self._is_over or underway is None or underway.vehicle is None:
+                return
+            batch = kept.batch
+            is_of_drive = underway.empty is not None and underway.empty.covers(batch.drive_start_ns, batch.t_start_ns)
+            try:
+                has_grown = is_of_drive and self._remember(underway, kept)
+            except OSError as refusal:
+                self._book.cannot_store(refusal)
+                return
+            if has_grown:
+                self.fit()
+            elif not self._worker.is_busy:
+                self._look(kept)
+
+    def _take_up(self) -> None:
+        """What was open when the power went is whole now; batches that are gone, or read otherwise, are forgotten."""
+        underway = self._book.record.underway
+        if underway is None:
+            return
+        there = {entry.id for entry in self._shelf.entries()}
+        found = [*underway.batches, *([underway.open_batch] if underway.open_batch else [])]
+        change: dict[str, Any] = {"batches": tuple(one for one in found if one in there), "open_batch": None}
+        if underway.signals_id != self._vehicle.signals_id:
+            change |= {"batches": (), "empty": None, "learned": None, "is_fit_asked": False}
+            change |= {"signals_id": self._vehicle.signals_id, "fault": "the signal map was changed: drive again"}
+        elif underway.empty is not None:  # whatever drive was under way is over
+            change["empty"] = underway.empty.model_copy(update={"drive_start_ns": None, "newest_ns": None})
+        try:
+            self._book.keep(underway.model_copy(update=change))
+        except CommissioningRefusedError as refusal:
+            self._book.cannot_store(refusal)
+
+    def _remember(self, underway: Underway, kept: KeptBatch) -> bool:
+        """Add a batch to the drive; True where one counted. Raises OSError."""
+        batch, before = kept.batch, underway.open_batch
+        change: dict[str, Any] = {"open_batch": None}
+        if batch.is_provisional and not batch.rejected:
+            self._shelf.add(kept)
+            change["open_batch"] = kept.id
+        elif batch.is_provisional:
+            return False
+        elif not batch.rejected and kept.id not in underway.batches:
+            change["batches"] = (*underway.batches, kept.id)
+        now = underway.model_copy(update=change)
+        if now != underway:
+            save_record(self._book.directory, self._book.record.model_copy(update={"underway": now}))
+            self._book.record = self._book.record.model_copy(update={"underway": now})
+            self._shelf.hold(OWNER, [*now.batches, *([now.open_batch] if now.open_batch else [])])
+        if before is not None and before != now.open_batch:
+            self._shelf.remove(before)
+        return "batches" in change
+
+    def fit(self) -> None:
+        """Begin the fit of all that was driven, if there is anything."""
+        underway = self._book.record.underway
+        if underway is None or underway.vehicle is None or underway.line is None or not underway.batches:
+            return
+        there = {entry.id: entry for entry in self._shelf.entries()}
+        files = [
+            BatchFile(self._shelf.path(there[one]), there[one].t_start_ns, there[one].t_end_ns)
+            for one in underway.batches
+            if one in there
+        ]
+        if files:
+            self._start(self._jobs.job(self._table(underway.vehicle), underway.line, files, is_fit=True))
+
+    def _look(self, kept: KeptBatch) -> None:
+        """Begin the inspection of one window."""
+        underway = self._book.record.underway
+        if underway is None or underway.vehicle is None or underway.line is None:
+            return
+        file = BatchFile(self._worker.folder / LOOKED_AT, kept.batch.t_start_ns, kept.batch.t_end_ns)
+        job = self._jobs.job(self._table(underway.vehicle), underway.line, [file], is_fit=False)
+        self._start(job, {LOOKED_AT: packed(kept)})
+
+    def _start(self, job: Job, files: Mapping[str, bytes] | None = None) -> None:
+        if self._is_over:
+            return
+        self._job = job
+        try:
+            self._worker.start(job, files or {})
+        except OSError as refusal:
+            self._book.cannot_store(refusal)
+
+    def _on_result(self, job: Job, result: Result) -> None:
+        """What came of a job, in the worker's thread."""
+        with self._book.lock:
+            underway = self._book.record.underway
+            if self._is_over or underway is None or underway.vehicle is None or job is not self._job:
+                return
+            if result.fault is None:
+                self.looked = Looked(result.findings, _seconds(job))
+            if not job.is_fit:
+                return
+            try:
+                self._take(underway, underway.vehicle, result)
+            except (CommissioningRefusedError, CalibrationFileError) as refusal:
+                self._book.cannot_store(refusal)
+
+    def _take(self, underway: Underway, vehicle: VehicleAnswers, result: Result) -> None:
+        """Put a fit to use where enough is known, or somebody asked for it; else drive on."""
+        has_enough = result.learned is not None and result.learned.is_enough
+        is_wanted = underway.is_fit_asked or (has_enough and len(underway.batches) >= LEAST_BATCHES)
+        if result.calibration is None or result.calibration_id is None or not is_wanted:
+            fault = result.fault or result.refusal
+            change = {"learned": result.learned, "fault": fault, "is_fit_asked": False}
+            self._book.keep(underway.model_copy(update=change))
+            return
+        name = f"commissioned-{result.calibration_id.removeprefix('sha256:')[:16]}.json"
+        self._book.write(name, result.calibration.encode())
+        load_calibration(self._book.directory / name)  # as the next start will, from the disk
+        made = Made(
+            id=result.calibration_id,
+            file_name=name,
+            at=self._book.now(),
+            by=underway.by,
+            note=underway.note,
+            line=underway.line or LineChoice(name=""),
+            vehicle=self._table(vehicle),
+            batches=underway.batches,
+            learned=result.learned,
+            warnings=result.warnings,
+        )
+        self._book.save(self._book.record.with_made(made))
+        with suppress(OSError):
+            self._shelf.hold(made.file_name, made.batches)
+            self._shelf.let_go(OWNER)
+        self._book.tell(Event.COMMISSIONED, {"calibration_id": made.id, "by": made.by, "n_batches": len(made.batches)})
+
+    def _table(self, answers: VehicleAnswers) -> VehicleTable:
+        table = vehicle_table(answers, self._vehicle.name)
+        return table.model_copy(update={"name": self._vehicle.name}) if self._vehicle.is_name_fixed else table
+
+
+def _seconds(job: Job) -> float:
+    """Of driving that it looked at."""
+    return float(job.settings["window_s"]) * len(job.drives[0].batches)

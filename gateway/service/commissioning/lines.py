@@ -1,0 +1,117 @@
+"""Which lines of vehicles there are to choose from: files of the package, of the administrator, and uploaded ones."""
+
+import hashlib
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError
+from gateway.files.kept import KeptFiles
+from gateway.files.signed import SUFFIX, Trust
+from gateway.service.commissioning.record import LineChoice, Source
+
+FOLDER: Final = "lines"
+MOST_UPLOADED: Final = 20
+MOST_BYTES: Final = 1_000_000
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,58}\.json")
+
+
+@dataclass(frozen=True, slots=True)
+class LineFound:
+    """One file: what it holds, or why it cannot be used."""
+
+    name: str
+    source: Source
+    id: str | None = None
+    vehicle: Mapping[str, object] | None = None
+    fault: str | None = None
+
+
+class Lines:
+    """All that can be chosen. A file of the package needs no signature, every other one where signatures are asked."""
+
+    def __init__(self, directory: Path, administrator: Path | None, trust: Trust) -> None:
+        """``directory`` is the service's folder; uploaded files lie in one of their own below it."""
+        self._uploaded = directory / FOLDER
+        self._folders: tuple[tuple[Source, Path | None], ...] = (
+            ("package", Path(str(files("gateway"))) / FOLDER),
+            ("administrator", administrator),
+            ("uploaded", self._uploaded),
+        )
+        self._trust = trust
+
+    def found(self) -> Iterator[LineFound]:
+        """Every file that could be one, by source and name."""
+        for source, folder in self._folders:
+            for path in sorted(folder.glob("*.json")) if folder is not None and folder.is_dir() else ():
+                try:
+                    held, _ = self._load(source, path)
+                except ConfigurationError as fault:
+                    yield LineFound(path.name, source, fault=str(fault))
+                else:
+                    yield LineFound(path.name, source, held.id, held.vehicle.model_dump(mode="json"))
+
+    def choose(self, name: str, source: Source) -> tuple[LineChoice, bytes]:
+        """The choice and the file's content. Raises CommissioningRefusedError."""
+        path = next((folder / name for one, folder in self._folders if one == source and folder is not None), None)
+        if path is None or _NAME.fullmatch(name) is None or not path.is_file():
+            raise CommissioningRefusedError("no_such_line", f"there is no line {name!r} of the {source}")
+        try:
+            held, content = self._load(source, path)
+        except ConfigurationError as fault:
+            raise CommissioningRefusedError("line_unusable", str(fault)) from None
+        copy_name = f"line-{hashlib.sha256(content).hexdigest()[:16]}.json"
+        return LineChoice(name=name, id=held.id, source=source, copy_name=copy_name), content
+
+    def upload(self, name: str, content: str, signature: str | None) -> LineFound:
+        """Keep a file under this name; on disk when this returns. Raises CommissioningRefusedError."""
+        if _NAME.fullmatch(name) is None:
+            raise CommissioningRefusedError(
+                "bad_name", f"{name!r}: a line's file is called like van-model.json: letters, digits, dots, dashes"
+            )
+        written = content.encode()
+        if len(written) > MOST_BYTES:
+            raise CommissioningRefusedError("too_large", f"{name} is longer than {MOST_BYTES} bytes")
+        kept, fresh = KeptFiles(self._uploaded), f".{name}.looked-at"
+        try:
+            self._require_place(name, written)
+            kept.write(fresh, written)
+            if signature is not None:
+                kept.write(fresh + SUFFIX, signature.encode())
+            held, _ = self._load("uploaded", self._uploaded / fresh)
+            if signature is not None:
+                kept.write(name + SUFFIX, signature.encode())
+            kept.write(name, written)
+        except OSError as fault:
+            raise CommissioningRefusedError("not_stored", f"{name} cannot be kept: {fault}") from None
+        except ConfigurationError as fault:
+            said = str(fault).replace(str(self._uploaded / fresh), name)
+            raise CommissioningRefusedError("line_unusable", said) from None
+        finally:
+            for leftover in (fresh, fresh + SUFFIX):
+                with suppress(OSError):
+                    (self._uploaded / leftover).unlink()
+        return LineFound(name, "uploaded", held.id, held.vehicle.model_dump(mode="json"))
+
+    def _require_place(self, name: str, written: bytes) -> None:
+        there = {path.name for path in self._uploaded.glob("*.json")} if self._uploaded.is_dir() else set()
+        if name in there and (self._uploaded / name).read_bytes() != written:
+            raise CommissioningRefusedError("name_taken", f"another line was uploaded as {name}: choose another name")
+        if name not in there and len(there) >= MOST_UPLOADED:
+            raise CommissioningRefusedError("too_many", f"{MOST_UPLOADED} lines were uploaded already")
+
+    def _load(self, source: Source, path: Path) -> tuple[CalibrationFile, bytes]:
+        """The file and its content. Raises ConfigurationError."""
+        read = Path.read_bytes if source == "package" else self._trust.read
+        try:
+            if path.stat().st_size > MOST_BYTES:
+                raise CalibrationFileError(f"{path}: is longer than {MOST_BYTES} bytes")
+            content = read(path)
+        except OSError as fault:
+            raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
+        return load_calibration(path, lambda _: content), content

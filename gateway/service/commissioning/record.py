@@ -1,0 +1,127 @@
+"""commissioning.json: the commissioning under way, and every calibration that one made. Replaced in one step."""
+
+import json
+from pathlib import Path
+from typing import Final, Literal
+
+from pydantic import Field, ValidationError
+
+from gateway.calibration.campaign import VehicleTable
+from gateway.calibration.commissioning import Learned
+from gateway.calibration.file.parts import Part
+from gateway.errors import ConfigurationError
+from gateway.files.kept import KeptFiles
+from gateway.stated import VehicleAnswers
+from gateway.toml_file import describe_faults
+
+FILE_NAME: Final = "commissioning.json"
+MOST_MADE: Final = 20  # calibrations; the oldest beyond are forgotten, and their files removed
+
+Source = Literal["package", "administrator", "uploaded"]
+
+
+class LineChoice(Part):
+    """The line that was chosen. ``copy_name`` is its copy in the service's folder, None for no line at all."""
+
+    name: str
+    id: str | None = None
+    source: Source | None = None
+    copy_name: str | None = None
+
+
+class EmptyClaim(Part):
+    """Who said that the vehicle is empty, and where the bus was then: a window that had begun does not count."""
+
+    at: str
+    by: str
+    drive_start_ns: int | None
+    newest_ns: int | None
+
+    def covers(self, drive_start_ns: int, t_start_ns: int) -> bool:
+        """Whether a window lies after the claim."""
+        if self.newest_ns is None or drive_start_ns != self.drive_start_ns:
+            return True
+        return t_start_ns >= self.newest_ns
+
+
+class Underway(Part):
+    """A commissioning that has begun and not ended."""
+
+    begun_at: str
+    by: str
+    note: str | None = None
+    line: LineChoice | None = None
+    vehicle: VehicleAnswers | None = None
+    empty: EmptyClaim | None = None
+    batches: tuple[str, ...] = Field((), description="kept batches of the empty drive, oldest first")
+    open_batch: str | None = Field(None, description="the part so far of the window that is open")
+    signals_id: str = Field(description="of the signal map that they were read with")
+    learned: Learned | None = None
+    is_fit_asked: bool = False
+    fault: str | None = Field(None, description="why the last fit made no calibration")
+
+
+class Ended(Part):
+    """When, by whom and why a calibration went out of use."""
+
+    at: str
+    by: str
+    why: Literal["undone", "back_to_factory"]
+
+
+class Made(Part):
+    """A calibration that was made here, and all it was made of."""
+
+    id: str = Field(description="of the calibration file")
+    file_name: str
+    at: str
+    by: str
+    note: str | None
+    line: LineChoice
+    vehicle: VehicleTable
+    batches: tuple[str, ...]
+    learned: Learned | None
+    warnings: tuple[str, ...]
+    ended: Ended | None = None
+
+
+class Record(Part):
+    """Calibrations that have not ended lie one on the other: the last is in use."""
+
+    format: Literal["springscale-commissioning"] = "springscale-commissioning"
+    version: Literal[1] = 1
+    underway: Underway | None = None
+    made: tuple[Made, ...] = ()
+
+    @property
+    def active(self) -> Made | None:
+        """The calibration to use; None: the one that the settings name."""
+        return next((one for one in reversed(self.made) if one.ended is None), None)
+
+    def with_made(self, one: Made) -> "Record":
+        """The commissioning is over and this came of it."""
+        return self.model_copy(update={"underway": None, "made": (*self.made, one)[-MOST_MADE:]})
+
+    def ended(self, chosen: tuple[Made, ...], end: Ended) -> "Record":
+        """With these out of use."""
+        made = tuple(one.model_copy(update={"ended": end}) if one in chosen else one for one in self.made)
+        return self.model_copy(update={"made": made})
+
+
+def load_record(directory: Path) -> Record:
+    """Empty where there is none yet. Raises ConfigurationError for a file that is none."""
+    path = directory / FILE_NAME
+    try:
+        return Record.model_validate_json(KeptFiles(directory).read(FILE_NAME))
+    except FileNotFoundError:
+        return Record()
+    except OSError as fault:
+        raise ConfigurationError(f"{path}: cannot be read: {fault.strerror or fault}") from None
+    except ValidationError as fault:
+        raise ConfigurationError(describe_faults(path, fault)) from None
+
+
+def save_record(directory: Path, record: Record) -> None:
+    """On disk when this returns. Raises OSError, and then the old one stands."""
+    text = json.dumps(record.model_dump(mode="json"), indent=1, allow_nan=False, ensure_ascii=False)
+    KeptFiles(directory).write(FILE_NAME, (text + "\n").encode())

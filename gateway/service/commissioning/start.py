@@ -1,0 +1,68 @@
+"""With which calibration a service starts: the one made on the vehicle, where there is one."""
+
+import logging
+from pathlib import Path
+
+from gateway.config import Settings
+from gateway.errors import ConfigurationError
+from gateway.files.signed import Read
+from gateway.log import Event, log_event
+from gateway.service.commissioning.record import load_record
+from gateway.service.last_good import setup_or_last_good
+from gateway.setup import Setup, setup_of
+
+
+def why_not_allowed(settings: Settings) -> str | None:
+    """Why no calibration may be made on this vehicle; None where one may."""
+    if not settings.commissioning.is_allowed:
+        return "[commissioning] is_allowed = false: calibrations come by file"
+    if settings.trust.public_keys and not settings.commissioning.is_unsigned_believed:
+        return (
+            "[trust] asks for signed calibrations, and nobody signs what is made on the vehicle: "
+            "set [commissioning] is_unsigned_believed to use it all the same"
+        )
+    return None
+
+
+def with_commissioned(settings: Settings) -> Settings:
+    """The settings with the calibration that was made here and is in use; the same where there is none.
+
+    A book that cannot be believed says nothing here: the service sets it aside and tells.
+    """
+    if why_not_allowed(settings) is not None:
+        return settings
+    try:
+        active = load_record(settings.store.directory).active
+    except ConfigurationError:
+        return settings
+    if active is None:
+        return settings
+    path = settings.store.directory / active.file_name
+    return settings.model_copy(update={"calibration": path, "estimator": "cross_spectrum"})
+
+
+def commissioned(settings: Settings) -> tuple[Settings, Setup, str | None]:
+    """The settings in use, the setup, and what is wrong with the calibration where another stands in for it.
+
+    Raises as ``setup_of``.
+    """
+    chosen = with_commissioned(settings)
+    if chosen is settings:
+        return settings, *setup_or_last_good(settings)
+    try:
+        return chosen, setup_of(chosen, read=_reading(chosen)), None
+    except ConfigurationError as broken:
+        log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=str(broken))
+        setup, fault = setup_or_last_good(settings)
+        what = f"the calibration made on the vehicle cannot be used ({broken}): make another, or undo it"
+        return settings, setup, f"{what}; {fault}" if fault else what
+
+
+def _reading(settings: Settings) -> Read:
+    """All as the settings trust it, but the one file that was made here and that nobody signs."""
+    own, read = settings.calibration, settings.trust.for_reading().read
+
+    def reading(path: Path) -> bytes:
+        return path.read_bytes() if path == own else read(path)
+
+    return reading

@@ -1,0 +1,121 @@
+"""Which step a commissioning is at, as it follows from what is written, and all of it as the web tells it."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any
+
+from gateway.calibration.commissioning import Learned
+from gateway.calibration.commissioning.job import Found
+from gateway.service.commissioning.lines import LineFound
+from gateway.service.commissioning.record import Made, Record, Underway
+
+
+class Step(StrEnum):
+    """What is wanted next."""
+
+    LINE = "line"
+    VEHICLE = "vehicle"
+    EMPTY = "empty"
+    DRIVE = "drive"
+    FIT = "fit"
+
+
+def step_of(underway: Underway) -> Step:
+    """The first that is not answered yet."""
+    if underway.line is None:
+        return Step.LINE
+    if underway.vehicle is None:
+        return Step.VEHICLE
+    if underway.empty is None:
+        return Step.EMPTY
+    return Step.FIT if underway.is_fit_asked else Step.DRIVE
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """What inspection found last, and over how many seconds of driving."""
+
+    findings: tuple[Found, ...]
+    seconds: float
+
+    @property
+    def has_fault(self) -> bool:
+        """Whether something must be mended first."""
+        return any(one.severity == "fault" for one in self.findings)
+
+
+@dataclass(frozen=True, slots=True)
+class Present:
+    """What is not on disk: how things are at this moment."""
+
+    why_not_allowed: str | None
+    is_calibrated: bool
+    is_busy: bool
+    driven_s: float
+    looked: Looked | None
+    started_with: str | None  # the calibration of ``Record.active`` at the service's start
+
+
+def told(record: Record, present: Present) -> dict[str, Any]:
+    """A CommissioningState of the web."""
+    underway, active = record.underway, record.active
+    is_pending = (active.id if active else None) != present.started_with
+    return {
+        "is_allowed": present.why_not_allowed is None,
+        "why_not": present.why_not_allowed,
+        "is_offered": present.why_not_allowed is None and underway is None and active is None
+        and not present.is_calibrated,
+        "underway": None if underway is None else _underway(underway, present),
+        "is_pending": is_pending,
+        "active": None if active is None else _made(active),
+        "history": [_made(one) for one in reversed(record.made)],
+    }  # fmt: skip
+
+
+def lines_told(found: Sequence[LineFound]) -> dict[str, Any]:
+    """The LinesFound of the web."""
+    return {"items": [asdict(one) for one in found]}
+
+
+def _underway(underway: Underway, present: Present) -> dict[str, Any]:
+    looked = present.looked
+    return {
+        "step": step_of(underway),
+        "begun_at": underway.begun_at,
+        "by": underway.by,
+        "note": underway.note,
+        "line": None if underway.line is None else underway.line.model_dump(include={"name", "id", "source"}),
+        "vehicle": None if underway.vehicle is None else underway.vehicle.model_dump(mode="json"),
+        "inspection": None
+        if looked is None
+        else {
+            "seconds": looked.seconds,
+            "has_fault": looked.has_fault,
+            "findings": [found.model_dump() for found in looked.findings],
+        },
+        "n_batches": len(underway.batches),
+        "driven_s": present.driven_s,
+        "learned": _learned(underway.learned),
+        "is_fitting": present.is_busy,
+        "fault": underway.fault,
+    }
+
+
+def _learned(learned: Learned | None) -> dict[str, Any] | None:
+    return None if learned is None else {**learned.model_dump(), "share": learned.share, "is_enough": learned.is_enough}
+
+
+def _made(made: Made) -> dict[str, Any]:
+    return {
+        "id": made.id,
+        "at": made.at,
+        "by": made.by,
+        "note": made.note,
+        "line": made.line.model_dump(include={"name", "id", "source"}),
+        "vehicle_name": made.vehicle.name,
+        "n_batches": len(made.batches),
+        "learned": _learned(made.learned),
+        "warnings": list(made.warnings),
+        "ended": None if made.ended is None else made.ended.model_dump(),
+    }

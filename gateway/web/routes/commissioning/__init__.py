@@ -1,0 +1,21 @@
+"""/api/v1/calibration/commissioning: a vehicle calibrated on its own machine, step by step.
+
+``steps`` has the addresses, ``shapes`` what is said and answered; the desk behind them is the service's.
+"""
+
+from gateway.web.routes.commissioning.shapes import CommissioningState, LinesFound
+from gateway.web.routes.commissioning.steps import (
+    COMMISSIONING_PATH,
+    CommissioningDesk,
+    NoCommissioningDesk,
+    commissioning_router,
+)
+
+__all__ = [
+    "COMMISSIONING_PATH",
+    "CommissioningDesk",
+    "CommissioningState",
+    "LinesFound",
+    "NoCommissioningDesk",
+    "commissioning_router",
+]

@@ -1,0 +1,152 @@
+"""What is said and answered while a vehicle is commissioned."""
+
+from typing import Literal
+
+from pydantic import BaseModel, Field
+
+from gateway.stated import VehicleAnswers
+from gateway.web.schemas import Body
+
+Source = Literal["package", "administrator", "uploaded"]
+
+
+class Begin(Body):
+    """Begins anew; forbidden while another is under way."""
+
+    note: str = Field("", max_length=200, description="kept in the history")
+
+
+class LineNamed(Body):
+    """A file among the lines there are."""
+
+    name: str = Field(max_length=64, examples=["van-model.json"])
+    source: Source
+
+
+class ChooseLine(Body):
+    """One of the lines there are; null: none, what is usual of any vehicle."""
+
+    line: LineNamed | None
+
+
+class VehicleBody(Body, VehicleAnswers):
+    """The vehicle as it stands before you, empty."""
+
+
+class ClaimEmpty(Body):
+    """The claim that the drive rests on."""
+
+    is_empty: Literal[True] = Field(description="you know that the vehicle is empty, and will be until this is over")
+
+
+class UploadLine(Body):
+    """A calibration of a sister vehicle, or a line file, as it lies on your disk."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,58}\.json$", examples=["van-model.json"])
+    content: str = Field(max_length=1_000_000, description="the file's text")
+    signature: str | None = Field(
+        None, max_length=4096, description="the text of its .sig, where the service asks for signatures"
+    )
+
+
+class LineTold(BaseModel):
+    """The line that was chosen; no name: none."""
+
+    name: str
+    id: str | None
+    source: Source | None
+
+
+class FindingTold(BaseModel):
+    """What inspection found."""
+
+    kind: str = Field(examples=["pitch_rate_sign"])
+    severity: Literal["fault", "warning", "note"]
+    text: str
+    advice: str
+
+
+class InspectionTold(BaseModel):
+    """What the last minutes of driving show of axes, signs, units and rates; a fault must be mended first."""
+
+    seconds: float
+    has_fault: bool
+    findings: list[FindingTold]
+
+
+class LearnedTold(BaseModel):
+    """How well loads would be weighed with what is known now, and what is needed: standard deviations."""
+
+    payload_std_kg: float
+    front_share_std_pct: float
+    needed_std_kg: float
+    share: float = Field(description="0..1 of what is to be learned")
+    is_enough: bool
+
+
+class UnderwayTold(BaseModel):
+    """What is under way, and which step is wanted next."""
+
+    step: Literal["line", "vehicle", "empty", "drive", "fit"]
+    begun_at: str = Field(json_schema_extra={"format": "date-time"})
+    by: str
+    note: str | None
+    line: LineTold | None
+    vehicle: VehicleAnswers | None
+    inspection: InspectionTold | None = Field(description="null: nothing was driven yet")
+    n_batches: int = Field(description="of the empty drive that count")
+    driven_s: float = Field(description="seconds in them, the open one as far as it has come")
+    learned: LearnedTold | None = Field(description="null: before the first batch is fitted")
+    is_fitting: bool
+    fault: str | None = Field(description="why the last fit made no calibration")
+
+
+class MadeEnd(BaseModel):
+    """How a calibration went out of use."""
+
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    by: str
+    why: Literal["undone", "back_to_factory"]
+
+
+class MadeTold(BaseModel):
+    """A calibration that was made on the vehicle."""
+
+    id: str
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    by: str
+    note: str | None
+    line: LineTold
+    vehicle_name: str
+    n_batches: int
+    learned: LearnedTold | None
+    warnings: list[str]
+    ended: MadeEnd | None
+
+
+class CommissioningState(BaseModel):
+    """Where a commissioning stands, and what was made before, newest first."""
+
+    is_allowed: bool
+    why_not: str | None
+    is_offered: bool = Field(description="the service has no calibration and none is on its way")
+    underway: UnderwayTold | None
+    is_pending: bool = Field(description="another calibration than the one at work counts from the next drive on")
+    active: MadeTold | None = Field(description="null: the calibration that the settings name, if any")
+    history: list[MadeTold]
+
+
+class LineFoundTold(BaseModel):
+    """A file to choose; a fault says why it cannot be used. ``vehicle`` are its figures, to fill a form with."""
+
+    name: str
+    source: Source
+    id: str | None
+    vehicle: dict[str, object] | None
+    fault: str | None
+
+
+class LinesFound(BaseModel):
+    """Every line there is."""
+
+    items: list[LineFoundTold]

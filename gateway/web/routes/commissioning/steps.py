@@ -1,0 +1,149 @@
+"""The addresses of a commissioning: what stands, and a step each."""
+
+import asyncio
+from typing import Annotated, Final, Protocol
+
+from fastapi import APIRouter, Query, Request
+from starlette.responses import Response
+
+from gateway.errors import CommissioningRefusedError
+from gateway.records import json_line
+from gateway.stated import VehicleAnswers
+from gateway.web.routes.calibration.asking import answered, json_response, who
+from gateway.web.routes.calibration.tare import UndoQuery
+from gateway.web.routes.commissioning.shapes import (
+    Begin,
+    ChooseLine,
+    ClaimEmpty,
+    CommissioningState,
+    LinesFound,
+    Source,
+    UploadLine,
+    VehicleBody,
+)
+from gateway.web.schemas import problem_responses
+
+COMMISSIONING_PATH: Final = "/calibration/commissioning"
+NOT_HERE: Final = "there is no service behind this page that could calibrate"
+
+
+class CommissioningDesk(Protocol):
+    """Who commissions. Blocking calls, each from a thread of its own; answers are JSON: a CommissioningState, or
+    LinesFound. All but ``told`` and ``lines`` raise CommissioningRefusedError.
+    """
+
+    def told(self) -> str: ...
+    def lines(self) -> str: ...
+    def begin(self, by: str, note: str | None) -> str: ...
+    def upload(self, name: str, content: str, signature: str | None) -> str: ...
+    def choose_line(self, name: str | None, source: Source | None) -> str: ...
+    def state_vehicle(self, answers: VehicleAnswers) -> str: ...
+    def is_empty(self, by: str) -> str: ...
+    def fit_now(self, by: str) -> str: ...
+    def cancel(self, by: str) -> str: ...
+    def undo(self, by: str, *, to_factory: bool) -> str: ...
+
+
+class NoCommissioningDesk:
+    """Where nothing is weighed nothing is calibrated."""
+
+    def told(self) -> str:
+        """Nothing, for good."""
+        nothing = dict.fromkeys(("underway", "active"))
+        flags = {"is_allowed": False, "why_not": NOT_HERE, "is_offered": False, "is_pending": False}
+        return json_line({**flags, **nothing, "history": []})
+
+    def lines(self) -> str:
+        """None."""
+        return json_line({"items": []})
+
+    def begin(self, by: str, note: str | None) -> str:
+        return self._refuse()
+
+    def upload(self, name: str, content: str, signature: str | None) -> str:
+        return self._refuse()
+
+    def choose_line(self, name: str | None, source: Source | None) -> str:
+        return self._refuse()
+
+    def state_vehicle(self, answers: VehicleAnswers) -> str:
+        return self._refuse()
+
+    def is_empty(self, by: str) -> str:
+        return self._refuse()
+
+    def fit_now(self, by: str) -> str:
+        return self._refuse()
+
+    def cancel(self, by: str) -> str:
+        return self._refuse()
+
+    def undo(self, by: str, *, to_factory: bool) -> str:
+        return self._refuse()
+
+    @staticmethod
+    def _refuse() -> str:
+        raise CommissioningRefusedError("not_allowed", NOT_HERE)
+
+
+def commissioning_router(desk: CommissioningDesk) -> APIRouter:
+    """The routes of a commissioning."""
+    router = APIRouter(prefix="/api/v1" + COMMISSIONING_PATH, tags=["calibration"])
+    refusals = problem_responses(403, 409, 503)
+    of_body = {**refusals, **problem_responses(400, 422)}
+
+    @router.get("", response_model=CommissioningState)
+    async def commissioning_state() -> Response:
+        """Where it stands: the step that is wanted, what inspection shows, what was learned, what was made."""
+        return json_response(await asyncio.to_thread(desk.told))
+
+    @router.post("", status_code=201, response_model=CommissioningState, responses=of_body)
+    async def begin_commissioning(request: Request, said: Begin) -> Response:
+        """Begin. On disk when answered, as every step."""
+        note = said.note if "note" in said.model_fields_set else None
+        return await answered(request, lambda: desk.begin(who(request), note), 201)
+
+    @router.delete("", response_model=CommissioningState, responses=refusals)
+    async def cancel_commissioning(request: Request) -> Response:
+        """Forget what is under way, at any step. Calibrations made before stay as they are."""
+        return await answered(request, lambda: desk.cancel(who(request)))
+
+    @router.get("/lines", response_model=LinesFound)
+    async def lines() -> Response:
+        """The lines there are: of the package, of the administrator, uploaded."""
+        return json_response(await asyncio.to_thread(desk.lines))
+
+    @router.post("/lines", status_code=201, response_model=LinesFound, responses={**of_body, **problem_responses(413)})
+    async def upload_line(request: Request, said: UploadLine) -> Response:
+        """Keep a file to choose, checked whole, and its signature where the service asks for one; up to 1 MiB."""
+        return await answered(request, lambda: desk.upload(said.name, said.content, said.signature), 201)
+
+    @router.post("/line", response_model=CommissioningState, responses={**of_body, **problem_responses(404)})
+    async def choose_line(request: Request, said: ChooseLine) -> Response:
+        """Which line the vehicle is of. May be answered anew until the calibration is made."""
+        return await answered(
+            request, lambda: desk.choose_line(*((said.line.name, said.line.source) if said.line else (None, None)))
+        )
+
+    @router.post("/vehicle", response_model=CommissioningState, responses=of_body)
+    async def state_vehicle(request: Request, said: VehicleBody) -> Response:
+        """What the empty vehicle weighs, its wheelbase, and where the sensor sits. May be answered anew as well."""
+        answers = VehicleAnswers(**said.model_dump(exclude_unset=True))
+        return await answered(request, lambda: desk.state_vehicle(answers))
+
+    @router.post("/empty", response_model=CommissioningState, responses=of_body)
+    async def claim_empty(request: Request, _said: ClaimEmpty) -> Response:
+        """It is empty now: what is driven from now on counts, until enough is known."""
+        return await answered(request, lambda: desk.is_empty(who(request)))
+
+    @router.post("/fit", response_model=CommissioningState, responses=refusals)
+    async def fit_now(request: Request) -> Response:
+        """Make the calibration of what was driven so far, enough or not."""
+        return await answered(request, lambda: desk.fit_now(who(request)))
+
+    @router.post("/undo", response_model=CommissioningState, responses={**refusals, **problem_responses(422)})
+    async def undo_commissioning(request: Request, query: Annotated[UndoQuery, Query()]) -> Response:
+        """Take the last calibration that was made here out of use, or all of them, from the next drive on."""
+        return await answered(request, lambda: desk.undo(who(request), to_factory=query.to == "factory"))
+
+    return router

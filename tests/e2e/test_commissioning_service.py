@@ -1,0 +1,121 @@
+"""A vehicle commissioned at a running service over HTTP: the same numbers as calibrated from logs at a desk."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.commissioned import Running, serve
+from support.half_car_road import VAN
+from support.known_load_logs import write_known_loads
+
+from gateway.calibration.campaign import load_campaign
+from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.config import load_settings
+from gateway.core.settings import BatchSettings
+from gateway.estimate_json import estimate_to_json
+from gateway.offline.campaigns import calibrate
+from gateway.offline.estimates import estimates_of_logs
+from gateway.setup import load_setup
+from gateway.store import Store
+
+WINDOW_S = 100.0
+DRIVEN_S = 250.0  # two windows, and a part of one
+LOADS = ((0.0, None), (300.0, 1.4))
+ANSWERS = {
+    "kerb_front_axle_kg": 725.0,
+    "kerb_rear_axle_kg": 683.0,
+    "wheelbase_m": VAN.wheelbase_m,
+    "sensor_position_m": VAN.sensor_position_m,
+    "empty_mass_kg": VAN.empty_mass_kg,
+    "empty_front_share_pct": VAN.empty_front_share_pct,
+    "empty_front_share_std_pct": VAN.empty_front_share_std_pct,
+}
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    """A service without a calibration on a bus of the test's own."""
+    path = tmp_path / "springscale.toml"
+    path.write_text(
+        f"""
+        signals = "springscale:reference"
+        [vehicle]
+        id = "van-17"
+        [bus]
+        interface = "virtual"
+        channel = "{tmp_path.name}"
+        [batch]
+        window_s = {WINDOW_S}
+        provisional_every_s = 0.0
+        silence_s = 2.0
+        [web]
+        port = 0
+        [store]
+        directory = "state"
+        """
+    )
+    return path
+
+
+def calibrated_at_a_desk(campaign_path: Path) -> CalibrationFile:
+    campaign = load_campaign(campaign_path)
+    return calibrate(campaign, BatchSettings(window_s=WINDOW_S), estimators=("cross_spectrum",), numbers=[1]).file
+
+
+def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, tmp_path: Path) -> None:
+    campaign = write_known_loads(tmp_path, LOADS, DRIVEN_S, identification_fraction=1.0)
+    said: dict[str, Any] = {}
+
+    def meet(running: Running) -> None:
+        assert running.ask()["is_offered"]
+        assert running.step("vehicle", ANSWERS)["reason"] == "not_begun"
+        assert running.step("", {"note": "in the yard"})["underway"]["step"] == "line"
+        assert running.step("vehicle", ANSWERS)["reason"] == "wrong_step"
+        assert running.step("line", {"line": None})["underway"]["step"] == "vehicle"
+        assert running.step("vehicle", ANSWERS)["underway"]["step"] == "empty"
+        assert running.step("empty", {"is_empty": True})["underway"]["step"] == "drive"
+        assert running.step("fit", {})["reason"] == "no_batch"
+        running.play(tmp_path / "01.log")
+        said["made"] = running.wait_until(lambda told: told["active"] is not None)
+        running.wait_until(lambda told: running.n_starts == 2 and not told["is_pending"])
+        said["status"] = running.ask("/api/v1/status")
+        running.play(tmp_path / "02.log")
+        said["undone"] = running.ask("/api/v1/calibration/commissioning/undo", {}, "POST")
+        running.wait_until(lambda told: running.n_starts == 3 and not told["is_pending"])
+        said["after"] = running.ask("/api/v1/status")
+
+    serve(config, meet)
+
+    desk = calibrated_at_a_desk(campaign)
+    made = said["made"]["active"]
+    box = load_calibration(next((tmp_path / "state").glob("commissioned-*.json")))
+    assert box.id == made["id"] == said["status"]["calibration_id"]
+    assert (made["by"], made["note"], made["n_batches"]) == ("local", "in the yard", 2)
+    assert box.cross_spectrum is not None
+    assert desk.cross_spectrum is not None
+    assert box.cross_spectrum.model_dump_json() == desk.cross_spectrum.model_dump_json()
+    assert box.warnings == desk.warnings
+    assert said["undone"]["active"] is None
+    assert said["after"]["calibration_id"] is None
+    assert_weighs_the_same(config, tmp_path, desk)
+
+
+def assert_weighs_the_same(config: Path, folder: Path, desk: CalibrationFile) -> None:
+    """What the service stored of the loaded drive is what its log gives with the desk's calibration."""
+    store = Store.open(load_settings(config).store.directory)
+    try:
+        items = [json.loads(text) for text in store.reader().estimates(limit=100).items]
+    finally:
+        store.close()
+    weighed = [one for one in items if one["calibration_id"] is not None and not one["rejected"]]
+    (folder / "desk.json").write_text(desk.to_json())
+    setup = load_setup("springscale:reference", folder / "desk.json")
+    offline = list(estimates_of_logs([folder / "02.log"], setup, BatchSettings(window_s=WINDOW_S)))
+    told = [numbers(estimate_to_json(one)) for one in offline if one.counted]
+    assert weighed
+    assert [numbers(one) for one in weighed] == told
+
+
+def numbers(record: dict[str, Any]) -> tuple[Any, ...]:
+    return tuple(record[key] for key in ("t_end_ns", "payload_kg", "payload_std_kg", "front_share_pct"))
