@@ -17,12 +17,14 @@ from benchmarks.accuracy import advice as on_advice
 from benchmarks.accuracy import coverage as on_coverage
 from benchmarks.accuracy import disturbances as on_disturbances
 from benchmarks.accuracy import sensitivity as on_sensitivity
+from benchmarks.accuracy import siblings as on_siblings
 from benchmarks.accuracy.bounds import limits, limits_table
 from benchmarks.accuracy.coverage_drives import Scope
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.disturbances_page import disturbances_page
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
 from benchmarks.accuracy.sensitivity import sensitivity_page
+from benchmarks.accuracy.siblings import siblings_page
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection import SplitRun
 from gateway.calibration.judgement import learning_curve as on_learning
@@ -131,6 +133,16 @@ def sensitivity(n_vans: int, seed: int, workers: int, output: Path | None) -> No
     with counted("driving vans, calibrating and weighing them over and over") as on_van:
         found = on_sensitivity.sensitivity(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("sensitivity", found, sensitivity_page(found), output)
+
+
+@studies.command("siblings")
+@_vans(on_siblings.SEED)
+@_output
+def siblings(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
+    """What does a line tell of its next van? Simulated siblings calibrated in six ways; ~1 min a van."""
+    with counted("calibrating lines and driving their siblings") as on_line:
+        found = on_siblings.siblings(n_vans, seed, workers=workers, on_van=on_line).to_json()
+    _hand_out("siblings", found, siblings_page(found), output)
 
 
 @studies.command("bounds")

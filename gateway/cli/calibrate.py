@@ -9,7 +9,7 @@ import click
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file import CalibrationFile, LikeFile, load_like
+from gateway.calibration.file import CalibrationFile, LikeFile, line_of_files, load_like
 from gateway.calibration.inspection import Inspection, Kind
 from gateway.calibration.judgement import LearningCurve, curve_of
 from gateway.calibration.plan import LoadPlan, plan_first, plan_next
@@ -88,10 +88,10 @@ def calibrate(
     _require_places(output, report)
     loaded = load_campaign(campaign, may_lack_runs=wants_plan)
     _ask_for_payload_range(loaded, is_needed=wants_plan)
-    if not loaded.runs:
-        _plan_first(loaded.vehicle, as_json=as_json)
-        return
     sisters = [load_like(path) for path in like]
+    if not loaded.runs:
+        _plan_first(loaded.vehicle, sisters, as_json=as_json)
+        return
     inspection = _inspect(loaded, numbers, batch_settings(window_s))
     if sisters:
         inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)  # other loads were driven with the sisters
@@ -145,9 +145,9 @@ def _command(
     return shlex.join(words)
 
 
-def _plan_first(vehicle: Vehicle, *, as_json: bool) -> None:
+def _plan_first(vehicle: Vehicle, like: Sequence[LikeFile], *, as_json: bool) -> None:
     """--plan before any drive."""
-    plan = plan_first(vehicle)
+    plan = plan_first(vehicle, inherited=line_of_files(like) if like else None)
     click.echo(json_line({"plan": plan.to_json()}) if as_json else plan_sentences(plan))
 
 

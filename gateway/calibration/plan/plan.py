@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.half_car import prior_of
+from gateway.calibration.half_car import Inherited, prior_of
 from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATION
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import Design
@@ -90,9 +90,9 @@ class LoadPlan:
         return asdict(self) | {"is_enough_driven": self.is_enough_driven}
 
 
-def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST) -> LoadPlan:
-    """A first campaign: empty, then what the priors of any vehicle let expect the most of."""
-    prior = prior_of(vehicle)
+def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST, inherited: Inherited | None = None) -> LoadPlan:
+    """A first campaign: empty, then what the priors of any vehicle, or of its line, let expect the most of."""
+    prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=False)
     planner = _Planner(vehicle, prior.mean, FIRST_DRIVE)
     unloaded = empty(vehicle)
     known = planner.after(prior.covariance, unloaded)
@@ -122,7 +122,7 @@ def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadP
     inflation = known.payload_inflation, known.front_share_inflation
     planner = _Planner(vehicle, known.parameters, drive, inflation)
     of_half_car = known.covariance[: len(PARAMETERS), : len(PARAMETERS)]  # what was learned of roll weighs no load
-    driven = tuple(PlacedLoad(run.payload_kg, None, run.front_share_pct) for run in runs)
+    driven = tuple(PlacedLoad(load.payload_kg, None, load.front_share_pct) for load in known.known_loads)
     return LoadPlan(
         vehicle=vehicle.name,
         n_driven=len(runs),
