@@ -1,47 +1,18 @@
 """A calibration file of any content, its hash made to fit, is used or refused in words: nothing else."""
 
-import copy
 import json
 import random
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
+from support.odd_content import GONE, ODD, changed, places
 
 from gateway.calibration.file.calibration_file import content_id, load_calibration
 from gateway.errors import CalibrationFileError
 
 GOOD = json.loads((Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json").read_text())
-ODD: tuple[Any, ...] = (
-    *(None, True, False, "", "x", "\ud83d", "0", [], {}, [[]], [None], {"a": 1}, [1.0, [2.0]], [[1.0], [2.0, 3.0]]),
-    *(0, -1, 1, 2, 3, 0.5, 1e308, -1e308, 5e-324, 2**63, 10**400, -(2**70)),
-)
-GONE = object()
 N_TRIALS = 120
-
-
-def places(part: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Every place in the file; of a long list the first two and the last."""
-    if path:
-        yield path
-    inner = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
-    for key, child in inner:
-        if not isinstance(part, list) or key in {0, 1, len(part) - 1}:
-            yield from places(child, (*path, key))
-
-
-def changed(path: tuple[Any, ...], odd: Any) -> dict[str, Any]:
-    content: dict[str, Any] = copy.deepcopy(GOOD)
-    inner: Any = content
-    for key in path[:-1]:
-        inner = inner[key]
-    if odd is GONE:
-        del inner[path[-1]]
-    else:
-        inner[path[-1]] = odd
-    return content
 
 
 def test_any_content_is_used_or_refused_in_words(tmp_path: Path) -> None:
@@ -49,7 +20,7 @@ def test_any_content_is_used_or_refused_in_words(tmp_path: Path) -> None:
     all_places = list(places(GOOD))
     path, n_used, refusals = tmp_path / "vehicle.json", 0, []
     for _ in range(N_TRIALS):
-        content = changed(dice.choice(all_places), dice.choice((*ODD, GONE)))
+        content = changed(GOOD, dice.choice(all_places), dice.choice((*ODD, GONE)))
         content["id"] = content_id(content)
         path.write_text(json.dumps(content))
         try:

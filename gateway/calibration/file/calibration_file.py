@@ -117,7 +117,7 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
     if content.get("format") != FORMAT:
         raise CalibrationFileError(f"{path}: not a springscale calibration file (format is {content.get('format')!r})")
     _refuse_unknown_version(path, content.get("version"))
-    if not _matches_its_id(content):
+    if not matches_its_id(content):
         raise CalibrationFileError(
             f"{path}: content does not match its id: the file was changed after it was written; "
             "restore it or calibrate again"
@@ -152,7 +152,8 @@ def _refuse_unknown_version(path: Path, version: Any) -> None:
         )
 
 
-def _matches_its_id(content: dict[str, Any]) -> bool:
+def matches_its_id(content: Content) -> bool:
+    """False for a file that was changed since it was written."""
     try:
         return bool(content.get("id") == content_id(content))
     except ValueError:  # a number that is not finite, which is never written

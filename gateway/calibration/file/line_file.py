@@ -7,7 +7,13 @@ from typing import Final, Literal
 
 from pydantic import Field, ValidationError
 
-from gateway.calibration.file.calibration_file import CalibrationFile, content_id, load_calibration, read_content
+from gateway.calibration.file.calibration_file import (
+    CalibrationFile,
+    content_id,
+    load_calibration,
+    matches_its_id,
+    read_content,
+)
 from gateway.calibration.file.line_part import LinePart
 from gateway.calibration.file.parts import ExpectedErrorsPart, Part
 from gateway.calibration.line import Line, line_of
@@ -66,7 +72,7 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
             f"{path}: line file version {content.get('version')!r}, this springscale reads version {LINE_VERSION}: "
             "build it again with `springscale line build`"
         )
-    if content.get("id") != content_id(content):
+    if not matches_its_id(content):
         raise CalibrationFileError(
             f"{path}: content does not match its id: the file was changed after it was written; restore it or build "
             "it again"

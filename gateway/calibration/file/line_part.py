@@ -1,6 +1,7 @@
 """What a calibration inherited from sister vehicles, as the file holds it; a line file holds the same."""
 
 from dataclasses import asdict, astuple
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -24,6 +25,8 @@ class EvidencePart(Part):
     def _is_consistent(self) -> "EvidencePart":
         n = len(self.names)
         check_shapes(information=(self.information, (n, n)), pull=(self.pull, (n,)))
+        if not np.array_equal(self.information, self.information.T):
+            raise ValueError("information is not symmetric")
         return self
 
     @classmethod
@@ -81,7 +84,7 @@ class LinePart(Part):
     usual_log_amplitude: float
     half_car: EvidencePart
     roll: EvidencePart | None = Field(description="null: no member read a roll rate")
-    scatter_std: dict[str, float] = Field(
+    scatter_std: dict[str, Annotated[float, Field(gt=0.0, allow_inf_nan=False)]] = Field(
         description="of the difference between two vehicles: shares of what is positive, else in the unit that ends "
         "the name; what is not named here is each vehicle's own"
     )

@@ -18,10 +18,14 @@ _ENDS: Final = ("front", "rear")
 
 _OF_AXLE: Final[Mapping[str, float]] = MappingProxyType(
     {
-        "spring_{}_npm": 0.03,  # coil springs are made to +-10 % of their rate (springs3d.com/en/tolerancias)
-        "damper_{}_nspm": 0.10,  # new ones to +-15 % or so, and they wear; no source beyond the fleet trade's rule
-        "damper_mount_{}_npm": 0.15,  # rubber: +-5 degrees of Shore hardness are about 15 % of its modulus
-        "tyre_{}_npm": 0.04,  # goes with its pressure: 10 % of that, which a fleet lets pass, are about 8 %
+        # makers of custom coils guarantee +-10 % of the rate (springs3d.com/en/tolerancias), car makers ask for less
+        "spring_{}_npm": 0.03,
+        "damper_{}_nspm": 0.10,  # wear, oil, makes; chosen: buyers agree on bands of their own
+        # rubber of +-5 degrees Shore A (driventus.com on sourcing dampers) is +-20 % (gmt-rubber.com, figure 1.2)
+        "damper_mount_{}_npm": 0.15,
+        # chosen for a fleet that looks after its tyres, whose rate goes with the pressure: in a survey of 3950 light
+        # trucks a third had one a quarter too low (NHTSA 2001)
+        "tyre_{}_npm": 0.04,
         "unsprung_{}_kg": 0.03,  # wheels and tyres of other makes
         "damper_friction_{}": 0.05,  # a third of the 0.1 to 0.3 that vans were found to have
         "spring_friction_{}": 0.02,  # likewise, of 0.03 to 0.09

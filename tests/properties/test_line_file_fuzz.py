@@ -1,0 +1,77 @@
+"""A line file says what was built, and one of any content, its hash made to fit, is used or refused in words."""
+
+import json
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.half_car_road import VAN
+from support.odd_content import GONE, ODD, changed, places
+
+from gateway.calibration.file import LineFile, LinePart, SiblingPart, line_of_files, load_like
+from gateway.calibration.file.calibration_file import content_id
+from gateway.calibration.half_car import prior_of
+from gateway.calibration.line import Evidence, Limits, Line, Seen
+from gateway.calibration.line.scatter import default_scatter_std, is_inherited
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
+from gateway.core.vehicle import Load
+from gateway.errors import CalibrationFileError
+
+N_TRIALS = 120
+
+
+def line() -> Line:
+    """Of drives that halved every standard deviation of what is inherited."""
+    prior = prior_of(VAN)
+    shared = is_inherited(PARAMETERS)
+    return Line(
+        members=("sha256:" + 64 * "a",),
+        wheelbase_m=VAN.wheelbase_m,
+        empty_mass_kg=VAN.empty_mass_kg,
+        usual_log_amplitude=-4.0,
+        half_car=Evidence.of(prior.mean, 0.25 * prior.covariance, prior, shared),
+        roll=None,
+        scatter_std=default_scatter_std(PARAMETERS + ROLL_PARAMETERS),
+        n_siblings=0,
+        seen=Seen((0.0, 400.0), (40.0, 55.0), (13.0, 15.0), 0.8, 0.02, (Load(0.0, 52.0), Load(400.0, 41.0))),
+        limits=Limits(1.25, 0.0, 1.25, 0.0, 1.25, 5.0, 6.0, 6.0),
+    )
+
+
+def line_file() -> LineFile:
+    sibling = SiblingPart(id="sha256:" + 64 * "a", name="van", empty_mass_kg=1240.0, n_runs=10)
+    return LineFile(software="springscale", siblings=(sibling,), line=LinePart.of(line()))
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "line.json"
+    path.write_text(line_file().to_json())
+    held = load_like(path)
+    assert held.id == line_file().id
+    read, built = line_of_files([held]), line()
+    assert (read.members, read.seen, read.limits) == (built.members, built.seen, built.limits)
+    assert np.array_equal(read.half_car.information, built.half_car.information)
+    assert np.array_equal(read.half_car.pull, built.half_car.pull)
+    assert np.array_equal(read.scatter_std, built.scatter_std)
+    assert read.roll is None
+
+
+@pytest.mark.filterwarnings("ignore:overflow")  # numbers of 1e308 are finite
+def test_any_content_is_used_or_refused_in_words(tmp_path: Path) -> None:
+    good = json.loads(line_file().to_json())
+    dice = random.Random(58)
+    all_places = list(places(good))
+    path, n_used, refusals = tmp_path / "line.json", 0, []
+    for _ in range(N_TRIALS):
+        content = changed(good, dice.choice(all_places), dice.choice((*ODD, GONE)))
+        content["id"] = content_id(content)
+        path.write_text(json.dumps(content))
+        try:
+            line_of_files([load_like(path)])
+            n_used += 1
+        except CalibrationFileError as fault:
+            refusals.append(str(fault))
+    assert all(str(path) in refusal for refusal in refusals)
+    assert n_used > 3
+    assert len(refusals) > 40
