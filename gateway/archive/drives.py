@@ -100,7 +100,7 @@ def readable(logs: Sequence[JobLog]) -> list[JobLog]:
 
 def followed(logs: Sequence[JobLog], next_ns: int | None) -> Iterator[tuple[JobLog, int | None]]:
     """Each log with the first frame of the one after it; ``next_ns`` is that after the last."""
-    return zip(logs, [*(one.facts.first_ns for one in logs[1:]), next_ns], strict=True)
+    return zip(logs, [*(one.facts.first_ns for one in logs[1:]), next_ns], strict=False)  # no logs, none after them
 
 
 def goes_on(newest_ns: int | None, next_ns: int | None, settings: BatchSettings) -> bool:

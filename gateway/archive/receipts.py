@@ -7,6 +7,7 @@
 JOB is the hash of everything that the table follows from. What is named here can be told from a listing alone.
 """
 
+import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -47,9 +48,9 @@ class Slot:
         """What vouches for them."""
         return f"{RECEIPTS}/{self.folder}/{self.job}.json"
 
-    def failure(self, log_sha256: str | None = None) -> str:
-        """Where it is told that the job, or one log of it, gave nothing."""
-        name = self.job if log_sha256 is None else f"{self.job}-{log_sha256[:16]}"
+    def failure(self, log: str | None = None) -> str:
+        """Where it is told that the job, or one log of it by its name, gave nothing."""
+        name = self.job if log is None else f"{self.job}-{hashlib.sha256(log.encode()).hexdigest()[:16]}"
         return f"{FAILED}/{self.folder}/{name}.json"
 
 

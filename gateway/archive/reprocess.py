@@ -179,5 +179,6 @@ def _retire(dataset: Place, jobs: Sequence[Job]) -> None:
         if slot.folder in whole and slot not in planned[slot.folder]:
             dataset.remove(slot.receipt)
     for slot, path in failure_files(dataset):
-        if slot.folder in whole and slot.job not in {job.job for job in planned[slot.folder]}:
+        is_of_old_inputs = slot.folder in whole and slot not in planned[slot.folder]
+        if is_of_old_inputs or (slot in done and path == slot.failure()):
             dataset.remove(path)

@@ -126,7 +126,7 @@ def _told(one: JobLog, report: LogReport) -> dict[str, Any]:
 def _tell_failure(job: Job, one: JobLog, reason: str) -> None:
     slot = job.slot
     content = {"vehicle": slot.vehicle, "month": slot.month, "job": slot.job, "log": one.log.name, "reason": reason}
-    job.dataset.replace(slot.failure(one.facts.sha256), text_of({**content, "sha256": one.facts.sha256}))
+    job.dataset.replace(slot.failure(one.log.name), text_of({**content, "sha256": one.facts.sha256}))
 
 
 def _failed(job: Job, outcome: Outcome) -> Outcome:

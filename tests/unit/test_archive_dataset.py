@@ -72,7 +72,7 @@ def test_readers_trust_receipts_only(tmp_path: Path) -> None:
     without_receipt = replace(SLOT, job="killed")
     place = place_of(tmp_path)
     place.create(without_receipt.table, parquet_of([{**row_of(make_record(2)), **TOLD, "job": "killed"}]))
-    place.create(SLOT.failure("0" * 64), text_of({"log": "a.log", "reason": "holds no CAN frame"}))
+    place.create(SLOT.failure("a.log"), text_of({"log": "a.log", "reason": "holds no CAN frame"}))
     place.create(replace(SLOT, job="broken").failure(), text_of({"log": None, "reason": "killed its worker"}))
     assert slots_done(place) == [SLOT]
     assert slots_failed(place) == [replace(SLOT, job="broken")]

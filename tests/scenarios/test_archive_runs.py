@@ -1,0 +1,272 @@
+"""Runs over an archive that go wrong, stop, or meet what has changed: no lie, no loss, nothing done twice."""
+
+import gzip
+import json
+from concurrent.futures import Future
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.archive import MIDNIGHT_NS, Here, S, tables_of, uploaded, write_drive, write_manifest
+
+from gateway.archive import Place, PlaceError, failures, place_of, receipts, rows_of, slots_done
+from gateway.archive.inventory import forecast, look
+from gateway.archive.jobs import Job
+from gateway.archive.manifest import load_manifest
+from gateway.archive.processes import WorkerKilledError
+from gateway.archive.reprocess import Summary, reprocess
+from gateway.archive.run import Outcome, Status, run
+from gateway.errors import ConfigurationError
+
+HOUR = 3600 * S
+
+
+@pytest.fixture(name="archive")
+def _archive(tmp_path: Path) -> Path:
+    """Two vehicles, two drives each, of one whole batch and a short one."""
+    for n, name in enumerate(("van-1", "van-2")):
+        for i in range(2):
+            write_drive(tmp_path / name / f"{i}.log", MIDNIGHT_NS + i * HOUR, 21.0, seed=10 * n + i)
+    write_manifest(tmp_path, "van-1", "van-2")
+    return tmp_path
+
+
+def dataset_of(archive: Path) -> Place:
+    return place_of(archive / "dataset")
+
+
+def done(archive: Path, workers: Any = None, **how: Any) -> Summary:
+    return reprocess(load_manifest(str(archive)), dataset_of(archive), workers or Here(), **how)
+
+
+def files_of(archive: Path) -> dict[str, bytes]:
+    return {item.path: dataset_of(archive).read(item.path) for item in dataset_of(archive).items()}
+
+
+class Refusing(Here):
+    """Answers with a fault where a job is of this vehicle."""
+
+    def __init__(self, vehicle: str, fault: Exception) -> None:
+        self.vehicle, self.fault = vehicle, fault
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        if isinstance(args[0], Job) and args[0].slot.vehicle == self.vehicle:
+            future: Future[Any] = Future()
+            future.set_exception(self.fault)
+            return future
+        return super().submit(fn, *args, **kwargs)
+
+
+def test_a_second_run_writes_nothing_anew(archive: Path) -> None:
+    first = done(archive)
+    before = files_of(archive)
+    second = done(archive)
+    assert (first.counts["done"], first.is_good) == (2, True)
+    assert (second.counts["done"], second.counts["already"], second.is_good) == (0, 2, True)
+    assert files_of(archive) == before
+
+
+def test_a_poison_log_is_told_and_the_rest_goes_on(archive: Path) -> None:
+    (archive / "van-1" / "0.log").write_bytes(b"\0\xff not a log \n" * 100)
+    summary = done(archive)
+    assert not summary.is_good
+    assert (summary.counts["done"], summary.counts["failed"], summary.n_failed_logs) == (2, 0, 1)
+    [told] = failures(archive / "dataset")
+    assert told["log"] == "van-1/0.log"
+    assert told["reason"].startswith("van-1/0.log: holds no CAN frame")
+    [receipt] = receipts(archive / "dataset", lambda slot: slot.vehicle == "van-1")
+    assert [one["log"] for one in receipt["logs"]] == ["van-1/1.log"]
+    assert [one["log"] for one in receipt["failed_logs"]] == ["van-1/0.log"]
+    assert done(archive).is_good  # it is told once; nothing else can be made of the same bytes
+
+
+def test_a_vehicle_of_poison_logs_alone_gets_no_receipt(archive: Path) -> None:
+    for log in (archive / "van-1").iterdir():
+        log.write_bytes(b"")
+    summary = done(archive)
+    assert (summary.counts["done"], summary.counts["failed"]) == (1, 1)
+    assert {slot.vehicle for slot in slots_done(dataset_of(archive))} == {"van-2"}
+    assert sorted(str(told["log"]) for told in failures(archive / "dataset")) == ["None", "van-1/0.log", "van-1/1.log"]
+    again = done(archive)
+    assert (again.counts["failed_before"], again.counts["failed"]) == (1, 0)
+    assert done(archive, retry_failed=True).counts["failed"] == 1
+
+
+def test_a_log_cut_in_the_middle_counts_as_far_as_it_goes(archive: Path) -> None:
+    packed = gzip.compress((archive / "van-1" / "1.log").read_bytes())
+    (archive / "van-1" / "1.log").unlink()
+    (archive / "van-1" / "1.log.gz").write_bytes(packed[: len(packed) // 2])
+    assert done(archive).is_good
+    [receipt] = receipts(archive / "dataset", lambda slot: slot.vehicle == "van-1")
+    assert [one["ended_early"] is None for one in receipt["logs"]] == [True, False]
+
+
+def test_a_log_of_another_vehicle_s_frames_is_told(archive: Path) -> None:
+    lines = (archive / "van-1" / "0.log").read_text().splitlines()
+    others = [line.partition(" can0 ")[0] + " can0 7A1#0102030405060708" for line in lines]
+    (archive / "van-1" / "0.log").write_text("\n".join(others) + "\n")
+    assert not done(archive).is_good
+    [told] = failures(archive / "dataset")
+    assert "has an identifier of the signal map" in told["reason"]
+    assert told["reason"].startswith("van-1/0.log: ")
+
+
+def test_a_worker_killed_between_table_and_receipt_leaves_no_lie(
+    archive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    create = Place.create
+
+    def killed(place: Place, path: str, content: bytes) -> bool:
+        if path.startswith("receipts/"):
+            raise KeyboardInterrupt
+        return create(place, path, content)
+
+    with monkeypatch.context() as killing:
+        killing.setattr(Place, "create", killed)
+        with pytest.raises(KeyboardInterrupt):
+            done(archive)
+    assert [item.path for item in dataset_of(archive).items("estimates")]
+    assert slots_done(dataset_of(archive)) == []
+    assert done(archive).counts["done"] == 2
+    assert {len(rows_of(dataset_of(archive), slot)) for slot in slots_done(dataset_of(archive))} == {4}
+
+
+def test_a_receipt_that_another_worker_wrote_stands(archive: Path) -> None:
+    manifest = load_manifest(str(archive))
+    done(archive)
+    jobs = look(manifest, dataset_of(archive)).jobs()
+    before = files_of(archive)
+    assert {run(job).status for job in jobs} == {Status.ALREADY}
+    assert files_of(archive) == before
+
+
+def test_two_workers_at_one_job_agree_on_one_receipt(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both find no receipt; the conditional write lets one of them win, and the other says so."""
+    done(archive)
+    before = files_of(archive)
+    job = look(load_manifest(str(archive)), dataset_of(archive)).jobs()[0]
+    monkeypatch.setattr("gateway.archive.run._is_done", lambda job: False)
+    assert run(job).status is Status.ALREADY
+    assert files_of(archive) == before
+
+
+def test_a_job_that_kills_its_workers_is_told_as_failed(archive: Path) -> None:
+    summary = done(archive, Refusing("van-1", WorkerKilledError("3 processes died over it")))
+    assert (summary.counts["done"], summary.counts["failed"]) == (1, 1)
+    [told] = failures(archive / "dataset")
+    assert (told["vehicle"], told["log"], told["reason"]) == ("van-1", None, "3 processes died over it")
+    assert done(archive).counts["failed_before"] == 1
+    assert done(archive, retry_failed=True).counts["done"] == 1
+    assert failures(archive / "dataset") == []  # a receipt has taken its place
+
+
+def test_what_a_store_refuses_is_left_for_the_next_run(archive: Path) -> None:
+    summary = done(archive, Refusing("van-1", PlaceError("s3://x/y: timed out")))
+    assert (summary.counts["done"], summary.counts["lost"], summary.is_good) == (1, 1, False)
+    assert list(summary.lost.values()) == ["s3://x/y: timed out"]
+    assert done(archive).counts["done"] == 1
+
+
+def test_another_springscale_on_a_worker_ends_the_run(archive: Path) -> None:
+    manifest = load_manifest(str(archive))
+    done(archive)
+    job = look(manifest, dataset_of(archive)).jobs()[0]
+    other = replace(job, inputs={**job.inputs, "software": "springscale 9.9.9 code 0"})
+    with pytest.raises(ConfigurationError, match="install the same springscale on every computer"):
+        run(other)
+
+
+def test_a_log_that_is_changed_meanwhile_is_left_for_the_next_run(archive: Path) -> None:
+    manifest = load_manifest(str(archive))
+    reprocess(manifest, dataset_of(archive), Here())
+    job = next(job for job in look(manifest, dataset_of(archive)).jobs() if job.slot.vehicle == "van-1")
+    dataset_of(archive).remove(job.slot.receipt)
+    write_drive(archive / "van-1" / "0.log", MIDNIGHT_NS, 21.0, seed=99)
+    with pytest.raises(PlaceError, match=r"van-1/0\.log: was changed while the archive was read"):
+        run(job)
+
+
+def test_new_inputs_take_the_place_of_the_old_once_they_are_done(archive: Path) -> None:
+    done(archive)
+    before = {slot.vehicle: slot for slot in slots_done(dataset_of(archive))}
+    write_drive(archive / "van-1" / "2.log", MIDNIGHT_NS + 2 * HOUR, 21.0, seed=7)
+    refused = done(archive, Refusing("van-1", PlaceError("later")))
+    assert refused.counts["lost"] == 1
+    assert set(slots_done(dataset_of(archive))) == set(before.values())  # the old stands until then
+    assert done(archive).counts["done"] == 1
+    after = {slot.vehicle: slot for slot in slots_done(dataset_of(archive))}
+    assert after["van-2"] == before["van-2"]
+    assert after["van-1"] != before["van-1"]
+    assert len(rows_of(dataset_of(archive), after["van-1"])) == 6
+
+
+def test_a_vehicle_with_a_log_out_of_reach_is_not_weighed_without_it(
+    archive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from gateway.archive import survey
+
+    def unreachable(log: survey.LogFile) -> survey.LogFacts:
+        if log.name == "van-1/1.log":
+            raise PlaceError(f"{log.name}: timed out")
+        return facts_of(log)
+
+    facts_of = survey._facts_of
+    with monkeypatch.context() as breaking:
+        breaking.setattr(survey, "_facts_of", unreachable)
+        summary = done(archive)
+    assert summary.lost == {"van-1/1.log": "van-1/1.log: timed out"}
+    assert {slot.vehicle for slot in slots_done(dataset_of(archive))} == {"van-2"}
+    assert done(archive).counts["done"] == 1
+
+
+def test_an_archive_without_logs_is_told_with_where_they_were_looked_for(tmp_path: Path) -> None:
+    write_manifest(tmp_path, "van-1")
+    with pytest.raises(ConfigurationError, match=r"not one log in the folders of its vehicles, .*van-1; see logs and"):
+        done(tmp_path)
+
+
+def test_a_forecast_tells_how_much_and_how_long_and_writes_nothing(archive: Path) -> None:
+    manifest = load_manifest(str(archive))
+    ahead = forecast(look(manifest, dataset_of(archive)), 2)
+    assert (ahead.n_vehicles, ahead.n_logs, ahead.n_new_logs, ahead.n_jobs, ahead.is_timed_before) == (
+        2,
+        4,
+        4,
+        0,
+        False,
+    )
+    assert ahead.size_to_do == ahead.size == sum(log.stat().st_size for log in archive.glob("van-*/*.log"))
+    assert ahead.rate is not None
+    assert ahead.remaining_s == pytest.approx(ahead.size / (2 * ahead.rate))
+    assert not (archive / "dataset").exists()
+    done(archive)
+    write_drive(archive / "van-1" / "2.log", MIDNIGHT_NS + 2 * HOUR, 21.0)
+    later = forecast(look(manifest, dataset_of(archive)), 1)
+    assert (later.n_logs, later.n_new_logs, later.n_jobs, later.n_done, later.is_timed_before) == (5, 1, 1, 1, True)
+    assert later.size_to_do == sum(log.stat().st_size for log in archive.glob("van-1/*.log"))
+
+
+def test_progress_counts_bytes_and_jobs(archive: Path) -> None:
+    told: list[tuple[str, int, int]] = []
+    done(archive, on_progress=lambda progress: told.append((progress.what, progress.n_done, progress.n_total)))
+    assert told == [("looking", 1, 2), ("looking", 2, 2), ("weighing", 1, 2), ("weighing", 2, 2)]
+
+
+def test_what_comes_back_from_a_job_is_small(archive: Path) -> None:
+    import pickle
+
+    done(archive)
+    jobs = look(load_manifest(str(archive)), dataset_of(archive)).jobs()
+    assert len(pickle.dumps(Outcome(jobs[0].slot, Status.DONE, failures=("x" * 200,) * 5))) < 4000
+    assert json.loads(dataset_of(archive).read(jobs[0].slot.receipt))["run"]["bytes"] == jobs[0].size
+
+
+def test_the_same_tables_whoever_weighs(archive: Path, tmp_path: Path) -> None:
+    """An archive moved elsewhere makes the same names and bytes."""
+    done(archive)
+    moved = tmp_path / "moved"
+    uploaded(archive, place_of(moved))
+    (moved / "dataset").rename(tmp_path / "put_aside")
+    done(moved)
+    assert tables_of(dataset_of(moved)) == tables_of(dataset_of(archive))
