@@ -62,10 +62,11 @@ def test_logs_with_a_pause_between_them_are_drives_of_their_own(tmp_path: Path) 
 def test_a_drive_goes_on_over_the_border_of_logs_and_months(tmp_path: Path, cut_s: int) -> None:
     """Window, load epoch and drive are those of the whole recording, whichever job the log of a batch's end is in."""
     start_ns = MIDNIGHT_NS - 50 * S
-    write_cut_drive(tmp_path / "van", start_ns, 130.0, MIDNIGHT_NS + cut_s * S)
+    frames = write_cut_drive(tmp_path / "van", start_ns, 130.0, MIDNIGHT_NS + cut_s * S)
+    write_candump(frames, "can0", tmp_path / "whole.log")
     write_manifest(tmp_path, "van")
     rows = reprocessed(tmp_path)
-    assert the_same(rows, printed(tmp_path / "vehicle.json", WINDOW_S, tmp_path / "van.whole.log"))
+    assert the_same(rows, printed(tmp_path / "vehicle.json", WINDOW_S, tmp_path / "whole.log"))
     assert [row["epoch_n_batches"] for row in rows] == [1, 2, 3, 4, 5, 6, None]
     months = {slot.month for slot in slots_done(place_of(tmp_path / "dataset"))}
     assert months == ({"2026-10"} if cut_s < 0 else {"2026-10", "2026-11"})

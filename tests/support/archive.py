@@ -65,13 +65,13 @@ def write_drive(path: Path, start_ns: int, duration_s: float, seed: int = 1) -> 
     return frames
 
 
-def write_cut_drive(folder: Path, start_ns: int, duration_s: float, cut_ns: int, seed: int = 1) -> None:
-    """One drive in two logs, as a logger that begins a new one at an instant leaves it; whole beside the folder."""
+def write_cut_drive(folder: Path, start_ns: int, duration_s: float, cut_ns: int, seed: int = 1) -> Frames:
+    """One drive in two logs, as a logger that begins a new one at an instant leaves it; all frames of both."""
     frames = white_noise(duration_s, start_ns, seed)
     folder.mkdir(parents=True, exist_ok=True)
     write_candump(take(frames, frames.t_ns < cut_ns), "can0", folder / "1.log")
     write_candump(take(frames, frames.t_ns >= cut_ns), "can0", folder / "2.log")
-    write_candump(frames, "can0", folder.with_suffix(".whole.log"))
+    return frames
 
 
 def write_fleet(folder: Path, n_vehicles: int) -> Path:
@@ -79,7 +79,7 @@ def write_fleet(folder: Path, n_vehicles: int) -> Path:
     names = [f"van-{n:03}" for n in range(n_vehicles)]
     for n, name in enumerate(names):
         start_ns = MIDNIGHT_NS + n * S
-        write_cut_drive(folder / name, start_ns, 41.0, start_ns + 25 * S, seed=n)
+        write_cut_drive(folder / name, start_ns, 22.0, start_ns + 12 * S, seed=n)
     return write_manifest(folder, *names)
 
 
