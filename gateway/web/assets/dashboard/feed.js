@@ -1,7 +1,7 @@
 // Keeps what the page knows in step with the gateway: asks at the start and now and then, follows the stream between.
 
 import { follow } from "/assets/dashboard/event-stream.js";
-import { Refused, TARE, load } from "/assets/dashboard/gateway.js";
+import { Refused, TARE, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
 import { known, learn } from "/assets/dashboard/known.js";
 
 const ASK_EVERY_MS = 5000;
@@ -14,6 +14,7 @@ async function askNow() {
     const [status, latest] = await Promise.all([load("/api/v1/status"), load("/api/v1/estimates/latest")]);
     learn({ status, latest, latestAtMs: performance.now(), isReachable: true, isRefused: false });
     if (known.weights?.id !== latest.id || latest.id === null) learn({ weights: await load("/api/v1/weights/latest") });
+    if (known.verifications && known.verifications.due.n_records !== status.verification.n_records) await askVerifications();
     if (known.tare && (known.tare.active?.id ?? null) !== status.tare_id) await askTare(); // somebody else changed it
   } catch (error) {
     learn({ isReachable: error instanceof Refused, isRefused: error instanceof Refused });
@@ -29,6 +30,11 @@ async function askBatches() {
 const askSpectra = async () => learn({ spectra: await load("/api/v1/spectra/latest") });
 
 const askTare = async () => learn({ tare: await load(TARE) });
+
+async function askVerifications() {
+  const [verifications, trend] = await Promise.all([load(VERIFICATIONS), load(TREND)]);
+  learn({ verifications, trend });
+}
 
 async function askOnce() {
   const [vehicle, reasons] = await Promise.all([load("/api/v1/vehicle"), load("/api/v1/reasons")]);
@@ -67,7 +73,7 @@ const giveUpUntilNext = (error) => console.info(error.message);
 /** What needs an answer before the page is whole; asked again whenever the stream comes back. */
 async function catchUp() {
   await askNow();
-  await Promise.all([askOnce(), askSpectra(), askTruth(), askTare()]);
+  await Promise.all([askOnce(), askSpectra(), askTruth(), askTare(), askVerifications()]);
 }
 
 /** Begins; never ends. */

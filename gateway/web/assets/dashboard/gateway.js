@@ -2,6 +2,8 @@
 
 const TOKEN = "springscale-token";
 export const TARE = "/api/v1/calibration/tare";
+export const VERIFICATIONS = "/api/v1/calibration/verifications";
+export const TREND = "/api/v1/calibration/trend";
 
 export class Refused extends Error {}
 
@@ -23,12 +25,12 @@ export async function ask(path, more = {}) {
 
 export const load = async (path) => (await ask(path)).json();
 
-/** Asks for a change, with another token where one is given; returns the state after it. Throws the gateway's own words. */
-export async function change(method, path, token, claim) {
+/** Asks for a change, with another token where one is given; returns what `state` tells after it. Throws the gateway's own words. */
+export async function change(method, path, token, claim, state = TARE) {
   const said = { ...headers(token || undefined), "Content-Type": "application/json" };
   const response = await fetch(path, { method, body: claim && JSON.stringify(claim), headers: said }).catch(() => {
     throw new Error("The gateway did not answer. Look whether anything changed before you try again.");
   });
   if (!response.ok) throw new Error((await response.json()).detail);
-  return load(TARE);
+  return load(state);
 }

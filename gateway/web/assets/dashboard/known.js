@@ -9,6 +9,8 @@ export const known = {
   weights: null,
   spectra: null,
   tare: null, // GET /calibration/tare
+  verifications: null, // GET /calibration/verifications
+  trend: null, // GET /calibration/trend
   reasons: new Map(), // reason -> {happened, advice}
   batches: null, // newest first, rejections included
   early: null, // the provisional estimate of the batch under way

@@ -1,0 +1,123 @@
+// Known loads: when they were last held against what was weighed, what drifts meanwhile, and another record.
+
+import { VERIFICATIONS, ask, change, hasToken } from "/assets/dashboard/gateway.js";
+import { learn, show } from "/assets/dashboard/known.js";
+import { element, made, say, write } from "/assets/dashboard/page.js";
+import { capital, clock, number, signed, words } from "/assets/dashboard/words.js";
+
+const FIELDS = { gross: ["gross_kg"], axles: ["front_axle_kg", "rear_axle_kg"], payload: ["payload_kg", "position_m"] };
+const OPTIONAL = new Set(["position_m"]);
+
+const loadText = (load) => `${number(load.known_payload_kg, 0)} kg aboard was weighed ${signed(load.error_kg, 0, "kg")} off, ${signed(load.error_pct, 1, "%")} of the gross weight`;
+
+const recordText = (record) => `${clock(record.at)} by ${record.by}: ${record.verdict}; ${record.loads.map(loadText).join("; ")}${record.note ? ` (${record.note})` : ""}`;
+
+function due({ due_at, is_due }) {
+  if (due_at === null) return "whenever you like: no interval is set";
+  return is_due ? "now" : `on ${clock(due_at)}`;
+}
+
+function trendText({ name, unit, change, interval99, is_drifting }) {
+  const course = change === null ? "too short a time to tell" : `${signed(change, 1, unit)} (${signed(interval99[0], 1, unit)} to ${signed(interval99[1], 1, unit)})`;
+  return `${capital(words(name))}: ${course}${is_drifting ? ", it drifts" : ""}`;
+}
+
+/** A link cannot carry the token; a question can. The page opens on its own, to be printed. */
+async function print(record) {
+  const page = await (await ask(`${VERIFICATIONS}/${record.id}`)).blob();
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(page);
+  link.download = `verification-${record.at.slice(0, 10)}.html`;
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
+function entry(record) {
+  const button = made("button", "Save the page");
+  button.type = "button";
+  button.setAttribute("aria-label", `Save the page of ${clock(record.at)}`);
+  button.addEventListener("click", () => print(record).catch((error) => write("known-said", error.message)));
+  return made("li", [made("span", `${recordText(record)} `), button]);
+}
+
+show(({ verifications }) => {
+  if (verifications === null) return;
+  const [last] = verifications.history;
+  write("verified-due", due(verifications.due));
+  write("verified-last", last ? recordText(last) : "never");
+  element("known-add").disabled = false;
+  element("verified-history").hidden = !last;
+  element("verified-entries").replaceChildren(...verifications.history.map(entry));
+}, "verifications");
+
+show(({ trend }) => {
+  if (trend === null) return;
+  element("drift").replaceChildren(...trend.parameters.map((one) => made("li", trendText(one), one.is_drifting ? "warning" : "")));
+}, "trend");
+
+let listed = [];
+
+/** The fields of the kind of weight that was chosen, and no others. */
+function fit() {
+  const by = element("known-by").value;
+  for (const label of document.querySelectorAll("#known-form [data-by]")) {
+    label.hidden = label.dataset.by !== by;
+    const input = label.querySelector("input");
+    input.required = label.dataset.by === by && !OPTIONAL.has(input.name);
+  }
+}
+
+/** What is typed, as the gateway takes it. */
+function typed() {
+  const by = element("known-by").value, load = { by };
+  for (const name of FIELDS[by]) {
+    const text = element("known-form").elements[name].value;
+    if (text !== "") load[name] = Number(text);
+  }
+  if (element("known-at").value) load.at = new Date(element("known-at").value).toISOString();
+  if (element("known-drive").value) load.drive = element("known-drive").value;
+  return load;
+}
+
+function list() {
+  write("known-listed", listed.length === 0 ? "" : `${listed.length} more in this record.`);
+}
+
+function open() {
+  listed = [];
+  element("known-form").reset();
+  element("known-token").hidden = !hasToken();
+  say("known-refusal", "");
+  list();
+  fit();
+  element("known-dialog").showModal();
+}
+
+async function confirm(event) {
+  event.preventDefault();
+  element("known-confirm").disabled = true;
+  say("known-refusal", "");
+  try {
+    const note = element("known-note").value;
+    const claim = { loads: [...listed, typed()], ...(note ? { note } : {}) };
+    learn({ verifications: await change("POST", VERIFICATIONS, element("known-token-text").value.trim(), claim, VERIFICATIONS) });
+    element("known-dialog").close();
+    write("known-said", "The record is kept.");
+  } catch (error) {
+    say("known-refusal", error.message);
+  } finally {
+    element("known-confirm").disabled = false;
+  }
+}
+
+element("known-add").addEventListener("click", open);
+element("known-by").addEventListener("change", fit);
+element("known-more").addEventListener("click", () => {
+  if (!element("known-form").reportValidity()) return;
+  listed.push(typed());
+  for (const name of Object.values(FIELDS).flat()) element("known-form").elements[name].value = "";
+  list();
+});
+element("known-form").addEventListener("submit", confirm);
+element("known-cancel").addEventListener("click", () => element("known-dialog").close());
+element("known-dialog").addEventListener("close", () => element("known-form").reset()); // no token stays behind

@@ -1,0 +1,79 @@
+"""Known loads on the dashboard: judged after a question, the record shown, saved and announced as due."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
+from support.epochs import drive_of, stored
+from support.verification import CALIBRATED, verification_desk
+from support.web import Gateway, serving
+
+from gateway.service.proving.verification_desk import VerificationDesk
+from gateway.store import Store
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
+expect = playwright.expect
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    """A drive weighed as 112 kg; browser and stamps are in UTC."""
+    opened = stored(tmp_path / "weighed", drive_of(3, 112.0, calibration_id=CALIBRATED.id))
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def desk(tmp_path: Path, store: Store) -> VerificationDesk:
+    return verification_desk(tmp_path, store, every_days=30.0)
+
+
+@pytest.fixture
+def gateway(tmp_path: Path, desk: VerificationDesk) -> Iterator[Gateway]:
+    with Gateway(tmp_path / "store", verification=desk) as opened:
+        opened.status = STATUS
+        yield opened
+
+
+def test_a_known_load_is_judged_after_a_question(gateway: Gateway, desk: VerificationDesk, watched: Watched) -> None:
+    page = watched.page
+    with serving(gateway.app) as server:
+        page.goto(server.url)
+        dialog = page.locator("#known-dialog")
+        expect(page.locator("#verified-last")).to_have_text("never")
+        expect(page.locator("#verified-due")).to_have_text("now")
+        page.get_by_role("button", name="Verify with a known load").click()
+        expect(page.get_by_role("dialog", name="What is known of the load?")).to_be_visible()
+        assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
+        dialog.get_by_label("Known is").select_option("payload")
+        expect(dialog.get_by_label("Gross weight [kg]")).to_be_hidden()
+        page.get_by_role("button", name="Judge and keep").click()  # nothing typed
+        expect(page.get_by_role("dialog")).to_be_visible()
+        dialog.get_by_label("Payload [kg]").fill("100")
+        dialog.get_by_label("When it was so").fill("2020-01-01T00:00")
+        page.get_by_role("button", name="Judge and keep").click()
+        expect(
+            page.get_by_role("alert").filter(has_text="no load was weighed around 2020-01-01T00:00Z")
+        ).to_be_visible()
+        assert json.loads(desk.told())["history"] == []
+        dialog.get_by_label("When it was so").fill("2026-09-21T14:15")  # within the drive
+        page.get_by_role("button", name="Add another load").click()
+        expect(page.locator("#known-listed")).to_have_text("1 more in this record.")
+        dialog.get_by_label("Payload [kg]").fill("112")
+        dialog.get_by_label("Remark, kept with it").fill("yard")
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("dialog")).to_be_hidden()
+        expect(page.locator("#verified-last")).to_contain_text("by local: passed; 100 kg aboard was weighed +12")
+        expect(page.locator("#verified-last")).to_contain_text("112 kg aboard was weighed 0")
+        expect(page.locator("#verified-due")).to_contain_text("on 21/10/2026")
+        page.get_by_text("Records").click()
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Save the page of").click()
+        assert "Verification of on-board weighing" in Path(download.value.path()).read_text()
+        (record,) = json.loads(desk.told())["history"]
+        assert (len(record["loads"]), record["note"]) == (2, "yard")
+        refusals = [said for said in watched.complaints if "409" not in said]
+        assert refusals == []
+        gateway.board.close()
