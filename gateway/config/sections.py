@@ -50,7 +50,7 @@ class CommissioningSection(Section):
     is_allowed: bool = Field(True, description="whether a calibration may be made here, by who may operate")
     lines: Path | None = Field(None, description="folder with calibrations of sister vehicles and line files to choose")
     goal_pct: float = Field(
-        4.0,
+        4.5,
         ge=0.5,
         le=50.0,
         description="driven enough where the standard deviation of a payload is this share of the largest payload",

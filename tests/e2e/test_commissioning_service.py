@@ -9,19 +9,22 @@ from support.commissioned import Running, serve
 from support.half_car_road import VAN
 from support.known_load_logs import write_known_loads
 
+from gateway.calibration.calibrate import calibrate_inspected
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.estimate_json import estimate_to_json
-from gateway.offline.campaigns import calibrate
+from gateway.offline.campaigns import calibrate, inspect
 from gateway.offline.estimates import estimates_of_logs
 from gateway.setup import load_setup
 from gateway.store import Store
 
 WINDOW_S = 100.0
 DRIVEN_S = 250.0  # two windows, and a part of one
+SETTINGS = BatchSettings(window_s=WINDOW_S)
 LOADS = ((0.0, None), (300.0, 1.4))
+SISTERS = ((0.0, None), (400.0, 2.6))
 ANSWERS = {
     "kerb_front_axle_kg": 725.0,
     "kerb_rear_axle_kg": 683.0,
@@ -58,13 +61,23 @@ def config(tmp_path: Path) -> Path:
     return path
 
 
-def calibrated_at_a_desk(campaign_path: Path) -> CalibrationFile:
+def a_sister(folder: Path) -> CalibrationFile:
+    """Calibrated with known loads."""
+    folder.mkdir()
+    campaign = load_campaign(write_known_loads(folder, SISTERS, 110.0, identification_fraction=1.0))
+    return calibrate(campaign, SETTINGS, estimators=("cross_spectrum",)).file
+
+
+def calibrated_at_a_desk(campaign_path: Path, sister: CalibrationFile) -> CalibrationFile:
+    """As `springscale calibrate --runs 1 --like` does."""
     campaign = load_campaign(campaign_path)
-    return calibrate(campaign, BatchSettings(window_s=WINDOW_S), estimators=("cross_spectrum",), numbers=[1]).file
+    inspection = inspect(campaign, SETTINGS, numbers=[1])
+    return calibrate_inspected(campaign, inspection, estimators=("cross_spectrum",), like=[sister]).file
 
 
 def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, tmp_path: Path) -> None:
     campaign = write_known_loads(tmp_path, LOADS, DRIVEN_S, identification_fraction=1.0)
+    sister = a_sister(tmp_path / "sister")
     said: dict[str, Any] = {}
 
     def meet(running: Running) -> None:
@@ -72,7 +85,13 @@ def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, 
         assert running.step("vehicle", ANSWERS)["reason"] == "not_begun"
         assert running.step("", {"note": "in the yard"})["underway"]["step"] == "line"
         assert running.step("vehicle", ANSWERS)["reason"] == "wrong_step"
-        assert running.step("line", {"line": None})["underway"]["step"] == "vehicle"
+        assert running.step("line", {"line": {"name": "sister.json", "source": "uploaded"}})["reason"] == "no_such_line"
+        found = running.step("lines", {"name": "sister.json", "content": sister.to_json()})["items"]
+        assert [(one["name"], one["id"], one["fault"]) for one in found] == [("sister.json", sister.id, None)]
+        chosen = running.step("line", {"line": {"name": "sister.json", "source": "uploaded"}})
+        assert (chosen["underway"]["step"], chosen["underway"]["line"]["id"]) == ("vehicle", sister.id)
+        other = running.step("vehicle", {**ANSWERS, "wheelbase_m": 3.5})
+        assert (other["reason"], "another model" in other["detail"]) == ("not_of_the_line", True)
         assert running.step("vehicle", ANSWERS)["underway"]["step"] == "empty"
         assert running.step("empty", {"is_empty": True})["underway"]["step"] == "drive"
         assert running.step("fit", {})["reason"] == "no_batch"
@@ -87,7 +106,7 @@ def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, 
 
     serve(config, meet)
 
-    desk = calibrated_at_a_desk(campaign)
+    desk = calibrated_at_a_desk(campaign, sister)
     made = said["made"]["active"]
     box = load_calibration(next((tmp_path / "state").glob("commissioned-*.json")))
     assert box.id == made["id"] == said["status"]["calibration_id"]
@@ -111,7 +130,7 @@ def assert_weighs_the_same(config: Path, folder: Path, desk: CalibrationFile) ->
     weighed = [one for one in items if one["calibration_id"] is not None and not one["rejected"]]
     (folder / "desk.json").write_text(desk.to_json())
     setup = load_setup("springscale:reference", folder / "desk.json")
-    offline = list(estimates_of_logs([folder / "02.log"], setup, BatchSettings(window_s=WINDOW_S)))
+    offline = list(estimates_of_logs([folder / "02.log"], setup, SETTINGS))
     told = [numbers(estimate_to_json(one)) for one in offline if one.counted]
     assert weighed
     assert [numbers(one) for one in weighed] == told

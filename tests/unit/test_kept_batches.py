@@ -1,17 +1,15 @@
 """Batches kept for calibrations to come: bit for bit what they were, bounded, whole whenever the power fails."""
 
-import os
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from support.bus_drive import bus_drive
 from support.known_load_logs import write_known_loads
 from support.log import names
+from support.power import KilledError, kill_at
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.campaign import load_campaign
@@ -191,27 +189,6 @@ def test_files_that_are_none_of_ours_are_left_alone(tmp_path: Path, three: list[
         shelf.add(one)
     assert [entry.id for entry in shelf.entries()] == [three[2].id]
     assert (tmp_path / "notes.batch").read_text() == "mine"
-
-
-class KilledError(BaseException):
-    """The power is gone: nothing after it is done, and nobody may catch it."""
-
-
-def kill_at(monkeypatch: pytest.MonkeyPatch, n: int) -> None:
-    """Let n changes of the disk happen and no more."""
-    left = [n]
-
-    def until_killed(does: Callable[..., Any]) -> Callable[..., Any]:
-        def change(*arguments: Any, **more: Any) -> Any:
-            left[0] -= 1
-            if left[0] < 0:
-                raise KilledError
-            return does(*arguments, **more)
-
-        return change
-
-    for name in ("open", "fsync", "rename", "unlink"):
-        monkeypatch.setattr(os, name, until_killed(getattr(os, name)))
 
 
 def test_killed_between_any_two_writes_the_shelf_holds_whole_batches(

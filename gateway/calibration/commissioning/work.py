@@ -17,7 +17,8 @@ from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, CampaignTable, RunTable
 from gateway.calibration.commissioning.job import JOB, RESULT, Job, Result, findings_of, to_file
 from gateway.calibration.commissioning.learned import learned_by
-from gateway.calibration.inspection import Finding, Inspection
+from gateway.calibration.file import load_like
+from gateway.calibration.inspection import Finding, Inspection, Kind
 from gateway.calibration.kept import KnownDrive, inspect_kept, unpacked
 from gateway.calibration.kept.drive import ESTIMATORS
 from gateway.core.settings import BatchSettings
@@ -52,7 +53,8 @@ def done(path: Path, job: Job) -> Result:
     looked = Result(findings=findings_of(_findings(inspection)), refusal=inspection.refusal)
     if not job.is_fit or inspection.refusal is not None:
         return looked
-    outcome = calibrate_inspected(campaign, inspection, estimators=ESTIMATORS, command=job.command)
+    like = [load_like(path) for path in job.like]
+    outcome = calibrate_inspected(campaign, inspection, estimators=ESTIMATORS, like=like, command=job.command)
     return looked.model_copy(update=_made(outcome, campaign, job))
 
 
@@ -94,7 +96,7 @@ def _drives(job: Job) -> Iterator[KnownDrive]:
 
 def _findings(inspection: Inspection) -> Iterator[Finding]:
     yield from (finding for verdict in inspection.verdicts for finding in verdict.findings)
-    yield from inspection.findings
+    yield from (finding for finding in inspection.findings if finding.kind is not Kind.ONE_LOAD_ONLY)  # as was meant
 
 
 def _take_little(most_memory_mb: float) -> None:

@@ -134,6 +134,12 @@ class Shelf:
             if owner in self._holds:
                 self._write_holds({name: held for name, held in self._holds.items() if name != owner})
 
+    @property
+    def owners(self) -> frozenset[str]:
+        """All who hold something."""
+        with self._lock:
+            return frozenset(self._holds)
+
     def held_by(self, owner: str) -> frozenset[str]:
         """Those of its batches that are still there."""
         with self._lock:

@@ -49,6 +49,15 @@ class Book:
         except OSError as fault:
             raise CommissioningRefusedError("not_stored", f"{name} cannot be written: {fault}") from None
 
+    def forget_others(self) -> None:
+        """Remove calibrations and copies of lines that nothing here names any more. Raises OSError."""
+        named = {one.file_name for one in self.record.made} | {one.line.copy_name for one in self.record.made}
+        if self.record.underway is not None and self.record.underway.line is not None:
+            named.add(self.record.underway.line.copy_name)
+        for path in (*self.directory.glob("commissioned-*.json"), *self.directory.glob("line-*.json")):
+            if path.name not in named:
+                path.unlink()
+
     def cannot_store(self, refusal: Exception) -> None:
         """What nobody asked for could not be kept: told, and tried again with the next."""
         self.fault = f"the commissioning cannot be kept: {refusal}"

@@ -12,7 +12,7 @@ from gateway.records import json_line
 from gateway.service.commissioning.book import Book, OnEvent
 from gateway.service.commissioning.drive import EmptyDrive, MakeWorker, Vehicle
 from gateway.service.commissioning.jobs import Jobs
-from gateway.service.commissioning.lines import Lines
+from gateway.service.commissioning.lines import Lines, require_alike
 from gateway.service.commissioning.record import EmptyClaim, Ended, LineChoice, Source, Underway
 from gateway.service.commissioning.steps import Present, Step, lines_told, step_of, told
 from gateway.service.commissioning.worker import Worker
@@ -124,8 +124,9 @@ class Commissioning:
             underway = self._underway()
             choice = LineChoice(name="")
             if name is not None:
-                choice, content = self._lines.choose(name, source or "uploaded")
+                choice, content = self._lines.choose(name, source or UPLOADED)
                 self._book.write(str(choice.copy_name), content)
+            self._require_alike(choice, underway.vehicle)
             self._book.keep(underway.model_copy(update={"line": choice, "learned": None, "fault": None}))
             self._drive.fit()
             return self.told()
@@ -134,10 +135,7 @@ class Commissioning:
         """What was typed."""
         with self._book.lock:
             underway = self._underway(Step.VEHICLE)
-            try:
-                vehicle_table(answers, self._vehicle.name)
-            except CampaignError as fault:
-                raise CommissioningRefusedError("vehicle_unusable", str(fault)) from None
+            self._require_alike(underway.line or LineChoice(name=""), answers)
             self._book.keep(underway.model_copy(update={"vehicle": answers, "learned": None, "fault": None}))
             self._drive.fit()
             return self.told()
@@ -218,6 +216,16 @@ class Commissioning:
         if step is Step.FIT:
             raise CommissioningRefusedError("fitting", "the calibration is being made: wait for it, or cancel")
         return underway
+
+    def _require_alike(self, line: LineChoice, answers: VehicleAnswers | None) -> None:
+        if answers is None:
+            return
+        try:
+            table = vehicle_table(answers, self._vehicle.name)
+        except CampaignError as fault:
+            raise CommissioningRefusedError("vehicle_unusable", str(fault)) from None
+        if line.copy_name is not None:
+            require_alike(self._book.directory / line.copy_name, table)
 
     def _require_allowed(self) -> None:
         if self._vehicle.why_not_allowed is not None:

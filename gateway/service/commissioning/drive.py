@@ -19,6 +19,7 @@ from gateway.service.commissioning.worker import Worker
 from gateway.stated import VehicleAnswers
 
 OWNER: Final = "commissioning"  # of the batches that the shelf must not give away
+MADE: Final = "commissioned-"  # the names of calibrations begin so
 LEAST_BATCHES: Final = 2  # one may be an odd one; whoever asks for the fit may have it of one
 LOOKED_AT: Final = "looked-at.batch"
 
@@ -187,9 +188,10 @@ class EmptyDrive:
             change = {"learned": result.learned, "fault": fault, "is_fit_asked": False}
             self._book.keep(underway.model_copy(update=change))
             return
-        name = f"commissioned-{result.calibration_id.removeprefix('sha256:')[:16]}.json"
+        name = f"{MADE}{result.calibration_id.removeprefix('sha256:')[:16]}.json"
         self._book.write(name, result.calibration.encode())
-        load_calibration(self._book.directory / name)  # as the next start will, from the disk
+        if load_calibration(self._book.directory / name).id != result.calibration_id:  # read as the next start will
+            raise CalibrationFileError(f"{name}: is not what was fitted")
         made = Made(
             id=result.calibration_id,
             file_name=name,
@@ -206,6 +208,10 @@ class EmptyDrive:
         with suppress(OSError):
             self._shelf.hold(made.file_name, made.batches)
             self._shelf.let_go(OWNER)
+            for owner in self._shelf.owners - {one.file_name for one in self._book.record.made}:
+                if owner.startswith(MADE):  # others hold batches too
+                    self._shelf.let_go(owner)
+            self._book.forget_others()
         self._book.tell(Event.COMMISSIONED, {"calibration_id": made.id, "by": made.by, "n_batches": len(made.batches)})
 
     def _table(self, answers: VehicleAnswers) -> VehicleTable:

@@ -9,8 +9,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from gateway.calibration.file import CalibrationFile, load_calibration
-from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError
+from gateway.calibration.campaign import VehicleTable
+from gateway.calibration.file import CalibrationFile, LikeFile, line_of_files, load_like
+from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError, LineError
 from gateway.files.kept import KeptFiles
 from gateway.files.signed import SUFFIX, Trust
 from gateway.service.commissioning.record import LineChoice, Source
@@ -54,7 +55,7 @@ class Lines:
                 except ConfigurationError as fault:
                     yield LineFound(path.name, source, fault=str(fault))
                 else:
-                    yield LineFound(path.name, source, held.id, held.vehicle.model_dump(mode="json"))
+                    yield LineFound(path.name, source, held.id, _figures(held))
 
     def choose(self, name: str, source: Source) -> tuple[LineChoice, bytes]:
         """The choice and the file's content. Raises CommissioningRefusedError."""
@@ -96,7 +97,7 @@ class Lines:
             for leftover in (fresh, fresh + SUFFIX):
                 with suppress(OSError):
                     (self._uploaded / leftover).unlink()
-        return LineFound(name, "uploaded", held.id, held.vehicle.model_dump(mode="json"))
+        return LineFound(name, "uploaded", held.id, _figures(held))
 
     def _require_place(self, name: str, written: bytes) -> None:
         there = {path.name for path in self._uploaded.glob("*.json")} if self._uploaded.is_dir() else set()
@@ -105,7 +106,7 @@ class Lines:
         if name not in there and len(there) >= MOST_UPLOADED:
             raise CommissioningRefusedError("too_many", f"{MOST_UPLOADED} lines were uploaded already")
 
-    def _load(self, source: Source, path: Path) -> tuple[CalibrationFile, bytes]:
+    def _load(self, source: Source, path: Path) -> tuple[LikeFile, bytes]:
         """The file and its content. Raises ConfigurationError."""
         read = Path.read_bytes if source == "package" else self._trust.read
         try:
@@ -114,4 +115,19 @@ class Lines:
             content = read(path)
         except OSError as fault:
             raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
-        return load_calibration(path, lambda _: content), content
+        return load_like(path, lambda _: content), content
+
+
+def require_alike(path: Path, vehicle: VehicleTable) -> None:
+    """Raises CommissioningRefusedError where a vehicle is none of the line whose copy lies at ``path``."""
+    try:
+        line_of_files([load_like(path)]).prior_of(vehicle.stated, with_roll=False)
+    except (CalibrationFileError, LineError) as fault:
+        raise CommissioningRefusedError("not_of_the_line", str(fault)) from None
+
+
+def _figures(held: LikeFile) -> dict[str, object]:
+    """What of it a form may be filled with."""
+    if isinstance(held, CalibrationFile):
+        return held.vehicle.model_dump(mode="json")
+    return {"name": held.siblings[0].name, "wheelbase_m": held.line.wheelbase_m}

@@ -1,0 +1,443 @@
+"""Steps of a commissioning: what each asks, what refuses it, what is on disk, and what a power cut leaves."""
+
+import errno
+import json
+import os
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from itertools import count, takewhile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.calibrated import calibration_file
+from support.commissioning import ANSWERS, NOW_NS, WINDOW_S, Bench, fitted, in_steps, replaced
+from support.log import names
+from support.power import KilledError, kill_at
+
+from gateway.calibration.commissioning import Result
+from gateway.calibration.commissioning.job import Found
+from gateway.config import Settings
+from gateway.config.sections import CommissioningSection
+from gateway.errors import CommissioningRefusedError
+from gateway.files.kept import KeptFiles
+from gateway.log import Event
+from gateway.records import Why
+from gateway.service.commissioning import commissioned, with_commissioned
+from gateway.service.commissioning.record import FILE_NAME, MOST_MADE, load_record
+from gateway.stated import VehicleAnswers
+from gateway.units import NS_PER_S
+from gateway.web.routes.commissioning import CommissioningState
+
+FAULT = Found(kind="pitch_rate_sign", severity="fault", text="turned over", advice="set sign = -1")
+
+
+def told(bench: Bench) -> dict[str, Any]:
+    text = bench.desk.told()
+    CommissioningState.model_validate_json(text)  # the shape that the API promises
+    state: dict[str, Any] = json.loads(text)
+    return state
+
+
+def underway(bench: Bench) -> dict[str, Any]:
+    found: dict[str, Any] = told(bench)["underway"]
+    return found
+
+
+def reason(ask: Callable[[], Any]) -> str:
+    with pytest.raises(CommissioningRefusedError) as refused:
+        ask()
+    return refused.value.reason
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path)
+
+
+@pytest.fixture
+def driving(bench: Bench) -> Bench:
+    in_steps(bench)
+    return bench
+
+
+def test_it_is_offered_where_there_is_no_calibration(tmp_path: Path) -> None:
+    assert told(Bench(tmp_path / "without"))["is_offered"]
+    assert not told(Bench(tmp_path / "with", replaced(is_calibrated=True)))["is_offered"]
+    forbidden = told(Bench(tmp_path / "forbidden", replaced(why_not_allowed="it is not wanted here")))
+    assert (forbidden["is_offered"], forbidden["is_allowed"], forbidden["why_not"]) == (
+        False,
+        False,
+        "it is not wanted here",
+    )
+
+
+def test_steps_follow_one_another_and_each_is_on_disk(bench: Bench) -> None:
+    for until, step in (("line", "line"), ("vehicle", "vehicle"), ("empty", "empty"), ("drive", "drive")):
+        with suppress(CommissioningRefusedError):
+            bench.desk.cancel("workshop")
+        in_steps(bench, until=until)
+        assert underway(bench)["step"] == step
+        assert underway(Bench(bench.directory))["step"] == step  # as after a power cut
+    assert bench.events[:2] == ["commissioning", "commissioning_cancelled"]
+
+
+def test_what_is_out_of_turn_is_refused(bench: Bench) -> None:
+    desk = bench.desk
+    for ask in (
+        lambda: desk.choose_line(None, None),
+        lambda: desk.state_vehicle(VehicleAnswers(**ANSWERS)),
+        lambda: desk.is_empty("x"),
+        lambda: desk.fit_now("x"),
+        lambda: desk.cancel("x"),
+    ):
+        assert reason(ask) == "not_begun"
+    assert reason(lambda: desk.undo("x", to_factory=False)) == "nothing_made"
+    in_steps(bench, until="line")
+    assert reason(lambda: desk.begin("x", None)) == "already_begun"
+    assert reason(lambda: desk.is_empty("x")) == "wrong_step"
+    assert reason(lambda: desk.choose_line("no.json", "package")) == "no_such_line"
+    assert reason(lambda: desk.choose_line("../commissioning.json", "uploaded")) == "no_such_line"
+
+
+def test_where_it_is_not_allowed_nothing_begins(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, replaced(why_not_allowed="no"))
+    assert reason(lambda: bench.desk.begin("x", None)) == "not_allowed"
+    assert reason(lambda: bench.desk.upload("a.json", "{}", None)) == "not_allowed"
+
+
+@pytest.mark.parametrize(
+    ("changes", "what"),
+    [
+        ({"kerb_front_axle_kg": 20.0, "kerb_rear_axle_kg": 700.0}, "unsprung"),
+        ({"payload_range_kg": (500.0, 100.0)}, "must rise"),
+        ({"empty_mass_kg": 1240.0}, "belong together"),
+        ({"kerb_front_axle_kg": 30.0, "kerb_rear_axle_kg": 31.0}, "100"),
+    ],
+)
+def test_a_vehicle_that_cannot_be_is_refused_in_words(bench: Bench, changes: dict[str, Any], what: str) -> None:
+    in_steps(bench, until="vehicle")
+    with pytest.raises(CommissioningRefusedError, match=what) as refused:
+        bench.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, **changes}))
+    assert refused.value.reason == "vehicle_unusable"
+    assert underway(bench)["step"] == "vehicle"
+
+
+def test_batches_count_from_the_claim_on_and_each_is_fitted(bench: Bench) -> None:
+    in_steps(bench, until="empty")
+    bench.drive(0)
+    assert underway(bench)["n_batches"] == 0
+    bench.drives.drive_start_ns, bench.drives.newest_ns = NOW_NS, NOW_NS + 450 * NS_PER_S
+    bench.desk.is_empty("workshop")
+    bench.drive(1)  # had begun when it was said
+    assert underway(bench)["n_batches"] == 0
+    bench.drive(2)
+    assert (underway(bench)["n_batches"], underway(bench)["driven_s"]) == (1, WINDOW_S)
+    assert bench.worker.job is not None
+    assert bench.worker.job.is_fit
+    assert len(bench.worker.job.drives[0].batches) == 1
+    bench.drive(3)
+    assert len(bench.worker.jobs[-1].drives[0].batches) == 2
+    assert bench.shelf.held_by("commissioning") == {entry.id for entry in bench.shelf.entries()[-2:]}
+
+
+def test_rejected_batches_count_for_nothing_but_are_looked_at(driving: Bench) -> None:
+    driving.drive(0, WINDOW_S, Why.GRAVITY_MISSING)
+    assert underway(driving)["n_batches"] == 0
+    assert driving.worker.job is not None
+    assert not driving.worker.job.is_fit
+    driving.worker.finish(Result(findings=(FAULT,)))
+    assert underway(driving)["inspection"] == {
+        "seconds": WINDOW_S,
+        "has_fault": True,
+        "findings": [FAULT.model_dump()],
+    }
+
+
+def test_a_fault_keeps_the_vehicle_from_being_called_empty_until_it_is_mended(bench: Bench) -> None:
+    in_steps(bench, until="empty")
+    bench.drive(0, 60, is_provisional=True)
+    bench.worker.finish(Result(findings=(FAULT,)))
+    with pytest.raises(CommissioningRefusedError, match=r"turned over: set sign = -1"):
+        bench.desk.is_empty("workshop")
+    bench.drive(0, 120, is_provisional=True)
+    bench.worker.finish(Result())
+    bench.desk.is_empty("workshop")
+    assert underway(bench)["step"] == "drive"
+
+
+def test_enough_is_what_was_learned(driving: Bench) -> None:
+    driving.drive(0)
+    driving.worker.finish(fitted(payload_std_kg=15.0))
+    assert told(driving)["active"] is None  # one window may be an odd one
+    driving.drive(1)
+    driving.worker.finish(fitted(payload_std_kg=19.0))
+    assert underway(driving)["learned"]["share"] == pytest.approx(18.0 / 19.0)
+    assert not underway(driving)["learned"]["is_enough"]
+    driving.drive(2)
+    driving.worker.finish(fitted(payload_std_kg=17.0))
+    state = told(driving)
+    assert state["underway"] is None
+    assert (state["active"]["id"], state["active"]["n_batches"]) == (calibration_file().id, 3)
+    assert state["is_pending"]
+    assert driving.desk.is_due
+    assert driving.events[-1] == "commissioned"
+
+
+def test_whoever_asks_may_have_it_of_one_window(driving: Bench) -> None:
+    assert reason(lambda: driving.desk.fit_now("workshop")) == "no_batch"
+    driving.drive(0)
+    driving.worker.finish(fitted(payload_std_kg=90.0))
+    driving.desk.fit_now("workshop")
+    assert (underway(driving)["step"], underway(driving)["is_fitting"]) == ("fit", True)
+    assert reason(lambda: driving.desk.choose_line(None, None)) == "fitting"
+    driving.worker.finish(fitted(payload_std_kg=90.0))
+    assert told(driving)["active"]["learned"]["payload_std_kg"] == 90.0
+
+
+def test_a_fit_that_fails_says_why_and_the_drive_goes_on(driving: Bench) -> None:
+    driving.drive(0)
+    driving.desk.fit_now("workshop")
+    driving.worker.finish(Result(fault="the fit needs more than 256 MB"))
+    assert (underway(driving)["step"], underway(driving)["fault"]) == ("drive", "the fit needs more than 256 MB")
+    driving.drive(1)
+    driving.worker.finish(Result(refusal="no run can be used", findings=(FAULT,)))
+    assert underway(driving)["fault"] == "no run can be used"
+    driving.drive(2)
+    driving.worker.finish(fitted())
+    assert told(driving)["active"] is not None
+
+
+def test_a_calibration_that_does_not_hold_its_own_hash_is_not_used(driving: Bench) -> None:
+    driving.drive(0)
+    driving.drive(1)
+    good = fitted()
+    assert good.calibration is not None
+    changed = good.calibration.replace('"van"', '"vam"')
+    assert changed != good.calibration
+    driving.worker.finish(good.model_copy(update={"calibration": changed}))
+    assert told(driving)["active"] is None
+    assert driving.desk.fault is not None
+
+
+def test_line_and_vehicle_may_be_answered_anew_and_what_was_driven_stays(driving: Bench) -> None:
+    driving.drive(0)
+    driving.worker.finish(fitted(payload_std_kg=50.0))
+    driving.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, "wheelbase_m": 2.9}))
+    assert (underway(driving)["step"], underway(driving)["n_batches"]) == ("drive", 1)
+    assert underway(driving)["learned"] is None
+    assert driving.worker.jobs[-1].vehicle.wheelbase_m == 2.9
+
+
+def test_cancel_forgets_all_but_what_was_made(driving: Bench) -> None:
+    make(driving)
+    in_steps(driving)
+    driving.drive(5)
+    driving.desk.cancel("workshop")
+    driving.drive(6)
+    assert told(driving)["underway"] is None
+    assert told(driving)["active"] is not None
+    assert driving.shelf.held_by("commissioning") == frozenset()
+    assert not driving.worker.is_busy
+
+
+def make(bench: Bench, payload_kg: float = 100.0) -> str:
+    """A calibration, from two windows."""
+    for n in range(2):
+        bench.drive(n)
+    bench.worker.finish(fitted(payload_kg=payload_kg))
+    return str(told(bench)["active"]["id"])
+
+
+def test_undo_brings_the_one_before_back_and_factory_the_settings_own(driving: Bench) -> None:
+    first = make(driving, 100.0)
+    in_steps(driving)
+    second = make(driving, 200.0)
+    assert first != second
+    driving.desk.undo("workshop", to_factory=False)
+    assert told(driving)["active"]["id"] == first
+    driving.desk.undo("workshop", to_factory=False)
+    assert told(driving)["active"] is None
+    assert not driving.desk.is_due  # as it was started
+    assert [one["ended"]["why"] for one in told(driving)["history"]] == ["undone", "undone"]
+    in_steps(driving)
+    make(driving, 300.0)
+    driving.desk.undo("workshop", to_factory=True)
+    assert told(driving)["history"][0]["ended"]["why"] == "back_to_factory"
+
+
+def test_the_part_of_an_open_window_is_all_that_a_power_cut_costs(driving: Bench) -> None:
+    driving.drive(0)
+    driving.drive(1, 60, is_provisional=True)
+    driving.drive(1, 120, is_provisional=True)
+    assert len(driving.shelf.entries()) == 2
+    after = Bench(driving.directory)
+    assert (underway(after)["n_batches"], underway(after)["driven_s"]) == (2, WINDOW_S + 120)
+    after.desk.start()
+    assert len(after.worker.jobs[-1].drives[0].batches) == 2
+    assert after.worker.jobs[-1].settings["window_s"] == WINDOW_S
+
+
+def test_a_window_that_is_whole_takes_the_place_of_its_parts(driving: Bench) -> None:
+    driving.drive(0, 60, is_provisional=True)
+    driving.drive(0)
+    assert (underway(driving)["n_batches"], underway(driving)["driven_s"]) == (1, WINDOW_S)
+    driving.drive(1, 60, is_provisional=True)
+    driving.drive(1, 90, Why.TOO_SHORT)  # the drive is over
+    assert (underway(driving)["n_batches"], underway(driving)["driven_s"]) == (1, WINDOW_S)
+    assert len(driving.shelf.entries()) == 1
+
+
+def test_another_signal_map_begins_the_drive_anew(driving: Bench) -> None:
+    driving.drive(0)
+    after = Bench(driving.directory, replaced(signals_id="another"))
+    assert (underway(after)["step"], underway(after)["n_batches"]) == ("empty", 0)
+    assert "signal map" in underway(after)["fault"]
+
+
+def test_batches_that_are_gone_are_forgotten(driving: Bench) -> None:
+    driving.drive(0)
+    for file in (driving.directory / "batches").glob("*.batch"):
+        file.unlink()
+    assert underway(Bench(driving.directory))["n_batches"] == 0
+
+
+def test_a_result_that_comes_late_belongs_to_nobody(driving: Bench) -> None:
+    driving.drive(0)
+    late = driving.worker.job
+    driving.desk.cancel("workshop")
+    in_steps(driving)
+    driving.worker.job = late
+    driving.worker.finish(fitted())
+    assert told(driving)["active"] is None
+    assert underway(driving)["learned"] is None
+
+
+def test_a_disk_that_refuses_changes_nothing(driving: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: KeptFiles, name: str, content: bytes) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    before = told(driving)
+    with monkeypatch.context() as patch:
+        patch.setattr(KeptFiles, "write", full)
+        for ask in (
+            lambda: driving.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, "wheelbase_m": 2.9})),
+            lambda: driving.desk.cancel("workshop"),
+        ):
+            assert reason(ask) == "not_stored"
+    assert told(driving) == before
+
+
+def test_a_full_disk_while_driving_is_told_and_the_next_window_counts(
+    driving: Bench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("gateway.service.commissioning.drive.save_record", full)
+        driving.drive(0)
+    assert driving.desk.fault is not None
+    assert Event.COMMISSIONING_NOT_KEPT in names(caplog)
+    driving.drive(1)
+    assert underway(driving)["n_batches"] == 1
+
+
+def test_a_book_that_cannot_be_believed_is_set_aside(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / FILE_NAME).write_text("{not json")
+    bench = Bench(tmp_path)
+    assert told(bench)["history"] == []
+    assert bench.desk.fault is not None
+    assert Event.COMMISSIONING_SET_ASIDE in names(caplog)
+    assert list(tmp_path.glob(f"{FILE_NAME}.broken-*"))
+
+
+def test_only_so_many_are_remembered(driving: Bench) -> None:
+    for n in range(MOST_MADE + 2):
+        make(driving, 10.0 * n)
+        in_steps(driving)
+    assert len(told(driving)["history"]) == MOST_MADE
+    assert len(list(driving.directory.glob("commissioned-*.json"))) == MOST_MADE
+
+
+STEPS: list[Callable[[Bench], Any]] = [
+    lambda b: b.desk.begin("workshop", "note"),
+    lambda b: b.desk.choose_line(None, None),
+    lambda b: b.desk.state_vehicle(VehicleAnswers(**ANSWERS)),
+    lambda b: b.desk.is_empty("workshop"),
+    lambda b: b.drive(0, 60, is_provisional=True),
+    lambda b: b.drive(0),
+    lambda b: b.drive(1, 60, is_provisional=True),
+    lambda b: b.drive(1),
+    lambda b: b.worker.finish(fitted()),
+    lambda b: b.desk.undo("workshop", to_factory=False),
+]
+
+
+def essence(bench: Bench) -> tuple[Any, ...]:
+    """What must be one of two neighbours."""
+    state = told(bench)
+    now = state["underway"] or {}
+    made = tuple((one["id"], one["ended"] is None) for one in state["history"])
+    return now.get("step"), now.get("n_batches"), now.get("driven_s"), made
+
+
+@pytest.mark.parametrize("at", range(len(STEPS)))
+def test_killed_between_any_two_writes_it_is_one_of_the_neighbours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int
+) -> None:
+    base = Bench(tmp_path / "base")
+    for step in STEPS[:at]:
+        step(base)
+
+    def killed_after(n_writes: int) -> tuple[Any, ...] | None:
+        """What is found after the next start; None where the step came to its end before."""
+        folder = tmp_path / str(n_writes)
+        shutil.copytree(base.directory, folder)
+        bench = Bench(folder)
+        bench.desk.start()
+        with monkeypatch.context() as patch:
+            kill_at(patch, n_writes)
+            try:
+                STEPS[at](bench)
+            except KilledError:
+                is_killed = True
+            else:
+                is_killed = False
+        return essence(Bench(folder)) if is_killed else None
+
+    base.directory.mkdir(exist_ok=True)
+    neighbours = [essence(Bench(base.directory))]
+    after = shutil.copytree(base.directory, tmp_path / "after")
+    done = Bench(after)
+    done.desk.start()
+    STEPS[at](done)
+    neighbours.append(essence(Bench(after)))
+    found = list(takewhile(lambda one: one is not None, map(killed_after, count())))
+    assert len(found) > 4
+    assert found[0] == neighbours[0]
+    assert all(one in neighbours for one in found), (found, neighbours)
+    assert found == sorted(found, key=neighbours.index)  # never back again
+
+
+def test_a_service_starts_with_what_was_made_here(driving: Bench) -> None:
+    settings = Settings(
+        signals="springscale:reference", store={"directory": driving.directory}, estimator="cross_spectrum"
+    )
+    assert with_commissioned(settings) is settings
+    for n in range(2):
+        driving.drive(n)
+    driving.worker.finish(fitted())
+    active = load_record(driving.directory).active
+    assert active is not None
+    chosen = with_commissioned(settings)
+    assert chosen.calibration == driving.directory / active.file_name
+    forbidden = settings.model_copy(update={"commissioning": CommissioningSection(is_allowed=False)})
+    assert with_commissioned(forbidden) is forbidden
+    (driving.directory / active.file_name).write_text("{}")
+    used, setup, fault = commissioned(settings)
+    assert used is settings
+    assert setup.calibration is None
+    assert fault is not None
+    assert "cannot be used" in fault
