@@ -129,3 +129,33 @@ def test_two_line_files_are_refused(drives: Path, sisters: list[Path], tmp_path:
     likes = [word for path in lines for word in ("--like", str(path))]
     said = refused("calibrate", drives, "--runs", "1", *likes, "--output", tmp_path / "van.json", *FAST)
     assert "two line files" in said
+
+
+def test_the_report_says_what_was_inherited(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
+    made = run(
+        *("calibrate", drives, "--runs", "1", "--like", sisters[0]),
+        *("--output", tmp_path / "van.json", "--report", tmp_path / "report", *FAST),
+    )
+    assert made.exit_code == 0, made.output
+    page = (tmp_path / "report" / "report.html").read_text()
+    for said in (
+        "Calibrated on 1 run and what 1 vehicle of its line told",
+        "what others do was inherited from 1 vehicle of its line",
+        "These stay at what its line told",
+        load_calibration(sisters[0]).id,
+    ):
+        assert said in page
+
+
+def test_a_plan_before_any_drive_knows_the_line(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
+    empty = tmp_path / "campaign.toml"
+    head, _, _ = drives.read_text().partition("[[runs]]")
+    empty.write_text(head + "payload_range_kg = [0.0, 450.0]\n")
+    (tmp_path / "signals.toml").write_text((drives.parent / "signals.toml").read_text())
+    expected = []
+    for like in ((), ("--like", sisters[0])):
+        planned = run("calibrate", empty, "--plan", *like, "--json")
+        assert planned.exit_code == 0, planned.output
+        expected.append(json.loads(planned.stdout)["plan"]["advice"][0]["expected"]["payload_std_kg"])
+    any_vehicle, of_its_line = expected
+    assert of_its_line < 0.7 * any_vehicle

@@ -31,7 +31,7 @@ TURN_STD_DEG: Final = 1.0
 SENSOR_OFF_M: Final = 0.3
 MIXED: Final = TRIPS["mixed"]
 TESTED: Final = (MIXED, TRIPS["mixed, another day"], TRIPS["another speed"])
-LONGEST: Final = Scope(n_known_loads=8)
+SCOPE: Final = Scope(n_known_loads=6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ def draw_line(number: int, rng: np.random.Generator) -> Line:
 def sister(line: Line, name: str, seeds: np.random.SeedSequence) -> Driven:
     """A van of the line, driven with known loads."""
     van, sensors, vehicle, rng, road_seeds = _drawn(line, name, seeds)
-    loads = known_loads(van, LONGEST.n_known_loads, rng)
+    loads = known_loads(van, SCOPE.n_known_loads, rng)
     return Driven(vehicle, _runs(van, sensors, [(AS_CALIBRATED, load) for load in loads], road_seeds))
 
 
@@ -108,6 +108,6 @@ def _runs(
 ) -> tuple[KnownRun, ...]:
     spawned = seeds.spawn(len(asked))
     return tuple(
-        driven(van, load, trip, LONGEST, one, number, sensors)
+        driven(van, load, trip, SCOPE, one, number, sensors)
         for number, ((trip, load), one) in enumerate(zip(asked, spawned, strict=True), first)
     )

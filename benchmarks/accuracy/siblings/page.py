@@ -23,7 +23,7 @@ def siblings_page(found: Mapping[str, Any]) -> str:
             "simulator's three types. The vans of a line differ about it in springs by 3 %, dampers 10 %, tyres 4 %, "
             "friction 30 %, unsprung masses 3 %, mass, centre of gravity and inertia 1.5 % (standard deviations, each "
             "axle its own). Each has another sensor unit, mounted 2 cm and one degree beside where it should be. "
-            "Sisters are calibrated with eight known loads of ten minutes near 50 km/h. A sibling is driven empty near "
+            "Sisters are calibrated with six known loads of ten minutes near 50 km/h. A sibling is driven empty near "
             "50 km/h, and mixed: town, country, motorway. It is judged on loads that nobody told: mixed, mixed on "
             "another day (springs changed by 1.5 %, dampers and tyres by 5 %), and at another steady speed from 30 to "
             "110 km/h. All with a roll "

@@ -78,6 +78,8 @@ def _verdict(assessment: Assessment, judgement: Judgement, expected: Expected | 
     reasons = list(_errors_and_intervals(judgement))
     if expected and judgement.estimator == "cross_spectrum":
         reasons.append(_stated(expected, assessment.vehicle))
+    if judgement.estimator == "cross_spectrum":
+        reasons += _inherited(assessment)
     if assessment.outcome:
         verdicts = assessment.outcome.inspection.verdicts
         reasons += [*_runs(verdicts), *_labels(verdicts), *_campaign(assessment.outcome)]
@@ -97,6 +99,18 @@ def _errors_and_intervals(judgement: Judgement) -> Iterator[Reason]:
     yield _answered(table.errors, part)
     if part is Part.LEFT_OUT and Part.VALIDATION in judgement.tables:
         yield from _agreement(table.errors.payload, judgement.tables[Part.VALIDATION].errors.payload)
+
+
+def _inherited(assessment: Assessment) -> Iterator[Reason]:
+    """What sister vehicles tell of loads is believed, but no load of its own has shown it yet."""
+    file = assessment.file
+    if file.line is None or len({run.payload_kg for run in file.provenance.runs}) > 1:
+        return
+    text = (
+        f"Only one load was driven: what others do was inherited from {counted(len(file.line.members), 'vehicle')} of "
+        "its line. One known load, weighed, shows that it holds here."
+    )
+    yield Reason("inherited", Grade.RESERVED, text)
 
 
 def _graded(figure: float, fit: float, most: float) -> Grade:

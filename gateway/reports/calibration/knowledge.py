@@ -45,15 +45,15 @@ def knowledge_of(
     return known
 
 
-def told(known: Sequence[Known]) -> str:
-    """Which parameters the data said next to nothing of."""
+def told(known: Sequence[Known], beforehand: str = "vehicles usually have") -> str:
+    """Which parameters the data said next to nothing of, and so stay at what was known ``beforehand``."""
     untold = [one.name for one in known if one.left_over > UNTOLD_SHARE and not one.is_slack]
     if not untold:
         return "The data told something of every parameter of the vehicle."
     return (
         f"What the data could not tell ({len(untold)} of {sum(not one.is_slack for one in known)} parameters keep more "
-        f"than {100.0 * UNTOLD_SHARE:.0f} % of their prior's spread): {', '.join(untold)}. These stay at what vehicles "
-        "usually have; loads that depend on them are weighed with that uncertainty."
+        f"than {100.0 * UNTOLD_SHARE:.0f} % of their prior's spread): {', '.join(untold)}. These stay at what "
+        f"{beforehand}; loads that depend on them are weighed with that uncertainty."
     )
 
 

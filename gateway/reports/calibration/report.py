@@ -130,8 +130,10 @@ def _charts(sections: list[Section]) -> Iterator[Chart]:
 def _subtitle(assessment: Assessment) -> str:
     seen = assessment.file.seen
     speeds = span(3.6 * seen.speed_mps[0], 3.6 * seen.speed_mps[1], "km/h")
+    line = assessment.file.line
+    inherited = f" and what {counted(len(line.members), 'vehicle')} of its line told" if line else ""
     return (
-        f"Calibrated on {counted(len(assessment.file.provenance.runs), 'run')}: payloads of "
+        f"Calibrated on {counted(len(assessment.file.provenance.runs), 'run')}{inherited}: payloads of "
         f"{span(*seen.payload_kg, 'kg')}, front shares of {span(*seen.front_share_pct, '%', 1)}, {speeds}. "
         f"{assessment.file.id}"
     )
