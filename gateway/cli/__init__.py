@@ -33,7 +33,7 @@ _COMMANDS = {
     "token": "Make, list and revoke access tokens for other machines.",
     "verification": "Known loads held against what a running service weighed, as dated records.",
 }  # each in the module of its name, or a room of ours
-_ROOMS = {"fleet-report": "archived", "line": "fleet", "record": "asked", "verification": "asked"}
+_ROOMS = {"fleet-report": "fleet", "line": "fleet", "record": "asked", "verification": "asked"}
 
 
 # What a vehicle does without: the extra "workbench", in Debian a package of its own.

@@ -1,1 +1,0 @@
-"""Commands over a fleet's archive; they want the extra "archive", which no vehicle has."""
