@@ -80,6 +80,8 @@ batch that crosses midnight is in the month of the log in which it ended.
 What of a vehicle drifts is found batch by batch: `damper_front_ratio`, `damper_rear_ratio`, `delay_scale`,
 `payload_mode_hz` and, with a roll rate, `roll_share_front`. Springs and tyres cannot be told from the load within one
 batch, so no column claims to: what they have changed shows as `tension` and in `payload_drift_std_kg`.
+
+[`springscale fleet-report DATASET`](fleet-report.md) makes pages of it: loads by week, refusals, drift, bad sensors.
 """
 
 

@@ -49,6 +49,8 @@ def _measured(scale: Scale) -> str:
         ("A record in the vehicle's SQLite, spectra and indexes included", in_bytes(records["sqlite_bytes"])),
         ("A record more in a Parquet file, without spectra", in_bytes(records["parquet_bytes"]["per_record"])),
         ("A Parquet file before its first record", in_bytes(records["parquet_bytes"]["per_file"])),
+        ("A receipt, and what each log adds to it", f"{in_bytes(records['receipt_bytes']['per_file'])}, "
+         f"{in_bytes(records['receipt_bytes']['per_log'])}"),
         ("A message of the uplink on the wire, without TLS", in_bytes(uplink["wire_bytes_up"])),
         ("The broker's answer", in_bytes(uplink["wire_bytes_down"])),
         ("An hour of the mapped frames, candump .gz", in_bytes(told["mapped_frames"]["gz_bytes_per_hour"])),
@@ -86,6 +88,7 @@ def _vehicle_year(scale: Scale) -> str:
         ("In the vehicle, SQLite (its size is bounded by `max_size_mb`)", in_bytes(scale.sqlite_bytes), ""),
         ("Uplink: sent to the broker", in_bytes(scale.uplink_bytes), figure(scale.uplink_bytes / GB * mobile)),
         ("Archive: Parquet", in_bytes(scale.parquet_bytes), figure(store(scale.parquet_bytes))),
+        ("Archive: receipts, a log a day", in_bytes(scale.receipt_bytes), figure(store(scale.receipt_bytes))),
         (
             "Archive: files and receipts written",
             figure(scale.objects),
@@ -132,8 +135,9 @@ def _fleets(scale: Scale) -> str:
     ]
     rows = [(name, *(of(float(n)) for n in SIZES)) for name, of in lines]
     head = ("Vehicles", *(f"{n:,}".replace(",", " ") for n in SIZES))
-    return "## Fleets\n\nThe cost is uplink, Parquet, logs, writes and one weighing of the above.\n\n" + _table(
-        head, rows
+    return (
+        "## Fleets\n\nThe cost is uplink, Parquet, receipts, logs, writes and one weighing of the above.\n\n"
+        + _table(head, rows)
     )
 
 
@@ -144,7 +148,7 @@ def _or_less(cores: float) -> str:
 def _yearly(scale: Scale) -> float:
     return (
         scale.uplink_bytes / GB * scale.price("mobile_data_per_gb")
-        + scale.stored_cost(scale.parquet_bytes + scale.mapped_log_bytes)
+        + scale.stored_cost(scale.parquet_bytes + scale.receipt_bytes + scale.mapped_log_bytes)
         + scale.objects / 1000.0 * scale.price("writes_per_1000")
         + scale.weighing_core_hours * scale.price("core_hour")
     )

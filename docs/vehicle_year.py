@@ -34,6 +34,12 @@ class Scale:
         return self.records * float(of["per_record"]) + self._jobs * float(of["per_file"])
 
     @property
+    def receipt_bytes(self) -> float:
+        """With a log a day."""
+        of = self.measured["records"]["receipt_bytes"]
+        return float(self.assumed["driving"]["days_per_year"] * of["per_log"]) + self._jobs * float(of["per_file"])
+
+    @property
     def mapped_log_bytes(self) -> float:
         return self.hours * float(self.measured["mapped_frames"]["gz_bytes_per_hour"])
 

@@ -1,13 +1,15 @@
 """One chart, drawn twice: what the live one shows, the still one shows too."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gateway.reports.charts import Axis, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts import Axis, Chart, Line, Link, Mark, Panel, Points, Ribbon, Rule, Section, Span, Table
 from gateway.reports.charts.chart import COLOURS
+from gateway.reports.charts.html import section_html, table_html
 from gateway.reports.charts.live import live, plotly_json, plotly_script
 from gateway.reports.charts.still import draw, save_still
 
@@ -98,3 +100,25 @@ def test_the_same_chart_gives_the_same_bytes(tmp_path: Path) -> None:
 
 def test_the_script_is_the_installed_packages_own() -> None:
     assert plotly_script().startswith("/**\n* plotly.js")
+
+
+def test_named_positions_stand_on_both_charts() -> None:
+    weeks = Axis("week", ticks=((1.0, "2026-01"), (3.0, "2026-02")))
+    named = chart(Panel(weeks, Axis("y"), (Line(X, X),)))
+    axis = json.loads(plotly_json(named))["layout"]["xaxis"]
+    assert (axis["tickvals"], axis["ticktext"]) == ([1.0, 3.0], ["2026-01", "2026-02"])
+    [axes, *_] = draw(named).axes
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["2026-01", "2026-02"]
+
+
+def test_a_cell_may_lead_to_another_page_and_nothing_breaks_out_of_it() -> None:
+    cells = table_html(Table("of vans", ("Van",), ((Link("<b>", 'a"b.html'),),)))
+    assert '<th scope="row"><a href="a&quot;b.html">&lt;b&gt;</a></th>' in cells
+
+
+def test_a_chart_without_a_still_picture_names_none() -> None:
+    still = chart(panel(Line(X, X)))
+    live_only = replace(still, has_still=False)
+    pages = [section_html(Section("a", "A", (), (one,)), {one.name: "{}"}) for one in (still, live_only)]
+    assert ["<img" in page for page in pages] == [True, False]
+    assert all('role="img" aria-label="what is to be seen"' in page for page in pages)

@@ -15,15 +15,13 @@ from gateway.estimate_json import estimate_to_json
 from gateway.store import Store
 from gateway.uplink.outbox import Letter, Outbox
 
-VEHICLE = "van-17"
-
 
 def measure(folder: Path, n_drives: int) -> dict[str, Any]:
     """Every figure of docs/scale.md that is measured."""
     written = list(drives.write_drives(folder, n_drives))
     logs = [path for path, _ in written]
     hours = sum(driven for _, driven in written)
-    weighed = drives.weigh(logs, VEHICLE)
+    weighed = drives.weigh(logs, kept.VEHICLE)
     answered = sum(estimate.counted for estimate in weighed.estimates)
     return {
         "machine": f"{platform.machine()}, Python {platform.python_version()}",
@@ -32,7 +30,7 @@ def measure(folder: Path, n_drives: int) -> dict[str, Any]:
             "n_answered": answered,
             "json_bytes": kept.json_bytes(weighed.estimates),
             "sqlite_bytes": kept.sqlite_bytes(folder, weighed.estimates),
-            "parquet_bytes": kept.parquet_bytes(folder, weighed.estimates),
+            **kept.archive_bytes(folder, logs),
         },
         "weighing": {"hours": hours, "cpu_s": weighed.cpu_s, "cpu_s_per_answer": weighed.cpu_s / answered},
         "mapped_frames": {"gz_bytes_per_hour": sum(log.stat().st_size for log in logs) / hours},

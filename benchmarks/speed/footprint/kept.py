@@ -1,15 +1,29 @@
-"""Bytes of a record where it is kept: in the vehicle's SQLite database, and in a Parquet file of an archive."""
+"""Bytes of a record where it is kept: in the vehicle's SQLite database, in an archive's tables and receipts."""
 
+import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.speed.footprint.drives import CALIBRATION, SIGNALS
+from gateway.archive import place_of, slots_done
+from gateway.archive.manifest import load_manifest
+from gateway.archive.processes import Processes
+from gateway.archive.reprocess import reprocess
 from gateway.estimate import Estimate
-from gateway.estimate_json import estimate_to_json, table_row
+from gateway.estimate_json import estimate_to_json
 from gateway.records import json_line
 from gateway.store import Store
 
 TIMEOUT_S = 60.0
+VEHICLE = "van-17"
+MANIFEST = """\
+signals = "{signals}"
+calibration = "{calibration}"
+[[vehicles]]
+id = "{vehicle}"
+"""
 
 
 def json_bytes(estimates: Sequence[Estimate]) -> dict[str, float]:
@@ -39,20 +53,39 @@ def _stored(store: Store, folder: Path, estimates: Sequence[Estimate]) -> int:
     return store.health().size_bytes
 
 
-def parquet_bytes(folder: Path, estimates: Sequence[Estimate]) -> dict[str, float]:
-    """Of a file of the flat columns: what it weighs without records, and what each record adds, spectra left out."""
-    half = len(estimates) // 2
-    first, whole = (_written(folder / f"{n}.parquet", estimates[:n]) for n in (half, len(estimates)))
-    per_record = (whole - first) / (len(estimates) - half)
-    return {"per_record": per_record, "per_file": first - half * per_record}
+def archive_bytes(folder: Path, logs: Sequence[Path]) -> dict[str, dict[str, float]]:
+    """What `springscale reprocess` leaves of a vehicle's logs of one month: its table and its receipt.
+
+    Each weighs something without records and logs, and something for each: half of the logs against all of them.
+    """
+    half, whole = (_reprocessed(folder / f"of-{n}", logs[:n]) for n in (len(logs) // 2, len(logs)))
+    per_record = (whole.table_bytes - half.table_bytes) / (whole.n_batches - half.n_batches)
+    per_log = (whole.receipt_bytes - half.receipt_bytes) / (len(logs) - len(logs) // 2)
+    return {
+        "parquet_bytes": {"per_record": per_record, "per_file": whole.table_bytes - whole.n_batches * per_record},
+        "receipt_bytes": {"per_log": per_log, "per_file": whole.receipt_bytes - len(logs) * per_log},
+    }
 
 
-def _written(path: Path, estimates: Sequence[Estimate]) -> int:
-    import pyarrow as pa  # noqa: PLC0415  # what the broker and the logs are measured by needs no Arrow
-    import pyarrow.parquet as pq  # noqa: PLC0415
+@dataclass(frozen=True, slots=True)
+class _Month:
+    table_bytes: int
+    receipt_bytes: int
+    n_batches: int
 
-    pq.write_table(pa.Table.from_pylist([table_row(estimate) for estimate in estimates]), path, compression="zstd")
-    return path.stat().st_size
+
+def _reprocessed(folder: Path, logs: Sequence[Path]) -> _Month:
+    (folder / "archive" / VEHICLE).mkdir(parents=True)
+    for log in logs:
+        (folder / "archive" / VEHICLE / log.name).symlink_to(log)
+    manifest = folder / "archive/archive.toml"
+    manifest.write_text(MANIFEST.format(signals=SIGNALS, calibration=CALIBRATION, vehicle=VEHICLE))
+    dataset, workers = place_of(folder / "dataset"), Processes(1)
+    reprocess(load_manifest(str(manifest)), dataset, workers)
+    workers.shutdown()
+    [slot] = slots_done(dataset)
+    receipt = dataset.read(slot.receipt)
+    return _Month(len(dataset.read(slot.table)), len(receipt), json.loads(receipt)["n_batches"])
 
 
 def _mean_length(records: Sequence[dict[str, Any]]) -> float:

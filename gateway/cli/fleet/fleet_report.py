@@ -14,7 +14,7 @@ from gateway.reports.fleet import write_fleet_report
 
 @click.command("fleet-report")
 @click.argument("dataset")
-@click.option("--output", type=FILE, required=True, help="directory to write; what is there of another report goes")
+@click.option("--output", type=FILE, required=True, help="directory to write; an earlier report is written over")
 @as_json
 def fleet_report(dataset: str, output: Path, as_json: bool) -> None:
     """What DATASET, the output of `springscale reprocess`, tells of each vehicle.
