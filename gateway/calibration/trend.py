@@ -27,7 +27,8 @@ DAMPER_CHANGE_PCT: Final = 5.0  # chosen: the search's own belief lets a damper 
 DELAY_CHANGE_PCT: Final = 1.0  # likewise; it believes in 0.3 %
 ZERO_CHANGE_SHARE: Final = 0.01  # of the empty mass; likewise
 
-_FOUND: Final = {"damper_front_ratio": "damper_front", "damper_rear_ratio": "damper_rear", "delay_scale": "delay"}
+_RATIOS: Final = {"damper_front_ratio": "damper_front", "damper_rear_ratio": "damper_rear"}  # of the calibrated: 1
+_SHARES: Final = {"delay_scale": "delay"}  # by which it is off: 0
 
 
 class Week(Part):
@@ -101,10 +102,14 @@ def found_pct(estimate: Estimate) -> dict[str, float] | None:
     A vehicle that drifts far is refused as a misfit: what such a batch found counts too.
     """
     is_heard = estimate.counted or estimate.rejected == (Why.MODEL_MISFIT,)
-    ratios = {name: estimate.diagnostics.get(key, math.nan) for key, name in _FOUND.items()}
-    if not is_heard or not all(math.isfinite(ratio) and ratio > 0.0 for ratio in ratios.values()):
+    ratios = {name: estimate.diagnostics.get(key, math.nan) for key, name in _RATIOS.items()}
+    shares = {name: estimate.diagnostics.get(key, math.nan) for key, name in _SHARES.items()}
+    is_known = all(map(math.isfinite, (*ratios.values(), *shares.values())))
+    if not is_heard or not is_known or not all(ratio > 0.0 for ratio in ratios.values()):
         return None
-    return {name: 100.0 * math.log(ratio) for name, ratio in ratios.items()}
+    return {name: 100.0 * math.log(ratio) for name, ratio in ratios.items()} | {
+        name: 100.0 * share for name, share in shares.items()
+    }
 
 
 def monday_of(t_ns: int) -> str:

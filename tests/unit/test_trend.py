@@ -31,7 +31,7 @@ def batch(t_end_ns: int, front: float = 1.0, rear: float = 1.0, *rejected: Why, 
         estimator="cross_spectrum",
         calibration_id=calibration_id,
         rejected=rejected,
-        diagnostics={"damper_front_ratio": front, "damper_rear_ratio": rear, "delay_scale": 1.0},
+        diagnostics={"damper_front_ratio": front, "damper_rear_ratio": rear, "delay_scale": 0.0},
     )
 
 
@@ -51,6 +51,13 @@ def weeks(rear_pct: "np.ndarray", calibration_id: str = "a") -> list[Week]:
 def rear_of(pct: "np.ndarray") -> tuple[bool, str | None]:
     (trend,) = [one for one in trends_of(weeks(pct), [], "a", 1240.0) if one.name == "damper_rear"]
     return trend.is_drifting, trend.sentence()
+
+
+@pytest.mark.parametrize("share", [-0.0015, 0.0, 0.0004])
+def test_a_rear_axle_that_comes_early_is_heard_like_one_that_comes_late(share: float) -> None:
+    """As batches tell it, the delay is off by a share of either sign: 0 where it is as calibrated."""
+    found = found_pct(replace(batch(MONDAY_NS), diagnostics={**batch(MONDAY_NS).diagnostics, "delay_scale": share}))
+    assert found == {"damper_front": 0.0, "damper_rear": 0.0, "delay": pytest.approx(100.0 * share)}
 
 
 def test_a_damper_that_wears_is_told_with_how_much_and_since_when() -> None:
