@@ -71,6 +71,7 @@ def test_a_slope_is_since_the_last_calibration(tmp_path: Path) -> None:
     drift = vehicle.drifts["damper_front_ratio"]
     assert (drift.found.slope, drift.found.n, drift.is_believed) == (0.0, 12, False)
     assert vehicle.calibrations == ("sha256:1", "sha256:2")
+    assert vehicle.calibrated_week == vehicle.weeks.number[12]
     assert len(vehicle.weeks.number) == 24
 
 

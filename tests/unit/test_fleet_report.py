@@ -2,6 +2,7 @@
 
 import json
 import re
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from click.testing import CliRunner, Result
 from support.fleet import DAY_S, MONDAY_S, row, week, write_table
 from support.html_page import Page
 
+from gateway.archive.fleet import monday_of
 from gateway.cli import main, springscale
 from gateway.reports.fleet.text import page_of, time_axis
 from gateway.reports.fleet.vehicle import runs_of
@@ -119,6 +121,16 @@ def test_a_vehicles_page_has_every_week_with_its_number_of_batches(made: Path) -
     assert weeks[1][1:5] == ["10", "10", "100 kg (92 to 108)", "100 to 100 kg"]
     slopes = next(one for one in van.tables if one[0][0] == "Parameter")
     assert [line[-1] for line in slopes[1:]] == ["yes", "no"]
+
+
+def test_a_new_calibration_is_marked_and_the_slope_begins_there(tmp_path: Path) -> None:
+    rows = [one for number in range(20) for one in week(number, calibration_id=f"sha256:{number // 12}", misfit=1.0)]
+    write_table(tmp_path / "dataset", "van", rows)
+    assert run(tmp_path / "dataset", tmp_path / "report").exit_code == 0
+    text = (tmp_path / "report/vehicles/van.html").read_text(encoding="utf-8")
+    charts = [json.loads(found) for found in re.findall(r'<script type="application/json">(.*?)</script>', text)]
+    [rule] = charts[-1]["layout"]["shapes"]
+    assert monday_of(int(rule["x0"])) == date(2026, 1, 5) + timedelta(weeks=12)
 
 
 def test_every_page_is_well_formed_and_headings_descend_by_one(made: Path) -> None:

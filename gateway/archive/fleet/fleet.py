@@ -27,7 +27,10 @@ EPOCH: Final = date(1970, 1, 1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Vehicle:
-    """What a data set tells of one vehicle. ``n_refused`` counts a batch for each of its reasons."""
+    """What a data set tells of one vehicle. ``n_refused`` counts a batch for each of its reasons.
+
+    ``drifts`` are of the weeks from number ``calibrated_week`` on, the first of its last calibration.
+    """
 
     name: str
     n: int
@@ -39,6 +42,7 @@ class Vehicle:
     n_refused: Mapping[str, int]
     troubles: tuple[Trouble, ...]
     calibrations: tuple[str, ...]
+    calibrated_week: int
     drifts: Mapping[str, Drift]
 
     @property
@@ -115,7 +119,7 @@ def fleet_of(dataset: Place, on_vehicle: OnVehicle = lambda done, of: None) -> F
 
 def _vehicle(name: str, batches: Batches) -> tuple[Vehicle, Series]:
     """What is kept of a vehicle, its drifts still to be judged, and the series they will be judged by."""
-    answered = batches.is_answered
+    answered, since = batches.is_answered, weeks_of(batches.rows(_by_last_calibration(batches)))
     first, last = (EPOCH.fromordinal(EPOCH.toordinal() + int(t // DAY_NS)) for t in batches.t_end_ns[[0, -1]])
     vehicle = Vehicle(
         name,
@@ -128,10 +132,10 @@ def _vehicle(name: str, batches: Batches) -> tuple[Vehicle, Series]:
         {reason: int(refused.sum()) for reason, refused in batches.rejected.items()},
         troubles_of(batches),
         tuple(dict.fromkeys(one for one in batches.calibration_id if one)),
+        int(since.number[0]),
         {},
     )
-    since = batches.rows(_by_last_calibration(batches))
-    return vehicle, series_of(weeks_of(since))
+    return vehicle, series_of(since)
 
 
 def _by_last_calibration(batches: Batches) -> Bool:

@@ -9,7 +9,7 @@ from gateway.archive.fleet import DRIFTING, Vehicle
 from gateway.archive.fleet.weeks import known_reason
 from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import I64, Bool
-from gateway.reports.charts import Axis, Chart, Line, Mark, Panel, Points, Ribbon, Section, Table
+from gateway.reports.charts import Axis, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Section, Table
 from gateway.reports.fleet.text import (
     NAMES,
     NONE,
@@ -136,7 +136,7 @@ def _parameters(vehicle: Vehicle) -> Section:
     )
     chart = Chart(
         "parameters",
-        "Weekly medians, and the slope where there are weeks enough; the first calibration's weeks included.",
+        "Weekly medians, and the slope since the last calibration where there are weeks enough.",
         "Weekly medians of each parameter; the table below holds the slopes.",
         panels,
         2,
@@ -160,11 +160,13 @@ def _parameter_panel(vehicle: Vehicle, name: str) -> Panel:
     )
     marks: list[Mark] = [Points(x[known], medians[known], "weekly median", 0, notes=notes)]
     if (drift := vehicle.drifts.get(name)) is not None:
-        middle = np.median(x[known])
-        ends = np.array([x[known][0], x[known][-1]])
-        line = np.median(medians[known]) + drift.found.slope * (ends - middle) / WEEKS_PER_YEAR
+        judged = known & (weeks.number >= vehicle.calibrated_week)
+        ends = x[judged][[0, -1]]
+        line = np.median(medians[judged]) + drift.found.slope * (ends - np.median(x[judged])) / WEEKS_PER_YEAR
         label, colour = ("slope, believed", 1) if drift.is_believed else ("slope", 7)
         marks.append(Line(ends, line, label, colour, "solid" if drift.is_believed else "dash"))
+    if vehicle.calibrated_week > weeks.number[0]:
+        marks.append(Rule(float(vehicle.calibrated_week), is_vertical=True, label="last calibration", dash="dot"))
     return Panel(time_axis(weeks.number.tolist()), Axis(""), tuple(marks), NAMES[name])
 
 
