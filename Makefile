@@ -49,6 +49,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_reasons.py --check
 	$(BIN)/python docs/make_findings.py --check
 	$(BIN)/python docs/make_calibration_schema.py --check
+	$(BIN)/python docs/make_performance.py --check
 	$(BIN)/python docs/make_readme_table.py --check
 	$(BIN)/python docs/make_scale.py --check
 	$(BIN)/python docs/make_site.py
@@ -59,8 +60,11 @@ check: .venv/.development
 audit: .venv/.development
 	$(BIN)/python deploy/dist/audit_locks.py
 
+# Everything about speed, beside others where these are installed (pip install --group bench), in one run and one table;
+# writes docs/performance.json and its page. A quarter of an hour and ten gigabytes of disk.
 bench: .venv/.development
-	for what in day decode live simulator web; do echo "== $$what"; $(BIN)/python -m benchmarks.speed.$$what || exit 1; done
+	$(BIN)/python -m benchmarks.speed --output docs/performance.json
+	$(BIN)/python docs/make_performance.py
 
 # The installed package on a real vcan0 under real systemd, in a small virtual machine: wants root, /dev/net/tun and the
 # Debian packages that .ci/run names; skips with a reason without them. One machine on each of two processors.
@@ -116,6 +120,7 @@ docs: .venv/.development
 	$(BIN)/python docs/make_reasons.py
 	$(BIN)/python docs/make_findings.py
 	$(BIN)/python docs/make_calibration_schema.py
+	$(BIN)/python docs/make_performance.py
 	$(BIN)/python docs/make_tutorial.py
 	$(BIN)/python docs/make_readme_table.py
 	$(BIN)/python docs/make_scale.py

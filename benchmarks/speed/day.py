@@ -4,8 +4,7 @@
 
 The drive of the demo (25 minutes) repeats until the hours are full, on a bus of about 2500 frames/s; the log is plain
 candump text of roughly 400 MB an hour, in a temporary folder. Each estimator reads the whole log in a process of its
-own, start of Python included; memory is compared with a log of one hour. Goals: both together under 60 s for eight
-hours (480 x real time), memory flat.
+own, start of Python included; memory is compared with a log of one hour, time with that of `wc -l`.
 """
 
 import argparse
@@ -20,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.speed.meter import ONE_THREAD, best_of
 from gateway.bus.frames import merge_frames
 from gateway.bus.logs.candump_write import append_candump
 from gateway.config import ESTIMATOR_NAMES
@@ -67,14 +67,19 @@ def estimate(log: Path, estimator: str) -> dict[str, float]:
     command = [sys.executable, "-m", "gateway", "estimate", str(log), "--signals", "springscale:reference"]
     command += ["--calibration", str(CALIBRATION), "--estimator", estimator, "--json"]
     begun_s = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.PIPE)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, env=os.environ | ONE_THREAD)
     assert process.stdout is not None
     n_lines = sum(1 for _ in process.stdout)
     process.stdout.close()
     _, code, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(code)
     assert process.returncode == 0, command
-    return {"seconds": time.perf_counter() - begun_s, "peak_mb": used.ru_maxrss / 1024, "batches": n_lines}
+    return {
+        "clock_s": time.perf_counter() - begun_s,
+        "cpu_s": used.ru_utime + used.ru_stime,
+        "peak_mb": used.ru_maxrss / 1024,
+        "batches": n_lines,
+    }
 
 
 def main() -> None:
@@ -91,19 +96,21 @@ def main() -> None:
         written_in_own_process(hour, 1.0)
         n_frames = written_in_own_process(day, options.hours)
         figures = {name: {"hour": estimate(hour, name), "day": estimate(day, name)} for name in ESTIMATOR_NAMES}
+        wc_s = best_of(
+            2, lambda: {"code": subprocess.run(["wc", "-l", day], check=True, capture_output=True).returncode}
+        )
         size_mb = day.stat().st_size / 1e6
     if options.json:
-        print(json.dumps({"frames": n_frames, "size_mb": size_mb, **figures}))
+        told = {"hours": options.hours, "frames": n_frames, "size_mb": size_mb, "wc_s": wc_s["seconds"]}
+        print(json.dumps(told | {"estimators": figures}))
         return
-    print(f"{options.hours:g} h, {n_frames:,} frames, {size_mb:,.0f} MB")
+    print(f"{options.hours:g} h, {n_frames:,} frames, {size_mb:,.0f} MB, wc -l {wc_s['seconds']:.1f} s")
     for name, runs in figures.items():
-        day_s, peak_mb, hour_mb = runs["day"]["seconds"], runs["day"]["peak_mb"], runs["hour"]["peak_mb"]
+        day_s, peak_mb, hour_mb = runs["day"]["cpu_s"], runs["day"]["peak_mb"], runs["hour"]["peak_mb"]
         print(
-            f"{name:16}{day_s:7.1f} s  {3600 * options.hours / day_s:7,.0f} x real time  "
+            f"{name:16}{day_s:7.1f} s  {n_frames / day_s / 1e6:5.1f} Mframes/s  "
             f"{runs['day']['batches']:4.0f} batches  peak {peak_mb:.0f} MB (one hour: {hour_mb:.0f} MB)"
         )
-    total_s = sum(runs["day"]["seconds"] for runs in figures.values())
-    print(f"both: {total_s:.1f} s (goal for 8 h < 60: {'met' if total_s < 60 * options.hours / 8 else 'MISSED'})")
 
 
 if __name__ == "__main__":

@@ -20,10 +20,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import can
-import cantools
-from can.interfaces.socketcan import socketcan as python_can_socketcan
-
 from gateway.bus.live import LiveSource
 from gateway.bus.live.socketcan import SocketCanReceiver, ask_for_stamps
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
@@ -85,6 +81,9 @@ def receive_ours(wire: socket.socket, signal_map: SignalMap, is_over: threading.
 
 def receive_python_can(wire: socket.socket, signal_map: SignalMap, is_over: threading.Event) -> dict[str, Any]:
     """python-can's SocketcanBus over the same kind of socket, cantools for the mapped frames."""
+    import cantools  # noqa: PLC0415 # what ours shall not hold in memory
+    from can.interfaces.socketcan import socketcan as python_can_socketcan  # noqa: PLC0415
+
     database: Any = cantools.database.load_file(shipped_map("reference").with_name("springscale_reference.dbc"))
     messages = {message.frame_id: message for message in database.messages}
     peer: Any = python_can_socketcan  # its way to a real CAN socket is put out of the way
@@ -162,7 +161,6 @@ def _verdict(is_met: bool) -> str:
 
 
 def main() -> None:
-    can.set_logging_level("warning")
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=6.0, help="how long each path receives at each rate")
     parser.add_argument("--json", action="store_true", help="print the figures for machines")

@@ -1,8 +1,10 @@
 """How fast the simulator drives: seconds of driving per second of one core.
 
-Run: python -m benchmarks.speed.simulator
+python -m benchmarks.speed.simulator [--json]
 """
 
+import argparse
+import json
 import time
 from collections.abc import Callable
 
@@ -20,8 +22,8 @@ from gateway.workbench.wiring import Wiring
 DRIVE_S = 900.0
 
 
-def main() -> None:
-    """Print the rate of each stage, warm."""
+def measure() -> dict[str, float]:
+    """Times real time, warm, of each stage."""
     rng = np.random.default_rng(1)
     drive, loads = constant(50.0 / 3.6, DRIVE_S, rng), (Load(270.0, 1.3),)
     road = iso_road("B").lay(drive.travelled_m[-1] + 50.0, rng)
@@ -32,11 +34,25 @@ def main() -> None:
         "road, vehicle, sensors": lambda: simulate_drive(PAPER_VAN, loads, iso_road("B"), drive, REFERENCE, 1),
         "encoding to frames": lambda: wiring.frames_of(recording),
     }
+    rates = {}
     for name, run in stages.items():
         run()
         begun_s = time.process_time()
         run()
-        print(f"{name:26s} {DRIVE_S / (time.process_time() - begun_s):8.0f} x real time")
+        rates[name] = DRIVE_S / (time.process_time() - begun_s)
+    return rates
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true", help="print the figures for machines")
+    options = parser.parse_args()
+    rates = measure()
+    if options.json:
+        print(json.dumps(rates))
+        return
+    for name, rate in rates.items():
+        print(f"{name:26s} {rate:8.0f} x real time")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from dataclasses import replace
 import can
 import numpy as np
 import pytest
+from support.databases import SomeMessage, SomeSignal, dbc
 from support.encoded import encode_signals
 from support.patience import PATIENCE_S
 
@@ -159,6 +160,31 @@ def test_a_trc_log_gives_the_same_motion_up_to_its_start_time(tmp_path, drive, t
     motion, report = read(path, signal_map)
     np.testing.assert_array_equal(np.diff(motion.t_ns), np.diff(truth.t_ns))
     assert (report.frames, report.n_rejected) == (len(drive), 0)
+
+
+@pytest.mark.parametrize("suffix", [".log", ".log.xz", ".asc", ".blf", ".mf4"])
+def test_can_fd_frames_give_the_same_motion(suffix, tmp_path):
+    signals = [SomeSignal("Accel", 320, 16, "m/s^2", 0.001, is_signed=True, minimum=-30.0, maximum=30.0)]
+    (tmp_path / "wide.dbc").write_text(dbc([SomeMessage("WIDE", 0x300, 64, signals)]))
+    (tmp_path / "map.toml").write_text(
+        'dbc = ["wide.dbc"]\n[signals.vertical_acceleration]\nmessage = "WIDE"\nsignal = "Accel"\n'
+    )
+    wide_map = load_signal_map(tmp_path / "map.toml")
+    rng = np.random.default_rng(2)
+    n = 60
+    length = np.where(np.arange(n) % 4, 64, 8).astype(np.uint8)  # classic frames of another message between
+    can_id = np.where(length == 64, 0x300, 0x301).astype(np.uint32)
+    payload = np.where(np.arange(64) < length[:, None], rng.integers(0, 256, (n, 64)), 0).astype(np.uint8)
+    drive = Frames(START_NS + np.arange(n) * 10_000_000, can_id, length, payload)
+    path = tmp_path / f"drive{suffix}"
+    if suffix == ".mf4":
+        files = pytest.importorskip("support.mf4", reason="asammdf is not installed")
+        files.write_mf4(path, START_NS, [files.can_group(drive, START_NS)])
+    else:
+        write_log(drive, path)
+    chunks, report = open_log(path, wide_map)
+    assert_same(Decoder(wide_map).decode(join(list(chunks), 64)), Decoder(wide_map).decode(drive))
+    assert (report.wanted, report.n_rejected) == (np.count_nonzero(length == 64), 0)
 
 
 def test_an_in_process_bus_gives_the_same_motion_and_stamps(drive, truth, signal_map):

@@ -23,6 +23,8 @@ else:
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
 
+__all__ = ["BUFFER_BYTES", "PACKED_SUFFIXES", "open_log_file", "packing_of", "unpacked_path", "unpacked_suffix", "zstd"]
+
 PACKED_BYTES: Final = 1 << 18
 INFLATED_BYTES: Final = 1 << 17  # at most this much before a damage is lost
 BUFFER_BYTES: Final = 2 << 20

@@ -6,7 +6,6 @@ from itertools import product
 from typing import Final, Literal
 
 import numpy as np
-from scipy.stats import rankdata
 
 from gateway.calibration.ratio_index.scatter import bin_covariance, integral_covariance
 from gateway.calibration.ratio_index.table import N_SEGMENT, SPECTRUM, SpectrumTable
@@ -119,6 +118,8 @@ def run_means(run: I64, columns: F64) -> F64:
 
 def rank_correlations(columns: F64, target: F64) -> F64:
     """Spearman's, of each column (r, b) with target (r,): 1 where it rises whenever the target does. 0 if constant."""
+    from scipy.stats import rankdata  # noqa: PLC0415 # a second of every start, for what only calibration needs
+
     ranks, aim = rankdata(columns.round(12), axis=0), rankdata(target.round(12))
     ranks, aim = ranks - ranks.mean(axis=0), aim - aim.mean()
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,0 +1,104 @@
+"""Everything about speed in one run and one table: `make bench`.
+
+    python -m benchmarks.speed [--only decode,formats] [--quick] [--output docs/performance.json]
+
+Each part is a program of its own (``python -m benchmarks.speed.PART``) and runs alone, one after the other. The figures
+go into a file as JSON, from which docs/performance.md is made (docs/make_performance.py). About a quarter of an hour,
+and ten gigabytes of disk for the day.
+"""
+
+import argparse
+import json
+import os
+import platform
+import sys
+import time
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.speed.meter import in_own_process
+from benchmarks.speed.table import Line, lines_of
+
+PARTS: Final[dict[str, tuple[str, ...]]] = {
+    "decode": ("--minutes", "10"),
+    "formats": ("--minutes", "4"),
+    "day": ("--hours", "8"),
+    "live": ("--seconds", "10"),
+    "service": ("--seconds", "75"),
+    "web": ("--seconds", "10"),
+    "weigh": (),
+    "start": (),
+    "simulator": (),
+}
+QUICK: Final = {"decode": "1", "formats": "0.5", "day": "0.5", "live": "3", "service": "70", "web": "3"}
+PACKAGES: Final = ("numpy", "python-can", "cantools", "hilspy", "asammdf", "can_decoder", "polars", "isal")
+
+
+def conditions() -> dict[str, Any]:
+    """What was measured, and on what."""
+    return {
+        "machine": f"{_processor()}, {os.cpu_count()} processors",
+        "python": platform.python_version(),
+        "packages": {name: version for name in PACKAGES if (version := _version(name))},
+        "load_average_before": os.getloadavg()[0],
+    }
+
+
+def _processor() -> str:
+    lines = Path("/proc/cpuinfo").read_text().splitlines()
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def measure(parts: Iterable[str], *, quick: bool) -> dict[str, Any]:
+    """The parts one after the other."""
+    found: dict[str, Any] = {"conditions": conditions() | {"is_quick": quick}}
+    for part in parts:
+        print(f"{time.strftime('%H:%M:%S')} {part} ...", file=sys.stderr, flush=True)
+        options = list(PARTS[part])
+        if quick and part in QUICK:
+            options[1] = QUICK[part]
+        found[part] = in_own_process(part, "--json", *options)
+    found["conditions"]["load_average_after"] = os.getloadavg()[0]
+    return found
+
+
+def show(lines: list[Line]) -> None:
+    """One table."""
+    widths = [
+        max(len(text) for text in column) for column in zip(*((line.what, line.figure) for line in lines), strict=True)
+    ]
+    section = ""
+    for line in lines:
+        if line.section != section:
+            section = line.section
+            print(f"\n{section}")
+        print(f"  {line.what:<{widths[0]}}  {line.figure:<{widths[1]}}  {line.verdict}".rstrip())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", default=",".join(PARTS), help="these parts, by comma; others are kept as they were")
+    parser.add_argument("--quick", action="store_true", help="shorter logs and times: to see that it works")
+    parser.add_argument("--output", type=Path, help="where the figures go as JSON")
+    options = parser.parse_args()
+    chosen = options.only.split(",")
+    if unknown := set(chosen) - set(PARTS):
+        parser.error(f"--only {','.join(unknown)}: there are {', '.join(PARTS)}")
+    found = measure(chosen, quick=options.quick)
+    if options.output:
+        before = json.loads(options.output.read_text()) if options.output.is_file() else {}
+        options.output.write_text(json.dumps(before | found, indent=1) + "\n")
+    show(lines_of(found))
+
+
+if __name__ == "__main__":
+    main()

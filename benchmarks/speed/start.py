@@ -1,0 +1,118 @@
+"""What a start costs and what an install weighs.
+
+    python -m benchmarks.speed.start [--json]
+
+CPU time of the imports, the time from the command to READY=1 of the service as systemd hears it (on an in-process bus,
+with the demo's calibration), and the bytes of everything that a vehicle's install holds.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Final
+
+from packaging.requirements import Requirement
+
+from benchmarks.speed.meter import ONE_THREAD, best_of
+
+REPOSITORY: Final = Path(__file__).parents[2]
+SETTINGS: Final = """\
+signals = "springscale:reference"
+calibration = "vehicle.json"
+estimator = "cross_spectrum"
+[bus]
+interface = "virtual"
+channel = "bench"
+[web]
+port = 0
+[store]
+directory = "state"
+"""
+
+
+def imports_s(module: str) -> float:
+    """CPU time of importing a module in a fresh Python, less that of a Python that imports nothing."""
+
+    def run(code: str) -> float:
+        command = [sys.executable, "-c", code]
+        environment = os.environ | ONE_THREAD
+        found = best_of(3, lambda: {"code": subprocess.run(command, check=True, env=environment).returncode})
+        return float(found["seconds"])
+
+    return run(f"import {module}") - run("pass")
+
+
+def ready_s(folder: Path) -> float:
+    """From the command to READY=1."""
+    shutil.copy(REPOSITORY / "gateway/demo/paper_van.json", folder / "vehicle.json")
+    (folder / "springscale.toml").write_text(SETTINGS)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as notified:
+        notified.bind(str(folder / "notify"))
+        notified.settimeout(60.0)
+        environment = os.environ | ONE_THREAD | {"NOTIFY_SOCKET": str(folder / "notify")}
+        begun_s = time.monotonic()
+        command = [sys.executable, "-m", "gateway", "run", "--config", str(folder / "springscale.toml")]
+        service = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
+        try:
+            while b"READY=1" not in notified.recv(4096):
+                pass
+            return time.monotonic() - begun_s
+        finally:
+            service.terminate()
+            service.wait(30.0)
+
+
+def install_mb() -> dict[str, float]:
+    """Megabytes of every package that a vehicle's install holds, the largest first."""
+    sizes = {"springscale": _bytes_under(REPOSITORY / "gateway") + _bytes_under(REPOSITORY / "dbc")}
+    waiting = [("springscale", frozenset[str]())]
+    while waiting:
+        package, extras = waiting.pop()
+        for wanted in map(Requirement, metadata.requires(package) or []):
+            name = wanted.name.lower().replace("_", "-")
+            if wanted.marker and not any(wanted.marker.evaluate({"extra": extra}) for extra in ("", *extras)):
+                continue
+            if name not in sizes:
+                files = [Path(str(file.locate())) for file in metadata.files(name) or []]
+                sizes[name] = sum(file.stat().st_size for file in files if file.is_file())
+                waiting.append((name, frozenset(wanted.extras)))
+    return {name: sizes[name] / 1e6 for name in sorted(sizes, key=lambda name: -sizes[name])}
+
+
+def _bytes_under(folder: Path) -> float:
+    return float(sum(f.stat().st_size for f in folder.rglob("*") if f.is_file() and "__pycache__" not in f.parts))
+
+
+def measure() -> dict[str, Any]:
+    """All of it."""
+    with tempfile.TemporaryDirectory() as folder:
+        times = []
+        for n in range(3):
+            (Path(folder) / str(n)).mkdir()
+            times.append(ready_s(Path(folder) / str(n)))
+    sizes = install_mb()
+    return {
+        "imports_s": {name: imports_s(name) for name in ("gateway.cli", "gateway.service.gateway")},
+        "ready_s": min(times),
+        "install_mb": sum(sizes.values()),
+        "largest_mb": dict(list(sizes.items())[:6]),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true", help="print the figures for machines")
+    options = parser.parse_args()
+    print(json.dumps(measure(), indent=None if options.json else 1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""The figures as one table, each beside its goal: what `make bench` prints and docs/performance.md says."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One figure. ``goal`` is empty where there is none; ``is_met`` then says nothing."""
+
+    section: str
+    what: str
+    figure: str
+    goal: str = ""
+    is_met: bool = True
+
+    @property
+    def verdict(self) -> str:
+        """The goal and whether it is met."""
+        return f"{self.goal}: {'met' if self.is_met else 'missed'}" if self.goal else ""
+
+
+def lines_of(found: Mapping[str, Any]) -> list[Line]:
+    """Every line that the figures of a run allow; a part that was left out has none."""
+    parts = {
+        "decode": _decode, "formats": _formats, "day": _day, "live": _live, "service": _service, "web": _web,
+        "weigh": _weigh, "start": _start, "simulator": _simulator,
+    }  # fmt: skip
+    return [line for name, part in parts.items() if name in found for line in part(found[name])]
+
+
+def _below(section: str, what: str, figure: float, unit: str, most: float, digits: int = 1) -> Line:
+    return Line(section, what, f"{figure:,.{digits}f} {unit}", f"at most {most:g} {unit}", figure <= most)
+
+
+def _decode(found: Mapping[str, Any]) -> Iterator[Line]:
+    section = "candump text to arrays"
+    ours = found["rows"]["springscale"]
+    for name, row in sorted(found["rows"].items(), key=lambda each: each[1].get("ns_per_frame", float("inf"))):
+        if "skipped" in row:
+            yield Line(section, name, f"left out: {row['skipped']}")
+            continue
+        times = row["ns_per_frame"] / ours["ns_per_frame"]
+        beside = "" if row is ours else f", {times:.2g} x ours" if times < 10 else f", {times:.0f} x ours"
+        yield Line(section, name, f"{row['ns_per_frame']:,.0f} ns a frame{beside}")
+    times = found["times_python_can"]
+    yield Line(section, "faster than python-can + cantools", f"{times:.0f} x", "at least 120 x", times >= 120)
+    yield _below(section, "times wc -l", found["times_wc"], "x", 5)
+    yield _below(section, "memory", ours["peak_mb"], "MB", 150, 0)
+
+
+def _formats(found: Mapping[str, Any]) -> Iterator[Line]:
+    for suffix, row in found["rows"].items():
+        if "skipped" in row:
+            yield Line("every format", suffix, f"left out: {row['skipped']}")
+            continue
+        ours, peer = row["springscale"], row["python-can"]
+        told = f"{ours['ns_per_frame']:,.0f} ns a frame, {ours['peak_mb']:.0f} MB"
+        if "skipped" in peer:
+            yield Line("every format", suffix, f"{told}; {peer['skipped']}")
+            continue
+        times = peer["ns_per_frame"] / ours["ns_per_frame"]
+        goal = "at least 10 x" if suffix in {".blf", ".mf4"} else ""
+        yield Line("every format", suffix, f"{told}, {times:.2g} x python-can's reader", goal, times >= 10)
+
+
+def _day(found: Mapping[str, Any]) -> Iterator[Line]:
+    section = f"a busy day: {found['hours']:g} h, {found['frames'] / 1e6:,.0f} million frames"
+    runs = found["estimators"]
+    for name, run in runs.items():
+        cpu_s, peak_mb, hour_mb = run["day"]["cpu_s"], run["day"]["peak_mb"], run["hour"]["peak_mb"]
+        rate = found["frames"] / cpu_s / 1e6
+        told = f"{cpu_s:.1f} s, {rate:.1f} million frames/s, {cpu_s / found['wc_s']:.1f} times wc -l"
+        yield Line(section, name, told)
+        yield Line(
+            section,
+            f"{name}, memory",
+            f"{peak_mb:.0f} MB, of one hour {hour_mb:.0f} MB",
+            "flat",
+            peak_mb < 1.1 * hour_mb,
+        )
+    if found["hours"] == 8.0:
+        yield _below(section, "both estimators", sum(run["day"]["cpu_s"] for run in runs.values()), "s", 15)
+
+
+def _live(found: Mapping[str, Any]) -> Iterator[Line]:
+    section = "receiving and decoding a live bus"
+    for bus, paths in found.items():
+        ours, peer = paths["springscale"], paths["python-can + cantools"]
+        told = f"{ours['cpu_pct']:.2f} % of a core; python-can + cantools {peer['cpu_pct']:.1f} %"
+        yield Line(section, bus, told)
+    fastest = found["8000 frames/s"]["springscale"]
+    yield _below(section, "lost at 8000 frames/s", fastest["sent"] - fastest["frames"], "frames", 0, 0)
+
+
+def _service(found: Mapping[str, Any]) -> Iterator[Line]:
+    section = "the whole service, with roll"
+    yield _below(section, "a filtered bus of 2500 frames/s", found["cpu_pct"], "% of a core", 3, 2)
+    yield _below(section, "memory", found["peak_mb"], "MB", 150, 0)
+    yield _below(section, "frames lost", found["lost"], "frames", 0, 0)
+
+
+def _web(found: Mapping[str, Any]) -> Iterator[Line]:
+    section = "HTTP: the latest estimate, bus live, eight streams open"
+    rate = found["requests_per_s"]
+    yield Line(section, "one core of server", f"{rate:,.0f} requests/s", "at least 5000 requests/s", rate >= 5000)
+    yield _below(section, "p99", found["p99_ms"], "ms", 20)
+
+
+def _weigh(found: Mapping[str, Any]) -> Iterator[Line]:
+    section = "weighing"
+    for name, seconds in found["batch_s"].items():
+        yield _below(section, f"a batch of 5 minutes, {name}", 1e3 * seconds, "ms", 150, 0)
+    yield _below(section, "calibration on ten drives of 15 minutes", found["calibration"]["cpu_s"], "s", 60, 0)
+
+
+def _start(found: Mapping[str, Any]) -> Iterator[Line]:
+    section = "start and install"
+    for module, seconds in found["imports_s"].items():
+        yield _below(section, f"import {module}", seconds, "s", 0.6, 2)
+    yield _below(section, "READY", found["ready_s"], "s by the clock", 2, 2)
+    largest = ", ".join(f"{name} {size:.0f}" for name, size in found["largest_mb"].items())
+    size = found["install_mb"]
+    yield Line(section, "a vehicle's install", f"{size:.0f} MB ({largest})", "at most 250 MB", size <= 250)
+
+
+def _simulator(found: Mapping[str, Any]) -> Iterator[Line]:
+    for stage, rate in found.items():
+        yield Line("simulator", stage, f"{rate:,.0f} x real time")

@@ -1,0 +1,57 @@
+"""The table of speeds: what is beside what, and which goals are met. No speed is asserted anywhere."""
+
+import json
+
+import pytest
+
+from benchmarks.speed import meter, peers
+from benchmarks.speed.table import lines_of
+
+DECODE = {
+    "minutes": 1.0,
+    "rows": {
+        "springscale": {"ns_per_frame": 40.0, "peak_mb": 62.0},
+        "wc -l": {"ns_per_frame": 7.0, "peak_mb": 5.0},
+        "hilspy, by DBC": {"skipped": "hilspy is not installed"},
+        "python-can + cantools": {"ns_per_frame": 5000.0, "peak_mb": 60.0},
+    },
+    "times_python_can": 125.0,
+    "times_wc": 5.7,
+}
+
+
+def test_a_goal_is_met_or_missed():
+    verdicts = {line.what: line.verdict for line in lines_of({"decode": DECODE})}
+    assert verdicts["faster than python-can + cantools"] == "at least 120 x: met"
+    assert verdicts["times wc -l"] == "at most 5 x: missed"
+    assert verdicts["wc -l"] == ""
+
+
+def test_who_is_not_installed_is_left_out_with_a_word():
+    figures = {line.what: line.figure for line in lines_of({"decode": DECODE})}
+    assert figures["hilspy, by DBC"] == "left out: hilspy is not installed"
+    assert figures["python-can + cantools"] == "5,000 ns a frame, 125 x ours"
+    assert figures["wc -l"] == "7 ns a frame, 0.17 x ours"
+
+
+def test_parts_that_were_not_run_have_no_lines():
+    assert lines_of({}) == []
+    assert {line.section for line in lines_of({"simulator": {"stage": 3.0}})} == {"simulator"}
+
+
+def test_a_run_without_its_library_says_which(capsys):
+    def run():
+        raise ModuleNotFoundError("No module named 'hilspy'", name="hilspy")
+
+    meter.print_run(run)
+    assert json.loads(capsys.readouterr().out) == {"skipped": "hilspy is not installed"}
+
+
+@pytest.mark.parametrize("name", ["wc -l", "for line in file", "python-can + cantools"])
+def test_every_path_finds_the_same_frames(name, tmp_path):
+    ours = "(1627274455.{:06d}) can0 120#0011223344556601\n"
+    other = "(1627274455.{:06d}) can0 18FEF100#0011223344556677\n"
+    (tmp_path / "a.log").write_text("".join(ours.format(i) + other.format(i) for i in range(50)))
+    found = peers.PEERS[name](tmp_path / "a.log")
+    assert found["frames"] == 100
+    assert found.get("samples", 50) == 50
