@@ -3,10 +3,11 @@
 from pathlib import Path
 from typing import Final
 
-from generated import keep_up_to_date
+from generated import keep_up_to_date, key_table
 from make_estimate import DIAGNOSTICS
 
 from gateway.archive.dataset import OVER_LIMIT, PROVENANCE, SCHEMA_VERSION, columns
+from gateway.archive.manifest import ManifestFile, VehicleEntry
 from gateway.estimate_json import FIELDS
 
 PAGE: Final = Path(__file__).with_name("archive.md")
@@ -25,9 +26,119 @@ INTRODUCTION: Final = """\
 
 Generated from `gateway/archive` by `python docs/make_archive.py`; do not edit by hand.
 
-Whenever a method, a calibration or a limit has changed, the logs of a whole fleet are read anew, into one data set of
-Parquet files that DuckDB, polars and pandas read. Reading and writing it wants
-`pip install 'springscale[archive]'` (pyarrow and obstore), which no vehicle needs.
+Whenever a method, a calibration or a limit has changed, the logs of a whole fleet are weighed anew, into one data set
+of Parquet files that DuckDB, polars and pandas read:
+
+    springscale reprocess ARCHIVE --output DATASET --dry-run    # how much there is, and how long it will take
+    springscale reprocess ARCHIVE --output DATASET
+
+ARCHIVE is a manifest, or a folder with an `archive.toml` or `archive.parquet` in it. Both may lie on this computer or
+in an object store. This wants `pip install 'springscale[archive]'` (pyarrow and obstore), which no vehicle needs.
+"""
+
+MANIFEST: Final = """\
+## The manifest
+
+It tells whose logs lie where, and what they are weighed by. Paths are relative to it; so are the databases of a signal
+map to that.
+
+```toml
+signals = "signals.toml"                # or springscale:NAME; for every vehicle that names no other
+logs = "s3://fleet-logs/2026"           # the vehicles' folders are below; without it, beside the manifest
+batch.window_s = 300.0                  # any key of [batch] in the settings
+
+[[vehicles]]
+id = "van-17"                           # its logs are in s3://fleet-logs/2026/van-17, and below
+vin = "WF0XXXTTGXJK12345"
+calibration = "van-17/vehicle.json"
+tare = "van-17/tare.json"               # as its gateway keeps it
+until = 2026-06-12                      # the day on which its springs were changed
+
+[[vehicles]]
+id = "van-17"
+vin = "WF0XXXTTGXJK12345"
+calibration = "van-17/after_repair.json"
+since = 2026-06-12
+
+[[vehicles]]
+vin = "WF0XXXTTGXJK12346"               # without an id the VIN is its name, and its folder's
+calibration = "van-18/vehicle.json"
+estimator = "ratio_index"
+```
+
+Instead of `[[vehicles]]`, `vehicles_in = "fleet.parquet"` names a Parquet file with one row for each, its columns named
+as the keys; and a manifest may be such a file alone. An unknown key, a vehicle or folder that is given twice for one
+instant, or a file that cannot be loaded is an error that says where.
+
+{top}
+`[batch]` is that of the [settings](settings.md).
+
+### [[vehicles]]
+
+{vehicles}
+"""
+
+RUNNING: Final = """\
+## A run
+
+First every log that is new is looked into: its hash, and the instant of its first frame. Then its jobs are done, one
+function from a job to a receipt, on all cores of this computer, each process with one thread. The terminal shows how
+much is done, the rate, and the time that is left. What comes back from a job is a small summary; logs are read as
+streams, and one in an object store is copied to the worker's disk, in chunks, for as long as it is read.
+
+- **Stop it, and run it again**: what has a receipt is not done again. A second run over the same logs writes nothing.
+- **A log that cannot be read** is told under `failed/` with the reason, and the rest goes on without it. The command
+  ends with 1, once; nothing else can be made of the same bytes.
+- **A worker that is killed** costs the job it was doing, which another one does. A job over which workers die three
+  times is told under `failed/`; `--retry-failed` tries such jobs again.
+- **A store that does not answer** leaves its jobs undone, and the command ends with 1: run it again. A vehicle of which
+  one log is out of reach is not weighed without it.
+- **New logs, another calibration, another version** change the hash of the jobs that they concern. These are done, and
+  when all of a vehicle's month are, the receipts of the old ones are taken back. Tables stay.
+
+Exit codes are 0 when everything is done, 1 when something failed or was left undone, 2 for a mistake in the manifest or
+the options. `--json` prints one object for machines.
+
+### Where archive and data set may lie
+
+| place | written as | credentials |
+|---|---|---|
+| this computer | a path, or `file:///...` | |
+| Amazon S3 | `s3://BUCKET/FOLDER` | `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, or a role there |
+| Google Cloud Storage | `gs://BUCKET/FOLDER` | `GOOGLE_APPLICATION_CREDENTIALS` |
+| Azure Blob Storage | `az://CONTAINER/FOLDER` | `AZURE_STORAGE_ACCOUNT_NAME`, `AZURE_STORAGE_ACCOUNT_KEY` |
+
+They are read from the environment of every process, workers' included. `AWS_ENDPOINT_URL` names another server that
+speaks S3's protocol, and `AWS_ALLOW_HTTP=true` lets it do so without TLS. A store must refuse a conditional write where
+something is; these do. Tests run against folders and against S3's protocol; Google and Azure go through the same
+library and were not tried.
+
+### On many computers
+
+    pip install 'springscale[cluster]'                                   # everywhere, the same version
+    dask scheduler                                                       # on one of them
+    dask worker tcp://SCHEDULER:8786 --nthreads 1 --nworkers auto        # on each
+    springscale reprocess s3://fleet/archive --output s3://fleet/estimates --scheduler tcp://SCHEDULER:8786
+
+Archive and data set must be places that every worker reaches; signal maps, calibrations and tares travel with the jobs.
+A worker with another version of the code refuses its job, and the run ends saying so.
+
+## What a job is
+
+The drives of one vehicle in one month (of a log's first frame, UTC), in order of their frames, by one calibration.
+
+- **A log that goes on where the one before it ended** (within `silence_s` of its last mapped frame) goes on: batch,
+  drive and load epoch are those of the whole recording, as live, over midnight and the ends of months. The numbers are
+  those of `springscale estimate` on the two logs joined.
+- **Any other log begins anew**, as a gateway does that starts with the ignition: the numbers are those of
+  `springscale estimate` on that log, bit for bit.
+- **At the beginning of a month** a job finds its state by reading the vehicle's logs of the 25 hours before, if the
+  last of them is still under way; a drive that began earlier is taken to begin there. The batch that crosses the border
+  is in the month of the log in which it ended.
+- **A tare counts while it was in use**: from the batch after the instant `at` to the instant at which it ended, by the
+  history in `tare.json`. (`springscale estimate --tare` applies the one that is in use now.)
+- **A change of calibration** (`since`, `until`) parts a month into jobs, by the first frames of logs; nothing goes on
+  from one calibration to the other.
 """
 
 DATASET: Final = """\
@@ -88,7 +199,8 @@ batch, so no column claims to: what they have changed shows as `tension` and in 
 def archive_page() -> str:
     """The whole page as Markdown."""
     rows = "\n".join(f"| `{name}` | {TYPES[kind]} | {_meaning(name)} |" for name, kind in columns().items())
-    return "\n".join([INTRODUCTION, DATASET, SCHEMA.format(version=SCHEMA_VERSION, rows=rows)])
+    manifest = MANIFEST.format(top=key_table(ManifestFile, "vehicles", "batch"), vehicles=key_table(VehicleEntry))
+    return "\n".join([INTRODUCTION, manifest, RUNNING, DATASET, SCHEMA.format(version=SCHEMA_VERSION, rows=rows)])
 
 
 def _meaning(column: str) -> str:

@@ -2,17 +2,19 @@
 
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.archive.drives import Drives
 from gateway.archive.jobs import Job, plan
-from gateway.archive.manifest import Manifest
+from gateway.archive.manifest import Assignment, Manifest
 from gateway.archive.places import Place, PlaceError
 from gateway.archive.receipts import Slot, receipts, slots_done, slots_failed
 from gateway.archive.survey import Facts, LogFile, keep_facts, known_facts, logs_of, survey
 from gateway.errors import ConfigurationError, SpringscaleError
 
+AT_A_TIME: Final = 16  # requests to a store
 RECEIPTS_ASKED: Final = 20  # for how fast it went before
 WORTH_TIMING: Final = 1_000_000  # bytes of a log
 
@@ -67,24 +69,27 @@ class Inventory:
 
 
 def look(manifest: Manifest, dataset: Place) -> Inventory:
-    """List every vehicle's logs. Raises ConfigurationError where there is not one."""
-    lost: dict[str, str] = {}
-    logs: list[list[LogFile]] = []
-    for assignment in manifest.assignments:
-        try:
-            logs.append(logs_of(manifest, assignment))
-        except PlaceError as fault:
-            lost[str(assignment.logs)] = str(fault)
-            logs.append([])
-    vehicles = {assignment.vehicle for assignment in manifest.assignments}
-    facts = {vehicle: known_facts(dataset, vehicle) for vehicle in sorted(vehicles)}
+    """List every vehicle's logs. Raises ConfigurationError where there is not one, PlaceError for the data set."""
+    vehicles = sorted({assignment.vehicle for assignment in manifest.assignments})
+    with ThreadPoolExecutor(AT_A_TIME) as asking:  # a store takes its time for each, and many at once
+        listed = list(asking.map(lambda assignment: _listed(manifest, assignment), manifest.assignments))
+        facts = dict(zip(vehicles, asking.map(lambda vehicle: known_facts(dataset, vehicle), vehicles), strict=True))
+    logs = [found if isinstance(found, list) else [] for found in listed]
+    pairs = zip(manifest.assignments, listed, strict=True)
+    lost = {str(assignment.logs): str(found) for assignment, found in pairs if isinstance(found, PlaceError)}
     if not any(logs) and not lost:
-        folder = manifest.assignments[0].logs if manifest.assignments else "no vehicle"
         raise ConfigurationError(
-            f"{manifest.where}: not one log in the folders of its vehicles, the first of which is {folder}; "
-            "see logs and pattern there"
+            f"{manifest.where}: not one log in the folders of its vehicles, the first of which is "
+            f"{manifest.assignments[0].logs}; see logs and pattern there"
         )
     return Inventory(manifest, dataset, logs, facts, lost)
+
+
+def _listed(manifest: Manifest, assignment: Assignment) -> list[LogFile] | PlaceError:
+    try:
+        return logs_of(manifest, assignment)
+    except PlaceError as fault:
+        return fault
 
 
 @dataclass(frozen=True, slots=True)

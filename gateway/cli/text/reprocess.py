@@ -6,6 +6,7 @@ from gateway.archive.inventory import Forecast
 from gateway.archive.reprocess import Summary
 from gateway.archive.run import Status
 from gateway.archive.turns import Progress
+from gateway.words import counted
 
 MOST_TOLD: Final = 10  # failures, one line each; the data set has them all
 
@@ -21,17 +22,19 @@ def how_far(progress: Progress) -> str:
 def forecast_in_words(ahead: Forecast) -> str:
     """What a run would do."""
     lines = [
-        f"{ahead.n_vehicles} vehicles, {ahead.n_logs} logs, {size(ahead.size)}",
-        f"{ahead.n_jobs} jobs: {ahead.n_done} done, {ahead.n_failed} failed before, "
+        f"{counted(ahead.n_vehicles, 'vehicle')}, {counted(ahead.n_logs, 'log')}, {size(ahead.size)}",
+        f"{counted(ahead.n_jobs, 'job')}: {ahead.n_done} done, {ahead.n_failed} failed before, "
         f"{ahead.n_jobs - ahead.n_done - ahead.n_failed} to do",
     ]
     if ahead.n_new_logs:
-        lines.append(f"{ahead.n_new_logs} logs were never looked into; which jobs they make is known after that")
+        new = counted(ahead.n_new_logs, "log")
+        lines.append(f"never looked into: {new}; which jobs they make is known after that")
     lines.append(f"to read: {size(ahead.size_to_do)}")
     if ahead.rate is not None and ahead.remaining_s is not None and ahead.size_to_do:
         source = "as earlier jobs went" if ahead.is_timed_before else "as one log went just now"
         lines.append(
-            f"about {duration(ahead.remaining_s)} on {ahead.n_workers} workers, at {size(ahead.rate)}/s each ({source})"
+            f"about {duration(ahead.remaining_s)} on {counted(ahead.n_workers, 'worker')}, "
+            f"each reading {size(ahead.rate)}/s ({source})"
         )
     return "\n".join(lines)
 
@@ -42,21 +45,21 @@ def summary_in_words(summary: Summary, output: str) -> str:
     weighed = sum(outcome.n_weighed for outcome in summary.outcomes)
     counts = summary.counts
     lines = [
-        f"{summary.n_vehicles} vehicles, {summary.n_logs} logs, {size(summary.size)}: {summary.n_jobs} jobs",
-        f"{counts['done']} done now with {batches} batches, {weighed} of them weighed; "
-        f"{counts['already']} were done before",
+        f"{counted(summary.n_vehicles, 'vehicle')}, {counted(summary.n_logs, 'log')}, {size(summary.size)}: "
+        f"{counted(summary.n_jobs, 'job')}",
+        f"done now: {counts['done']}, {batches} batches, of which {weighed} weighed; done before: {counts['already']}",
         f"took {duration(summary.took_s)}; the data set is in {output}",
     ]
     if counts["failed_before"]:
-        lines.append(f"{counts['failed_before']} jobs failed in an earlier run: --retry-failed tries them again")
+        lines.append(f"failed in an earlier run: {counts['failed_before']}; --retry-failed tries them again")
     failures = [
         reason for outcome in summary.outcomes for reason in outcome.failures if outcome.status is not Status.LOST
     ]
     if failures:
-        lines.append(f"{counts['failed']} jobs failed, {summary.n_failed_logs} logs could not be read:")
+        lines.append(f"failed: {counted(counts['failed'], 'job')}, {counted(summary.n_failed_logs, 'log')}:")
         lines += _some(failures)
     if summary.lost:
-        lines.append(f"{len(summary.lost)} were not done; run again to try them:")
+        lines.append(f"not done: {len(summary.lost)}; run again to try them:")
         lines += _some([f"{what}: {why}" for what, why in summary.lost.items()])
     return "\n".join(lines)
 

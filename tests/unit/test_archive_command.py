@@ -1,0 +1,95 @@
+"""springscale reprocess: what it prints, and how it ends."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from support.archive import MIDNIGHT_NS, write_drive, write_manifest
+
+from gateway.archive.receipts import Slot
+from gateway.archive.reprocess import Summary
+from gateway.archive.run import Outcome, Status
+from gateway.archive.turns import Progress
+from gateway.cli import main, springscale
+from gateway.cli.text.reprocess import duration, how_far, size, summary_in_words
+
+SLOT = Slot("van-1", "2026-11", "abc")
+
+
+@pytest.fixture(name="archive")
+def _archive(tmp_path: Path) -> Path:
+    write_drive(tmp_path / "van-1" / "1.log", MIDNIGHT_NS, 21.0)
+    write_manifest(tmp_path, "van-1")
+    return tmp_path
+
+
+def called(archive: Path, *options: str) -> Result:
+    command = ["reprocess", str(archive), "--output", str(archive / "dataset"), "--workers", "1", *options]
+    return CliRunner().invoke(springscale, command)
+
+
+def test_it_tells_what_there_is_what_was_done_and_that_nothing_is_left(archive: Path) -> None:
+    ahead = called(archive, "--dry-run")
+    assert ahead.exit_code == 0, ahead.output
+    first_line, *_ = ahead.stdout.splitlines()
+    assert first_line.startswith("1 vehicle, 1 log, ")
+    assert "never looked into: 1 log;" in ahead.stdout
+    assert "on 1 worker, each reading" in ahead.stdout
+    assert not (archive / "dataset").exists()
+    first, second = called(archive), called(archive, "--json")
+    assert first.exit_code == second.exit_code == 0, first.output
+    assert "done now: 1, 2 batches, of which 1 weighed; done before: 0" in first.stdout
+    assert json.loads(second.stdout)["jobs"] == {"done": 0, "already": 1, "failed": 0, "failed_before": 0, "lost": 0}
+    later = json.loads(called(archive, "--dry-run", "--json").stdout)
+    assert (later["n_jobs"], later["n_done"], later["bytes_to_do"], later["remaining_s"]) == (1, 1, 0, 0.0)
+
+
+def test_what_failed_ends_it_with_1_and_its_reason(archive: Path) -> None:
+    (archive / "van-1" / "2.log").write_bytes(b"nothing\n")
+    result = called(archive)
+    assert result.exit_code == 1
+    assert "failed: 0 jobs, 1 log:\n  van-1/2.log: holds no CAN frame" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["/nowhere", "--output", "/tmp/x"], "springscale: /nowhere: has neither archive.toml nor archive.parquet"),
+        (["/nowhere/a.toml", "--output", "/tmp/x"], "springscale: /nowhere/a.toml: no such file"),
+        (["/nowhere", "--output", "ftp://x"], "ftp:// is not read here; there are file, s3, gs, az, and paths"),
+        (["/nowhere", "--output", "/tmp/x", "--workers", "1", "--scheduler", "tcp://x:1"], "not both"),
+        (["/nowhere"], "Missing option '--output'"),
+    ],
+)
+def test_a_mistake_ends_it_with_2_and_one_clear_line(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["reprocess", *arguments])
+    assert left.value.code == 2
+    assert told in capsys.readouterr().err
+
+
+def test_how_far_it_is_with_rate_and_remaining_time() -> None:
+    assert how_far(Progress("weighing", 0, 10, 0, 3, 0.0)) == "weighing: 0 of 3 jobs, 0 B of 10 B, 0 B/s"
+    told = how_far(Progress("weighing", 1_200_000_000, 34_000_000_000, 12, 340, 23.0))
+    assert told == "weighing: 12 of 340 jobs, 1.2 GB of 34.0 GB, 52.2 MB/s, 10 min left"
+
+
+def test_sizes_and_durations_are_in_units_that_suit() -> None:
+    assert [size(n) for n in (999, 1000, 2.5e6, 3e9, 4e15)] == ["999 B", "1.0 kB", "2.5 MB", "3.0 GB", "4000.0 TB"]
+    assert [duration(s) for s in (1, 99, 600, 7200, 200_000)] == ["1 s", "99 s", "10 min", "2.0 h", "2.3 days"]
+
+
+def test_the_summary_names_a_few_of_many_and_says_what_to_do_next() -> None:
+    summary = Summary(n_vehicles=2, n_logs=30, size=100, n_jobs=3, n_already=0, n_failed_before=1)
+    summary.outcomes = [
+        Outcome(SLOT, Status.FAILED, failures=tuple(f"log {n}" for n in range(14)), n_failed_logs=14),
+        Outcome(SLOT, Status.LOST, failures=("timed out",)),
+    ]
+    summary.lost = {"vehicle=van-1/month=2026-11/abc": "timed out"}
+    told = summary_in_words(summary, "DATASET")
+    assert "  log 9\n  and 4 more\n" in told
+    assert "failed in an earlier run: 1; --retry-failed tries them again" in told
+    assert told.endswith("not done: 1; run again to try them:\n  vehicle=van-1/month=2026-11/abc: timed out")
