@@ -1,10 +1,12 @@
-"""The third gyro axis on recorded drives: calibrated with a roll rate, what is promised of loads that lie sideways.
+"""The third gyro axis on recorded drives: calibrated with a roll rate, what is promised of loads that lie sideways, and
+of sister vehicles that inherit this calibration.
 
 The bounds are promises to users, not fits: they may only ever be tightened.
 """
 
 import json
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import pytest
@@ -79,3 +81,27 @@ def test_a_lost_roll_rate_leaves_true_intervals(
     assert found["n_rejected"] <= most_refused
     assert found["payload"]["coverage95"] >= 0.9
     assert found["front_share"]["coverage95"] >= 0.9
+
+
+@pytest.mark.parametrize(
+    ("arguments", "payload_pct", "front_share_pct"), [(["--runs", "1"], 3.5, 1.5), ([], 3.0, 1.4)], ids=["one", "two"]
+)
+def test_empty_drives_calibrate_a_sister(
+    calibration: Path, tmp_path: Path, arguments: list[str], payload_pct: float, front_share_pct: float
+) -> None:
+    """On mixed drives with other loads, where priors of any vehicle refuse every batch at another speed."""
+    judged = [_sister(calibration, tmp_path / "van.json", name, arguments) for name in ("van_1", "van_2")]
+    assert [one["n_batches"] for one in judged] == [18, 18]
+    assert [one["n_rejected"] for one in judged] == [0, 0]
+    assert fmean(one["payload"]["mean_abs_pct"] for one in judged) <= payload_pct
+    assert fmean(one["front_share"]["mean_abs_pct"] for one in judged) <= front_share_pct
+    assert min(one[quantity]["coverage95"] for one in judged for quantity in ("payload", "front_share")) >= 0.93
+
+
+def _sister(calibration: Path, output: Path, name: str, arguments: list[str]) -> dict[str, Any]:
+    drives = recordings() / "siblings" / name
+    like = ("--like", calibration, "--output", output, "--json", *CROSS)
+    run("calibrate", drives / "empty" / "campaign_roll.toml", *like, *arguments)
+    judged = run("evaluate", drives / "test" / "campaign_roll.toml", "--calibration", output, "--json", *CROSS)
+    found: dict[str, Any] = json.loads(judged)
+    return found

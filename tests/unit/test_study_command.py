@@ -4,12 +4,15 @@ import json
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from benchmarks.accuracy import __main__ as command
 from benchmarks.accuracy.advice import AdviceStudy, Choice, compared
 from benchmarks.accuracy.coverage_table import JudgedBatch, coverage_table
+from benchmarks.accuracy.siblings.drives import draw_line, drawn_van
+from benchmarks.accuracy.siblings.study import Way
 from gateway.calibration.judgement import LearningCurve
 from gateway.calibration.judgement.learning_curve import Score, Trial
 
@@ -93,3 +96,29 @@ def test_coverage_says_whether_it_falls_short(
     assert "| 201 | 201 | 1: 1 gap |" in page
     assert "- b: ratio_index: too few" in page
     assert (tmp_path / "out/coverage.md").read_text(encoding="utf-8") == page
+
+
+def test_siblings_are_told_way_by_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    batches = [
+        JudgedBatch(f"van {i % 3}", f"van {i % 3} {i}", "mixed", way, (), 2.0, 1.0, i > 0, True)
+        for way in Way
+        for i in range(20)
+    ]
+    refused = JudgedBatch("van 0", "van 0 20", "mixed", Way.ALONE, ("gap",), 9.0, 9.0, False, False)
+    monkeypatch.setattr("benchmarks.accuracy.siblings.study.of_each_van", lambda *_: [batches, [refused]])
+    page = run("siblings", "--vans", "4", "--output", str(tmp_path / "out"))
+    assert "3 simulated vans of 2 lines" in page
+    assert f"| {Way.ALONE} | 21 | 1: 1 gap | 2.00 | 2.33 | 95 % (" in page
+    assert (tmp_path / "out/siblings.md").read_text(encoding="utf-8") == page
+
+
+def test_a_line_and_its_siblings_are_drawn_alike_again() -> None:
+    """Other numbers of siblings, or another order of work, change none of them; each differs from the others."""
+    drawn = [draw_line(0, np.random.default_rng(1)) for _ in range(2)]
+    assert drawn[0] == drawn[1]
+    vans = [drawn_van(drawn[0], f"van {i}", seeds).van for i, seeds in enumerate(np.random.SeedSequence(2).spawn(3))]
+    again = drawn_van(drawn[1], "van 1", np.random.SeedSequence(2).spawn(3)[1]).van
+    assert again == vans[1]
+    rates = [van.front.spring.rate_npm / drawn[0].van.front.spring.rate_npm for van in vans]
+    assert len({*rates}) == 3
+    assert all(0.85 < rate < 1.15 for rate in rates)

@@ -57,25 +57,19 @@ def draw_line(number: int, rng: np.random.Generator) -> Line:
     return Line(draw_van(number, rng), replace(REFERENCE, mount=mount))
 
 
-def sister(line: Line, name: str, seeds: np.random.SeedSequence) -> Driven:
-    """A van of the line, driven with known loads."""
-    van, sensors, vehicle, rng, road_seeds = _drawn(line, name, seeds)
-    loads = known_loads(van, SCOPE.n_known_loads, rng)
-    return Driven(vehicle, _runs(van, sensors, [(AS_CALIBRATED, load) for load in loads], road_seeds))
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A van of a line with its sensors, what its fitter states of them, and what to draw its loads and roads with."""
+
+    van: Vehicle
+    sensors: Sensors
+    vehicle: StatedVehicle
+    rng: np.random.Generator
+    road_seeds: np.random.SeedSequence
 
 
-def sibling(line: Line, name: str, seeds: np.random.SeedSequence) -> Driven:
-    """A van of the line, driven empty twice, steadily and mixed, and then with loads that nobody told."""
-    van, sensors, vehicle, rng, road_seeds = _drawn(line, name, seeds)
-    empty_seeds, test_seeds = road_seeds.spawn(2)
-    empty = _runs(van, sensors, [(AS_CALIBRATED, ()), (MIXED, ())], empty_seeds)
-    tests = _runs(van, sensors, [(trip, unseen_load(van, rng)) for trip in TESTED], test_seeds, first=len(empty) + 1)
-    return Driven(vehicle, empty, tuple(zip(TESTED, tests, strict=True)))
-
-
-def _drawn(
-    line: Line, name: str, seeds: np.random.SeedSequence
-) -> tuple[Vehicle, Sensors, StatedVehicle, np.random.Generator, np.random.SeedSequence]:
+def drawn_van(line: Line, name: str, seeds: np.random.SeedSequence) -> Drawn:
+    """Scattered about the line; its unit mounted about where the fitter says that it is."""
     van_seed, load_seed, road_seeds = seeds.spawn(3)
     rng = np.random.default_rng(van_seed)
     van = replace(scattered(line.van, OF_A_LINE, rng), name=name)
@@ -90,24 +84,35 @@ def _drawn(
         pitch_deg=usual.pitch_deg + pitch_deg,
         yaw_deg=usual.yaw_deg + yaw_deg,
     )
-    return (
-        van,
-        replace(line.sensors, mount=mount),
-        stated(van, line.sensors),
-        np.random.default_rng(load_seed),
-        road_seeds,
-    )
+    sensors = replace(line.sensors, mount=mount)
+    return Drawn(van, sensors, stated(van, line.sensors), np.random.default_rng(load_seed), road_seeds)
+
+
+def sister(line: Line, name: str, seeds: np.random.SeedSequence) -> Driven:
+    """A van of the line, driven with known loads."""
+    drawn = drawn_van(line, name, seeds)
+    loads = known_loads(drawn.van, SCOPE.n_known_loads, drawn.rng)
+    return Driven(drawn.vehicle, _runs(drawn, [(AS_CALIBRATED, load) for load in loads], drawn.road_seeds))
+
+
+def sibling(line: Line, name: str, seeds: np.random.SeedSequence) -> Driven:
+    """A van of the line, driven empty twice, steadily and mixed, and then with loads that nobody told."""
+    drawn = drawn_van(line, name, seeds)
+    empty_seeds, test_seeds = drawn.road_seeds.spawn(2)
+    empty = _runs(drawn, [(AS_CALIBRATED, ()), (MIXED, ())], empty_seeds)
+    asked = [(trip, unseen_load(drawn.van, drawn.rng)) for trip in TESTED]
+    tests = _runs(drawn, asked, test_seeds, first=len(empty) + 1)
+    return Driven(drawn.vehicle, empty, tuple(zip(TESTED, tests, strict=True)))
 
 
 def _runs(
-    van: Vehicle,
-    sensors: Sensors,
+    drawn: Drawn,
     asked: list[tuple[Trip, tuple[Load, ...]]],
     seeds: np.random.SeedSequence,
     first: int = 1,
 ) -> tuple[KnownRun, ...]:
     spawned = seeds.spawn(len(asked))
     return tuple(
-        driven(van, load, trip, SCOPE, one, number, sensors)
+        driven(drawn.van, load, trip, SCOPE, one, number, drawn.sensors)
         for number, ((trip, load), one) in enumerate(zip(asked, spawned, strict=True), first)
     )
