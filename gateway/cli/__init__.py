@@ -18,6 +18,7 @@ _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",
     "calibration": "Show, compare and check calibration files; re-zero a running service.",
     "check-config": "Check a configuration, without opening the bus.",
+    "commission": "Calibrate a running service's vehicle from its axle weights and an empty drive.",
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",
     "estimate": "Weigh from log files, one line per batch.",
     "evaluate": "Compare estimates with known loads: the error table.",
@@ -33,7 +34,7 @@ _COMMANDS = {
     "token": "Make, list and revoke access tokens for other machines.",
     "verification": "Known loads held against what a running service weighed, as dated records.",
 }  # each in the module of its name, or a room of ours
-_ROOMS = {"fleet-report": "fleet", "line": "fleet", "record": "asked", "verification": "asked"}
+_ROOMS = {"fleet-report": "fleet", "line": "fleet", "record": "asked", "verification": "asked", "commission": "asked"}
 
 
 # What a vehicle does without: the extra "workbench", in Debian a package of its own.

@@ -1,0 +1,71 @@
+"""A commissioning in sentences."""
+
+from typing import Any, Final
+
+STEPS: Final = {
+    "line": "choose the line that this vehicle is of",
+    "vehicle": "state its axle weights, wheelbase, and where the sensor sits",
+    "empty": "say that it is empty, and drive",
+    "drive": "drive, empty, on any ordinary road above 20 km/h",
+    "fit": "the calibration is being made",
+}
+
+
+def state_text(state: dict[str, Any]) -> str:
+    """All of it: what is under way, what is in use, what was made before."""
+    lines = [f"in use: {_made_text(state['active']) if state['active'] else 'the calibration of the settings, if any'}"]
+    if state["is_pending"]:
+        lines.append("another calibration counts from the next drive on")
+    if state["underway"] is not None:
+        lines.append(underway_text(state["underway"]))
+    elif state["why_not"]:
+        lines.append(f"none can be made here: {state['why_not']}")
+    else:
+        lines.append("nothing is under way: `springscale commission start` begins")
+    lines += [f"  {_made_text(made)}{_end_text(made['ended'])}" for made in state["history"]]
+    return "\n".join(lines)
+
+
+def underway_text(underway: dict[str, Any]) -> str:
+    """What is wanted next, what inspection shows, how much is known."""
+    lines = [f"next: {STEPS[underway['step']]}"]
+    if underway["n_batches"] or underway["driven_s"]:
+        lines.append(progress_text(underway))
+    if underway["fault"]:
+        lines.append(f"no calibration yet: {underway['fault']}")
+    inspection = underway["inspection"] or {"findings": []}
+    lines += [f"{one['severity']}: {one['kind']}: {one['text']}: {one['advice']}" for one in inspection["findings"]]
+    return "\n".join(lines)
+
+
+def progress_text(underway: dict[str, Any]) -> str:
+    """One line, while it is driven."""
+    driven = f"{underway['driven_s'] / 60.0:.0f} min driven, {underway['n_batches']} windows"
+    learned = underway["learned"]
+    if learned is None:
+        return f"{driven}: nothing is known yet"
+    return (
+        f"{driven}: {learned['share']:.0%} of what is wanted is known; a payload would be told to "
+        f"± {learned['payload_std_kg']:.0f} kg, {learned['needed_std_kg']:.0f} are enough (standard deviations)"
+    )
+
+
+def lines_text(items: list[dict[str, Any]]) -> str:
+    """Numbered, for somebody to choose."""
+    if not items:
+        return "there is no line: `springscale commission upload FILE` brings one, or go on without"
+    return "\n".join(
+        f"{n}: {item['name']} ({item['source']}){': ' + item['fault'] if item['fault'] else ''}"
+        for n, item in enumerate(items, 1)
+    )
+
+
+def _made_text(made: dict[str, Any]) -> str:
+    line = f"of the line {made['line']['name']}" if made["line"]["name"] else "without a line"
+    note = f" ({made['note']})" if made["note"] else ""
+    windows = "one window" if made["n_batches"] == 1 else f"{made['n_batches']} windows"
+    return f"{made['id'][:19]} {made['vehicle_name']} {line}, {windows}, made {made['at'][:19]}Z by {made['by']}{note}"
+
+
+def _end_text(ended: dict[str, Any] | None) -> str:
+    return "" if ended is None else f", {ended['why']} {ended['at'][:19]}Z by {ended['by']}"

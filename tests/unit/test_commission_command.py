@@ -1,0 +1,85 @@
+"""springscale commission: every step as an option, for scripts; refusals in the service's own words."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from support.calibrated import calibration_file
+from support.commissioning import Bench, fitted
+from support.web import Gateway, serving
+
+from gateway.cli.asked import commission as command
+from gateway.errors import ConfigurationError, SpringscaleError
+
+VEHICLE = ("--front-axle-kg", "690", "--rear-axle-kg", "710", "--wheelbase-m", "2.75", "--sensor-m", "1.2")
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path)
+
+
+@pytest.fixture
+def url(tmp_path: Path, bench: Bench) -> Iterator[str]:
+    with Gateway(tmp_path / "store", commissioning=bench.desk) as gateway, serving(gateway.app) as server:
+        yield server.url
+
+
+def run(url: str, *arguments: str, answers: str | None = None) -> Result:
+    return CliRunner().invoke(command.commission, [*arguments, "--url", url], input=answers)
+
+
+def test_one_call_answers_everything(url: str, bench: Bench) -> None:
+    begun = run(url, "start", "--line", "none", *VEHICLE, "--empty", "--note", "yard", "--json")
+    assert begun.exit_code == 0, begun.exception
+    underway = json.loads(begun.stdout)["underway"]
+    assert (underway["step"], underway["note"], underway["vehicle"]["wheelbase_m"]) == ("drive", "yard", 2.75)
+    bench.drive(0)
+    bench.worker.finish(fitted(payload_std_kg=36.0))
+    shown = run(url, "show")
+    assert "next: drive, empty" in shown.stdout
+    assert "5 min driven, 1 windows: 50% of what is wanted is known" in shown.stdout
+    assert "next: the calibration is being made" in run(url, "fit").stdout
+    bench.worker.finish(fitted(payload_std_kg=36.0))
+    made = run(url, "show").stdout
+    assert "in use: sha256:" in made
+    assert "van-17 without a line, one window, made 2026-09-21T14:13:20Z by local (yard)" in made
+    assert "another calibration counts from the next drive on" in made
+    assert "undone" in run(url, "undo").stdout
+
+
+def test_steps_may_come_one_by_one(url: str) -> None:
+    assert isinstance(run(url, "start", "--line", "none").exception, SystemExit)
+    assert json.loads(run(url, "show", "--json").stdout)["underway"]["step"] == "vehicle"
+    kept = run(url, "start", *VEHICLE)
+    assert isinstance(kept.exception, SpringscaleError)
+    assert "--empty" in str(kept.exception)
+    assert json.loads(run(url, "start", "--empty", "--json").stdout)["underway"]["step"] == "drive"
+    assert json.loads(run(url, "cancel", "--json").stdout)["underway"] is None
+
+
+def test_a_person_is_asked(url: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(command, "_is_at_terminal", lambda: True)
+    file = tmp_path / "sister.json"
+    file.write_text(calibration_file().to_json())
+    assert "1: sister.json (uploaded)" in run(url, "upload", str(file)).stdout
+    begun = run(url, "start", "--no-follow", answers="0\n690\n710\n2.75\n1.2\ny\n")
+    assert begun.exit_code == 0, (begun.output, begun.exception)
+    assert "Wheelbase [m]" in begun.stdout
+    assert "next: drive, empty" in begun.stdout
+
+
+def test_what_is_wrong_is_told_in_words(url: str, tmp_path: Path) -> None:
+    refused = run(url, "fit")
+    assert isinstance(refused.exception, SpringscaleError)
+    assert "no commissioning is under way" in str(refused.exception)
+    unknown = run(url, "start", "--line", "nothing.json")
+    assert isinstance(unknown.exception, ConfigurationError)
+    assert "no such line, and no such file" in str(unknown.exception)
+    (tmp_path / "broken.json").write_text("{}")
+    broken = run(url, "upload", str(tmp_path / "broken.json"))
+    assert "broken.json: not a springscale calibration file" in str(broken.exception)
+    missing = run(url, "start", "--line", "none", "--front-axle-kg", "690")
+    assert "--rear-axle-kg" in missing.output
