@@ -24,7 +24,10 @@ class WeightRefusal(StrEnum):
     NO_EPOCH = "no_epoch"
     AMBIGUOUS_EPOCH = "ambiguous_epoch"
     OTHER_CALIBRATION = "other_calibration"
-    NOT_KNOWN = "not_known"
+    NOT_COMMISSIONED = "not_commissioned"
+    NOT_KEPT = "not_kept"
+    TOO_MANY = "too_many"
+    NO_SUCH_TICKET = "no_such_ticket"
     NOT_STORED = "not_stored"
 
 

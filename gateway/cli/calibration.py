@@ -19,6 +19,7 @@ from gateway.calibration.file import (
 )
 from gateway.calibration.file.check import Verdict
 from gateway.cli.asked.tare import tare_commands
+from gateway.cli.asked.ticket import ticket_commands
 from gateway.cli.options import FILE, as_json
 from gateway.cli.text.axle_weights import vehicle_block
 from gateway.cli.text.calibration import calibration_text
@@ -32,6 +33,7 @@ def calibration() -> None:
 
 
 calibration.add_command(tare_commands)
+calibration.add_command(ticket_commands)
 
 
 @calibration.command("show")

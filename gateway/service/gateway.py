@@ -16,7 +16,7 @@ from gateway.log import Event, log_event
 from gateway.service.changes import BatchLog, StateLog
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
-from gateway.service.parts import commissioning_of, keeper_of, ring_log_of, source_of, store_of, uplink_of
+from gateway.service.parts import commissioning_of, keeper_of, ring_log_of, source_of, store_of, tickets_of, uplink_of
 from gateway.service.pipeline import Pipeline
 from gateway.service.proving import Proving
 from gateway.service.reload import LoadSettings, Reloader, tls_of
@@ -105,7 +105,10 @@ class Gateway:
             stale_after_s=settings.web.stale_after_s,
             on_event=self.store.write_event,
         )
-        self.proving = Proving(settings.store.directory, settings.verification, subject, self.store, self.tare.zeros)
+        tickets = tickets_of(settings, self.commissioning, self.keeper, subject, self.store)
+        self.proving = Proving(
+            settings.store.directory, settings.verification, subject, self.store, self.tare.zeros, tickets
+        )
         self._beside = tuple(part for part in (self.keeper, self.proving, self.ring_log) if part is not None)
         self.status = StatusReport(
             settings,
@@ -132,6 +135,7 @@ class Gateway:
             record=self.ring_log,
             verification=self.proving.verification,
             trend=self.proving.trend,
+            tickets=tickets,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = WebServer(web)

@@ -9,8 +9,10 @@ from gateway.calibration.kept.shelf import FOLDER
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.config.sections import KeepSection
 from gateway.core.flow import Flow
-from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle, why_not_allowed
+from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle, Worker, why_not_allowed
 from gateway.service.keeper import BatchKeeper
+from gateway.service.proving import TicketDesk
+from gateway.service.tare_desk import Subject
 from gateway.setup import Setup
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings
@@ -72,6 +74,22 @@ def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow
     )
     flow.on_batch, keeper.listener = keeper.keep, desk
     return desk
+
+
+def tickets_of(
+    settings: Settings, commissioning: Commissioning, keeper: BatchKeeper, subject: Subject, store: Store
+) -> TicketDesk:
+    directory = settings.store.directory
+    return TicketDesk(
+        commissioning.book,
+        Jobs(directory, settings.commissioning, settings.batch.for_core()),
+        keeper.shelf,
+        subject,
+        store.reader().estimates,
+        on_event=store.write_event,
+        make_worker=lambda on_result: Worker(directory / "refit", on_result),
+        why_not_allowed=why_not_allowed(settings),
+    )
 
 
 def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:

@@ -32,10 +32,12 @@ from gateway.web.routes import (
     NoCommissioningDesk,
     NoFrameLog,
     NoTareDesk,
+    NoTicketDesk,
     NoTrend,
     NoVerificationDesk,
     Scales,
     TareDesk,
+    TicketDesk,
     TrendDesk,
     VerificationDesk,
     api_router,
@@ -50,6 +52,7 @@ from gateway.web.routes import (
     rfms_router,
     spectra_router,
     tare_router,
+    tickets_router,
     trend_router,
     vehicle_router,
     verification_router,
@@ -77,6 +80,7 @@ def create_app(
     record: FrameLog | None = None,
     verification: VerificationDesk | None = None,
     trend: TrendDesk | None = None,
+    tickets: TicketDesk | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the
@@ -114,6 +118,7 @@ def create_app(
     app.include_router(tare_router(tare or NoTareDesk()))
     app.include_router(verification_router(verification or NoVerificationDesk()))
     app.include_router(trend_router(trend or NoTrend()))
+    app.include_router(tickets_router(tickets or NoTicketDesk()))
     app.include_router(commissioning_router(commissioning or NoCommissioningDesk()))
     app.include_router(export_router(reader))
     app.include_router(record_router(record or NoFrameLog()))

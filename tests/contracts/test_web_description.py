@@ -29,6 +29,8 @@ STEPS = ("lines", "line", "vehicle", "empty", "fit", "undo")
 CHANGES = [
     "POST /api/v1/calibration/tare",
     "DELETE /api/v1/calibration/tare",
+    "POST /api/v1/calibration/tickets",
+    "DELETE /api/v1/calibration/tickets/{ticket_id}",
     "POST /api/v1/calibration/verifications",
     f"POST {COMMISSIONING}",
     f"DELETE {COMMISSIONING}",
@@ -48,6 +50,7 @@ PATHS = [
     "/api/v1/weights/j1939",
     "/api/v1/vss",
     "/api/v1/calibration/tare",
+    "/api/v1/calibration/tickets",
     "/api/v1/calibration/trend",
     "/api/v1/calibration/verifications",
     "/api/v1/calibration/verifications/{record_id}",
@@ -111,7 +114,11 @@ def test_no_path_escapes(schema: BaseSchema) -> None:
 EXCLUDED = {"GET /rfms/vehiclestatuses": [positive_data_acceptance]}
 LABELS = [*(f"GET {path}" for path in PATHS), *CHANGES]
 WITHOUT_PARAMETERS = ("latest", "status", "reasons", "vehicle", "vss", "live", "ready", "metrics", "record", "trend")
-WITHOUT_PARAMETERS += ("GET /api/v1/calibration/tare", "GET /api/v1/calibration/verifications")
+WITHOUT_PARAMETERS += (
+    "GET /api/v1/calibration/tare",
+    "GET /api/v1/calibration/verifications",
+    "GET /api/v1/calibration/tickets",
+)
 WITHOUT_PARAMETERS += (f"GET {COMMISSIONING}", f"GET {COMMISSIONING}/lines")
 WITHOUT_PARAMETERS += (f"DELETE {COMMISSIONING}", f"POST {COMMISSIONING}/fit")
 WITH_PARAMETERS = [label for label in LABELS if not label.endswith(WITHOUT_PARAMETERS)]

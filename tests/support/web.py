@@ -20,7 +20,7 @@ from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
 from gateway.web.routes import CommissioningDesk
-from gateway.web.routes.calibration import TareDesk, VerificationDesk
+from gateway.web.routes.calibration import TareDesk, TicketDesk, VerificationDesk
 from gateway.web.routes.record import FrameLog
 from support.patience import PATIENCE_S
 
@@ -39,6 +39,7 @@ class Gateway:
         known_loads: KnownLoads | None = None,
         record: FrameLog | None = None,
         verification: VerificationDesk | None = None,
+        tickets: TicketDesk | None = None,
     ) -> None:
         self.clock_s = 1000.0
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
@@ -53,6 +54,7 @@ class Gateway:
             "known_loads": known_loads,
             "record": record,
             "verification": verification,
+            "tickets": tickets,
         }
         self.app = self._make_app()
 

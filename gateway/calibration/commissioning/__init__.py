@@ -6,6 +6,6 @@
 """
 
 from gateway.calibration.commissioning.answers import vehicle_table
-from gateway.calibration.commissioning.job import JOB, RESULT, Drive, Found, Job, Learned, Result
+from gateway.calibration.commissioning.job import JOB, RESULT, Drive, Found, Job, Learned, Planned, Result
 
-__all__ = ["JOB", "RESULT", "Drive", "Found", "Job", "Learned", "Result", "vehicle_table"]
+__all__ = ["JOB", "RESULT", "Drive", "Found", "Job", "Learned", "Planned", "Result", "vehicle_table"]

@@ -5,7 +5,7 @@ whether another calibration is due. It owns ``commissioning.json`` (``Record``),
 folder ``lines``; the fit runs in a process of its own (``Worker``).
 """
 
-from gateway.service.commissioning.book import OnEvent
+from gateway.service.commissioning.book import Book, OnEvent
 from gateway.service.commissioning.desk import Commissioning, Drives
 from gateway.service.commissioning.drive import Vehicle
 from gateway.service.commissioning.jobs import Jobs
@@ -14,6 +14,7 @@ from gateway.service.commissioning.start import commissioned, why_not_allowed, w
 from gateway.service.commissioning.worker import Worker
 
 __all__ = [
+    "Book",
     "Commissioning",
     "Drives",
     "Jobs",

@@ -60,6 +60,11 @@ class Commissioning:
         )
 
     @property
+    def book(self) -> Book:
+        """What keeps the calibrations made here."""
+        return self._book
+
+    @property
     def fault(self) -> str | None:
         """What is wrong with the book, for people."""
         return self._book.fault

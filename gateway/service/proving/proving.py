@@ -4,6 +4,7 @@ from pathlib import Path
 
 from gateway.calibration.verification_file import VerificationRule
 from gateway.config.sections import VerificationSection
+from gateway.service.proving.ticket_desk import TicketDesk
 from gateway.service.proving.trend_keeper import TrendKeeper, Zeros
 from gateway.service.proving.verification_desk import VerificationDesk
 from gateway.service.tare_desk import Subject
@@ -11,12 +12,19 @@ from gateway.store import Store
 
 
 class Proving:
-    """Verifications, asked for by people; and the trend of the vehicle's parameters, followed in the background."""
+    """Verifications and tickets, asked for by people; the trend of the vehicle's parameters, in the background."""
 
     def __init__(
-        self, directory: Path, wanted: VerificationSection, subject: Subject, store: Store, zeros: Zeros
+        self,
+        directory: Path,
+        wanted: VerificationSection,
+        subject: Subject,
+        store: Store,
+        zeros: Zeros,
+        tickets: TicketDesk,
     ) -> None:
         """``zeros`` tells the tares of the calibration in use."""
+        self.tickets = tickets
         ask = store.reader().estimates
         self.verification = VerificationDesk(
             directory,
@@ -29,14 +37,16 @@ class Proving:
         self.trend = TrendKeeper(directory, subject, ask, zeros)
 
     def start(self) -> None:
-        """Begin to follow the trend."""
+        """Begin to follow the trend, and to fit what tickets wait for it."""
         self.trend.start()
+        self.tickets.start()
 
     def stop(self) -> None:
-        """End it."""
+        """End both."""
+        self.tickets.stop()
         self.trend.stop()
 
     @property
     def faults(self) -> tuple[str, ...]:
         """What is due, drifts or is broken, for people."""
-        return tuple(fault for fault in (self.verification.fault, self.trend.fault) if fault)
+        return tuple(fault for fault in (self.verification.fault, self.trend.fault, self.tickets.fault) if fault)
