@@ -63,7 +63,7 @@ class StatusReport:
             uptime_s=time.monotonic() - self._started,
             vehicle_id=self._setup.identity.vehicle_id,
             vin=self._setup.identity.vin,
-            calibration_id=self._setup.calibration.id if self._setup.calibration else None,
+            calibration_id=self._setup.calibrated.id if self._setup.calibrated else None,  # hashed once, not each time
             tare_id=tare.id if (tare := self._pipeline.flow.tare) else None,
             estimator=self._setup.estimator,
             bus=self._bus(),
