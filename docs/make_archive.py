@@ -84,7 +84,7 @@ RUNNING: Final = """\
 First every log that is new is looked into: its hash, and the instant of its first frame. Then its jobs are done, one
 function from a job to a receipt, on all cores of this computer, each process with one thread. The terminal shows how
 much is done, the rate, and the time that is left. What comes back from a job is a small summary; logs are read as
-streams, and one in an object store is copied to the worker's disk, in chunks, for as long as it is read.
+streams, and one in an object store is copied to the worker's disk (`TMPDIR`), in chunks, for as long as it is read.
 
 - **Stop it, and run it again**: what has a receipt is not done again. A second run over the same logs writes nothing.
 - **A log that cannot be read** is told under `failed/` with the reason, and the rest goes on without it. The command
@@ -94,7 +94,9 @@ streams, and one in an object store is copied to the worker's disk, in chunks, f
 - **A store that does not answer** leaves its jobs undone, and the command ends with 1: run it again. A vehicle of which
   one log is out of reach is not weighed without it.
 - **New logs, another calibration, another version** change the hash of the jobs that they concern. These are done, and
-  when all of a vehicle's month are, the receipts of the old ones are taken back. Tables stay.
+  when all of a vehicle's month are, the receipts of the old ones are taken back. Tables stay. So a data set belongs to
+  one manifest; to compare two calibrations, write two data sets. Months and vehicles whose logs are gone stay as they
+  were.
 
 Exit codes are 0 when everything is done, 1 when something failed or was left undone, 2 for a mistake in the manifest or
 the options. `--json` prints one object for machines.

@@ -69,6 +69,10 @@ class LogUnreadableError(SpringscaleError):
     """A log holds no frame that can be read."""
 
 
+class ReaderMissingError(LogUnreadableError):
+    """A log may be whole, but what reads its kind is not installed here."""
+
+
 class ArraysError(SpringscaleError):
     """Arrays of measurements do not fit together, or not the calibration."""
 

@@ -11,7 +11,7 @@ from gateway.archive.places import PlaceError
 from gateway.bus.logs import LogReport, motion_of_log
 from gateway.core.flow import Flow
 from gateway.core.settings import BatchSettings
-from gateway.errors import LogUnreadableError
+from gateway.errors import ConfigurationError, LogUnreadableError, ReaderMissingError
 from gateway.estimate import Estimate
 from gateway.records import Batch
 from gateway.units import NS_PER_S
@@ -111,11 +111,14 @@ def goes_on(newest_ns: int | None, next_ns: int | None, settings: BatchSettings)
 
 
 def _of_the_log(fault: Exception, one: JobLog, path: str) -> Exception:
-    """What a fault while reading means: the place's, to be tried again, or the log's, for good."""
+    """What a fault while reading means: this computer's, the place's, to be tried again, or the log's, for good."""
+    told = str(fault).replace(path, one.log.name)
     if isinstance(fault, MemoryError):
         return fault
+    if isinstance(fault, ReaderMissingError):
+        return ConfigurationError(told)
     if isinstance(fault, OSError) and fault.errno is not None:
         return PlaceError(f"{one.log.name}: {fault.strerror}")
     if isinstance(fault, LogUnreadableError):
-        return LogUnreadableError(str(fault).replace(path, one.log.name))
+        return LogUnreadableError(told)
     return LogUnreadableError(f"{one.log.name}: cannot be read: {fault!r}")

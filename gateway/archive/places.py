@@ -89,12 +89,14 @@ class Place:
                 obs.put(self._store(), path, content, mode="create", use_multipart=False)
             except obs.exceptions.AlreadyExistsError:
                 return False
+            self._settle(path)
         return True
 
     def replace(self, path: str, content: bytes) -> None:
         """Write a file, whole or not at all, whatever is there."""
         with self._faults(path):
             _obstore().put(self._store(), path, content, use_multipart=False)
+            self._settle(path)
 
     def remove(self, path: str) -> None:
         """Remove a file; one that is not there is no fault."""
@@ -122,6 +124,16 @@ class Place:
                     digest.update(chunk)
                     file.write(chunk)
             yield Fetched(copy, digest.hexdigest())
+
+    def _settle(self, path: str) -> None:
+        """On a disk, a power cut must not keep what is written after it and lose this; object stores answer for it."""
+        here = self.local(path)
+        for settled in () if here is None else (here, here.parent):
+            handle = os.open(settled, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
 
     def _store(self) -> "ObjectStore":
         return _store_of(self.url)

@@ -117,13 +117,16 @@ def _answer(pipe: "Connection[Any, Any]") -> None:
     while True:
         try:
             fn, args, kwargs = pipe.recv()
-        except EOFError:
+        except EOFError:  # nobody asks any more
             return
         try:
             answer = (True, fn(*args, **kwargs))
         except Exception as fault:  # noqa: BLE001 - it belongs to who asked
             answer = (False, fault)
-        _send(pipe, answer)
+        try:
+            _send(pipe, answer)
+        except OSError:  # who asked is gone
+            return
 
 
 def _send(pipe: "Connection[Any, Any]", answer: tuple[bool, Any]) -> None:

@@ -142,6 +142,8 @@ def _surveyed(go: tuple[str, tuple[LogFile, ...]]) -> Surveyed:
 def _of_survey(go: tuple[LogFile, ...], answer: "Future[Surveyed]") -> Surveyed:
     try:
         return answer.result()
+    except ConfigurationError:
+        raise
     except Exception as fault:  # noqa: BLE001 - whatever happened to a worker, the other vehicles go on
         return Surveyed({}, {log.name: str(fault) or repr(fault) for log in go})
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 from gateway.archive.manifest import Assignment, Manifest
 from gateway.archive.places import Place, PlaceError
 from gateway.bus.logs import open_whole_log
-from gateway.errors import LogUnreadableError
+from gateway.errors import ConfigurationError, LogUnreadableError, ReaderMissingError
 
 KNOWN: Final = "logs"  # folder of the data set
 MOST_LOGS: Final = 32  # surveyed in one go
@@ -63,7 +63,7 @@ def logs_of(manifest: Manifest, assignment: Assignment) -> list[LogFile]:
 
 
 def survey(logs: Sequence[LogFile]) -> Surveyed:
-    """Read every log once. Raises nothing: what cannot be reached now is told as lost."""
+    """Read every log once; what cannot be reached now is told as lost. Raises ConfigurationError without a library."""
     facts: Facts = {}
     lost: dict[str, str] = {}
     for log in logs:
@@ -112,6 +112,8 @@ def _facts_of(log: LogFile) -> LogFacts:
             first_ns = next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), None)
             if first_ns is None:
                 report.require_frames()
+        except ReaderMissingError as fault:  # no fault of the log
+            raise ConfigurationError(str(fault).replace(str(fetched.path), log.name)) from None
         except LogUnreadableError as fault:
             return LogFacts(fetched.sha256, None, str(fault).replace(str(fetched.path), log.name))
         except Exception as fault:  # noqa: BLE001 - a reader's surprise is this log's fault, not that of the others

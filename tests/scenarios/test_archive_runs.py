@@ -17,7 +17,7 @@ from gateway.archive.manifest import load_manifest
 from gateway.archive.processes import WorkerKilledError
 from gateway.archive.reprocess import Summary, reprocess
 from gateway.archive.run import Outcome, Status, run
-from gateway.errors import ConfigurationError
+from gateway.errors import ConfigurationError, ReaderMissingError
 
 HOUR = 3600 * S
 
@@ -159,6 +159,21 @@ def test_a_job_that_kills_its_workers_is_told_as_failed(archive: Path) -> None:
     assert done(archive).counts["failed_before"] == 1
     assert done(archive, retry_failed=True).counts["done"] == 1
     assert failures(archive / "dataset") == []  # a receipt has taken its place
+
+
+def test_a_library_that_is_missing_ends_the_run_and_blames_no_log(
+    archive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(*log: Any) -> Any:
+        raise ReaderMissingError("install springscale[mdf]")
+
+    for reader in ("gateway.archive.survey.open_whole_log", "gateway.archive.drives.motion_of_log"):
+        with monkeypatch.context() as without:
+            without.setattr(reader, missing)
+            with pytest.raises(ConfigurationError, match="install springscale"):
+                done(archive)
+    assert dataset_of(archive).items("failed") == []
+    assert done(archive).counts["done"] == 2
 
 
 def test_what_a_store_refuses_is_left_for_the_next_run(archive: Path) -> None:

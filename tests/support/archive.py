@@ -1,17 +1,17 @@
 """A fleet's archive, made up: short drives of white noise, a calibration that answers them, and where to keep them."""
 
-import logging
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
-from urllib.request import Request, urlopen
 
+import httpx
 import pytest
-from moto.server import ThreadedMotoServer
 
 from gateway.archive import Place, place_of, slots_done
 from gateway.bus.frames import take
@@ -19,6 +19,8 @@ from gateway.bus.logs import write_candump
 from gateway.records import Frames
 from support.bus_drive import white_noise
 from support.calibrated import calibration_file
+from support.patience import PATIENCE_S
+from support.ports import first_answer, free_port
 
 Answer = TypeVar("Answer")
 
@@ -75,11 +77,14 @@ def write_cut_drive(folder: Path, start_ns: int, duration_s: float, cut_ns: int,
 
 
 def write_fleet(folder: Path, n_vehicles: int) -> Path:
-    """A day of many vehicles: a drive each, in two logs that follow one another within a batch."""
+    """A day of many vehicles: a drive each, of every fifth in two logs that follow one another within a batch."""
     names = [f"van-{n:03}" for n in range(n_vehicles)]
     for n, name in enumerate(names):
         start_ns = MIDNIGHT_NS + n * S
-        write_cut_drive(folder / name, start_ns, 22.0, start_ns + 12 * S, seed=n)
+        if n % 5 == 0:
+            write_cut_drive(folder / name, start_ns, 22.0, start_ns + 12 * S, seed=n)
+        else:
+            write_drive(folder / name / "1.log", start_ns, 22.0, seed=n)
     return write_manifest(folder, *names)
 
 
@@ -96,21 +101,26 @@ def tables_of(dataset: Place) -> dict[str, bytes]:
 
 @contextmanager
 def object_store() -> Iterator[str]:
-    """An S3 server of the test's own with one bucket; its URL. obstore finds it by the environment."""
-    logging.getLogger("werkzeug").setLevel(logging.ERROR)
-    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
-    server.start()
-    port = server.get_host_and_port()[1]
+    """An S3 server of the test's own, in a process of its own, with one bucket; its URL.
+
+    obstore finds it by the environment.
+    """
+    port = free_port()
     address, bucket = f"http://127.0.0.1:{port}", f"fleet-{port}"  # a process keeps its connections by their names
     told = {"ENDPOINT_URL": address, "ACCESS_KEY_ID": "x", "SECRET_ACCESS_KEY": "x", "REGION": "us-east-1"}
-    with pytest.MonkeyPatch.context() as environment:
+    command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
+    with (
+        subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server,
+        pytest.MonkeyPatch.context() as environment,
+    ):
         for name, text in (*told.items(), ("ALLOW_HTTP", "true")):
             environment.setenv(f"AWS_{name}", text)
-        urlopen(Request(f"{address}/{bucket}", method="PUT"), timeout=10.0).close()
         try:
+            first_answer(address)
+            httpx.put(f"{address}/{bucket}", timeout=PATIENCE_S).raise_for_status()
             yield f"s3://{bucket}"
         finally:
-            server.stop()
+            server.kill()
 
 
 def die(reached: str) -> None:

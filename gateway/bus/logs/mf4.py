@@ -14,7 +14,7 @@ from gateway.bus.frames import LAST_SECOND, join, take
 from gateway.bus.logs.packed import unpacked_path
 from gateway.bus.logs.report import LogReject
 from gateway.bus.logs.selection import Selection
-from gateway.errors import LogUnreadableError
+from gateway.errors import LogUnreadableError, ReaderMissingError
 from gateway.records import EXTENDED_ID, I64, U8, U32, Bool, Frames
 from gateway.units import NS_PER_S
 
@@ -37,7 +37,7 @@ def read_mf4(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
     try:
         open_mdf = _asammdf()
     except ImportError:
-        raise LogUnreadableError(f'{path}: reading .mf4 needs asammdf: pip install "springscale[mdf]"') from None
+        raise ReaderMissingError(f'{path}: reading .mf4 needs asammdf: pip install "springscale[mdf]"') from None
     try:
         with unpacked_path(path) as unpacked, closing(open_mdf(unpacked)) as mdf:
             for frames in _in_order_of_time(_groups(mdf, selection, width), width):

@@ -18,9 +18,7 @@ from gateway.records import EXTENDED_ID, Frames, Motion
 EVERY_FRAME: Final = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))
 CANDUMP_SUFFIXES: Final = (".log", ".txt", ".candump", "")
 BULK_READERS: Final = {".blf": read_blf, ".mf4": read_mf4}
-
-
-UNMISTAKABLE: Final = frozenset({".log", ".candump", *MESSAGE_SUFFIXES} - {".csv", ".db"})
+UNMISTAKABLE: Final = frozenset({".log", ".candump", *MESSAGE_SUFFIXES, *BULK_READERS} - {".csv", ".db"})
 
 
 def is_named_as_log(path: Path | str) -> bool:
