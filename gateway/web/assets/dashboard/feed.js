@@ -1,7 +1,7 @@
 // Keeps what the page knows in step with the gateway: asks at the start and now and then, follows the stream between.
 
 import { follow } from "/assets/dashboard/event-stream.js";
-import { Refused, TARE, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
+import { Refused, TARE, TICKETS, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
 import { known, learn } from "/assets/dashboard/known.js";
 
 const ASK_EVERY_MS = 5000;
@@ -15,6 +15,8 @@ async function askNow() {
     learn({ status, latest, latestAtMs: performance.now(), isReachable: true, isRefused: false });
     if (known.weights?.id !== latest.id || latest.id === null) learn({ weights: await load("/api/v1/weights/latest") });
     if (known.verifications && known.verifications.due.n_records !== status.verification.n_records) await askVerifications();
+    if (known.tickets?.is_busy || (known.calibrationId ?? status.calibration_id) !== status.calibration_id) await askTickets();
+    known.calibrationId = status.calibration_id;
     if (known.tare && (known.tare.active?.id ?? null) !== status.tare_id) await askTare(); // somebody else changed it
   } catch (error) {
     learn({ isReachable: error instanceof Refused, isRefused: error instanceof Refused });
@@ -35,6 +37,8 @@ async function askVerifications() {
   const [verifications, trend] = await Promise.all([load(VERIFICATIONS), load(TREND)]);
   learn({ verifications, trend });
 }
+
+const askTickets = async () => learn({ tickets: await load(TICKETS) });
 
 async function askOnce() {
   const [vehicle, reasons] = await Promise.all([load("/api/v1/vehicle"), load("/api/v1/reasons")]);
@@ -73,7 +77,7 @@ const giveUpUntilNext = (error) => console.info(error.message);
 /** What needs an answer before the page is whole; asked again whenever the stream comes back. */
 async function catchUp() {
   await askNow();
-  await Promise.all([askOnce(), askSpectra(), askTruth(), askTare(), askVerifications()]);
+  await Promise.all([askOnce(), askSpectra(), askTruth(), askTare(), askVerifications(), askTickets()]);
 }
 
 /** Begins; never ends. */

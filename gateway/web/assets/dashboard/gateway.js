@@ -4,6 +4,7 @@ const TOKEN = "springscale-token";
 export const TARE = "/api/v1/calibration/tare";
 export const VERIFICATIONS = "/api/v1/calibration/verifications";
 export const TREND = "/api/v1/calibration/trend";
+export const TICKETS = "/api/v1/calibration/tickets";
 
 export class Refused extends Error {}
 

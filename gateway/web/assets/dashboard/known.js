@@ -11,6 +11,7 @@ export const known = {
   tare: null, // GET /calibration/tare
   verifications: null, // GET /calibration/verifications
   trend: null, // GET /calibration/trend
+  tickets: null, // GET /calibration/tickets
   reasons: new Map(), // reason -> {happened, advice}
   batches: null, // newest first, rejections included
   early: null, // the provisional estimate of the batch under way

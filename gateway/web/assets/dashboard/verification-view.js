@@ -1,9 +1,9 @@
-// Known loads: when they were last held against what was weighed, what drifts meanwhile, and another record.
+// Known loads: when they were last held against what was weighed, what drifts meanwhile, and what was learned from them.
 
-import { VERIFICATIONS, ask, change, hasToken } from "/assets/dashboard/gateway.js";
+import { TICKETS, VERIFICATIONS, ask, change, hasToken } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { capital, clock, number, signed, words } from "/assets/dashboard/words.js";
+import { capital, clock, figure, number, signed, words } from "/assets/dashboard/words.js";
 
 const FIELDS = { gross: ["gross_kg"], axles: ["front_axle_kg", "rear_axle_kg"], payload: ["payload_kg", "position_m"] };
 const OPTIONAL = new Set(["position_m"]);
@@ -55,7 +55,62 @@ show(({ trend }) => {
   element("drift").replaceChildren(...trend.parameters.map((one) => made("li", trendText(one), one.is_drifting ? "warning" : "")));
 }, "trend");
 
-let listed = [];
+const accuracy = ({ planned, is_provisional, why_not, is_busy }) => {
+  if (why_not !== null) return `as calibrated: ${why_not}`;
+  const busy = is_busy ? "; the calibration is being made anew" : "";
+  if (planned === null) return `provisional${busy}`;
+  const now = `payloads to ± ${figure(1.96 * planned.payload_std_kg, 0, "kg")} (95 %)`;
+  if (!is_provisional) return `${now}; no other load would narrow that by much${busy}`;
+  const place = planned.load_position_m === null ? "" : `, ${figure(planned.load_position_m, 1, "m")} behind the front axle`;
+  return `provisional: ${now}; a ticket of ${figure(planned.load_kg, 0, "kg")}${place} would make it ± ${figure(1.96 * planned.then_payload_std_kg, 0, "kg")}${busy}`;
+};
+
+function ticketEntry(ticket) {
+  const share = ticket.front_share_pct === null ? "place unknown, teaches nothing" : `${number(ticket.front_share_pct, 1)} % in front`;
+  const end = ticket.withdrawn ? `; withdrawn ${clock(ticket.withdrawn.at)} by ${ticket.withdrawn.by}` : "";
+  const text = `${clock(ticket.t_start)}: ${figure(ticket.payload_kg, 0, "kg")}, ${share}, by ${ticket.by}${ticket.note ? ` (${ticket.note})` : ""}${end} `;
+  if (ticket.withdrawn) return made("li", text);
+  const button = made("button", "Withdraw");
+  button.type = "button";
+  button.setAttribute("aria-label", `Withdraw the ticket of ${clock(ticket.t_start)}`);
+  button.addEventListener("click", () => withdraw(ticket).catch((error) => write("known-said", error.message)));
+  return made("li", [made("span", text), button]);
+}
+
+async function withdraw(ticket) {
+  learn({ tickets: await change("DELETE", `${TICKETS}/${ticket.id}`, "", undefined, TICKETS) });
+  write("known-said", "Withdrawn. The calibration is made anew without it.");
+}
+
+show(({ tickets }) => {
+  if (tickets === null) return;
+  write("accuracy", `${capital(accuracy(tickets))}.${tickets.fault ? ` The last fit made no calibration: ${tickets.fault}` : ""}`);
+  element("known-teach").disabled = !tickets.is_possible;
+  element("ticket-history").hidden = tickets.history.length === 0;
+  element("ticket-entries").replaceChildren(...tickets.history.map(ticketEntry));
+}, "tickets");
+
+/** What a known load can be good for: how the dialog says it, and how the gateway is told. */
+const PURPOSES = {
+  verify: {
+    effect: "It is held against what was weighed of it, and a record is kept. Nothing is learned from it.",
+    confirm: "Judge and keep",
+    path: VERIFICATIONS,
+    part: "verifications",
+    claim: (loads) => ({ loads }),
+    done: "The record is kept.",
+  },
+  teach: {
+    effect: "The calibration is made anew with it in the background, and takes effect between two drives.",
+    confirm: "Teach",
+    path: TICKETS,
+    part: "tickets",
+    claim: ([weight]) => ({ weight }),
+    done: "The ticket is kept. The calibration is being made anew.",
+  },
+};
+
+let listed = [], purpose = PURPOSES.verify;
 
 /** The fields of the kind of weight that was chosen, and no others. */
 function fit() {
@@ -83,8 +138,12 @@ function list() {
   write("known-listed", listed.length === 0 ? "" : `${listed.length} more in this record.`);
 }
 
-function open() {
+function open(name) {
   listed = [];
+  purpose = PURPOSES[name];
+  write("known-effect", purpose.effect);
+  write("known-confirm", purpose.confirm);
+  element("known-more").hidden = name !== "verify";
   element("known-form").reset();
   element("known-token").hidden = !hasToken();
   say("known-refusal", "");
@@ -99,10 +158,10 @@ async function confirm(event) {
   say("known-refusal", "");
   try {
     const note = element("known-note").value;
-    const claim = { loads: [...listed, typed()], ...(note ? { note } : {}) };
-    learn({ verifications: await change("POST", VERIFICATIONS, element("known-token-text").value.trim(), claim, VERIFICATIONS) });
+    const claim = { ...purpose.claim([...listed, typed()]), ...(note ? { note } : {}) };
+    learn({ [purpose.part]: await change("POST", purpose.path, element("known-token-text").value.trim(), claim, purpose.path) });
     element("known-dialog").close();
-    write("known-said", "The record is kept.");
+    write("known-said", purpose.done);
   } catch (error) {
     say("known-refusal", error.message);
   } finally {
@@ -110,7 +169,8 @@ async function confirm(event) {
   }
 }
 
-element("known-add").addEventListener("click", open);
+element("known-add").addEventListener("click", () => open("verify"));
+element("known-teach").addEventListener("click", () => open("teach"));
 element("known-by").addEventListener("change", fit);
 element("known-more").addEventListener("click", () => {
   if (!element("known-form").reportValidity()) return;

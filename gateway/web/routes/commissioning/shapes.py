@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.stated import VehicleAnswers
 from gateway.web.schemas import Body
@@ -16,8 +16,10 @@ class Begin(Body):
     note: str = Field("", max_length=200, description="kept in the history")
 
 
-class LineNamed(Body):
+class LineNamed(BaseModel):
     """A file among the lines there are."""
+
+    model_config = ConfigDict(extra="forbid")
 
     name: str = Field(max_length=64, examples=["van-model.json"])
     source: Source
