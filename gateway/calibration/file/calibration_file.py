@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import Field, ValidationError
 
@@ -20,12 +20,14 @@ from gateway.calibration.file.parts import (
     SeenPart,
     VehiclePart,
 )
-from gateway.calibration.line import Sister
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle, sensor_offset_left
 from gateway.errors import CalibrationFileError, LineError, UntrustedFileError
 from gateway.files.signed import Read
 from gateway.toml_file import describe_faults
+
+if TYPE_CHECKING:
+    from gateway.calibration.line import Sister
 
 Content = dict[str, Any]
 FIRST_VERSION: Final = 1
@@ -81,8 +83,10 @@ class CalibrationFile(Part):
             cross_spectrum=self.cross_spectrum.for_core() if self.cross_spectrum else None,
         )
 
-    def sister(self) -> Sister:
+    def sister(self) -> "Sister":
         """What it tells of other vehicles of its line. Raises LineError where it holds no half-car."""
+        from gateway.calibration.line import Sister  # noqa: PLC0415 # a service reads, and loads nothing that fits
+
         if self.cross_spectrum is None:
             raise LineError(
                 f"{self.vehicle.name} ({self.id}): holds no cross_spectrum calibration, of which alone a line is made: "
@@ -127,7 +131,7 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
         held = CalibrationFile.model_validate({key: part for key, part in current.items() if key != "id"})
         held.for_core()  # a term or a model of another springscale is told here, with the file's name
         if held.line is not None:
-            held.line.for_core()
+            held.line.require_known()
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
     except ValidationError as fault:

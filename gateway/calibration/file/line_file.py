@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from pydantic import Field, ValidationError
 
@@ -16,10 +16,12 @@ from gateway.calibration.file.calibration_file import (
 )
 from gateway.calibration.file.line_part import LinePart
 from gateway.calibration.file.parts import ExpectedErrorsPart, Part
-from gateway.calibration.line import Line, line_of
 from gateway.errors import CalibrationFileError, LineError
 from gateway.files.signed import Read
 from gateway.toml_file import describe_faults
+
+if TYPE_CHECKING:
+    from gateway.calibration.line import Line
 
 LINE_FORMAT: Final = "springscale-line"
 LINE_VERSION: Final = 1
@@ -79,7 +81,7 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
         )
     try:
         held = LineFile.model_validate({key: part for key, part in content.items() if key != "id"})
-        held.line.for_core()
+        held.line.require_known()
     except ValidationError as fault:
         raise CalibrationFileError(describe_faults(path, fault)) from None
     except CalibrationFileError as fault:
@@ -87,11 +89,13 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
     return held
 
 
-def line_of_files(files: Sequence[LikeFile]) -> Line:
+def line_of_files(files: Sequence[LikeFile]) -> "Line":
     """The line that these make together: calibrations of sister vehicles, and at most one line file.
 
     Raises LineError where they make none.
     """
+    from gateway.calibration.line import line_of  # noqa: PLC0415 # a service reads, and loads nothing that fits
+
     lines = [one.line.for_core() for one in files if isinstance(one, LineFile)]
     if len(lines) > 1:
         raise LineError(

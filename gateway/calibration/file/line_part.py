@@ -1,17 +1,19 @@
 """What a calibration inherited from sister vehicles, as the file holds it; a line file holds the same."""
 
 from dataclasses import asdict, astuple
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from gateway.calibration.file.parts import Array, Part, check_shapes
-from gateway.calibration.line import Evidence, Limits, Line, Seen
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, ROLL_PARAMETERS
 from gateway.core.vehicle import Load
 from gateway.errors import CalibrationFileError
 from gateway.records import F64
+
+if TYPE_CHECKING:
+    from gateway.calibration.line import Evidence, Line
 
 
 class EvidencePart(Part):
@@ -30,20 +32,26 @@ class EvidencePart(Part):
         return self
 
     @classmethod
-    def of(cls, evidence: Evidence, names: tuple[str, ...]) -> "EvidencePart":
+    def of(cls, evidence: "Evidence", names: tuple[str, ...]) -> "EvidencePart":
         """Of those ``names`` (n,) of which something is known."""
         told = np.flatnonzero(np.any(evidence.information != 0.0, axis=1))
         held = evidence.information[np.ix_(told, told)]
         return cls(names=tuple(names[i] for i in told), information=held, pull=evidence.pull[told])
 
-    def for_core(self, names: tuple[str, ...]) -> Evidence:
-        """Of all ``names`` (n,). Raises CalibrationFileError for a parameter that this version does not have."""
+    def require_known(self, names: tuple[str, ...]) -> None:
+        """Raises CalibrationFileError for a parameter that this version does not have."""
         unknown = sorted(set(self.names) - set(names))
         if unknown:
             raise CalibrationFileError(
                 f"the line was built with another vehicle model than this springscale has ({', '.join(unknown)}): "
                 "calibrate its vehicles again"
             )
+
+    def for_core(self, names: tuple[str, ...]) -> "Evidence":
+        """Of all ``names`` (n,). Raises as :meth:`require_known` does."""
+        from gateway.calibration.line import Evidence  # noqa: PLC0415 # a service reads, and loads nothing that fits
+
+        self.require_known(names)
         at = [names.index(name) for name in self.names]
         evidence = Evidence.none(len(names))
         evidence.information[np.ix_(at, at)] = self.information
@@ -93,7 +101,7 @@ class LinePart(Part):
     limits: LimitsPart
 
     @classmethod
-    def of(cls, line: Line) -> "LinePart":
+    def of(cls, line: "Line") -> "LinePart":
         """The line as the file holds it."""
         names = PARAMETERS + ROLL_PARAMETERS
         seen = asdict(line.seen) | {"known_loads": tuple(astuple(load) for load in line.seen.known_loads)}
@@ -111,8 +119,16 @@ class LinePart(Part):
             limits=LimitsPart(**asdict(line.limits)),
         )
 
-    def for_core(self) -> Line:
-        """The same in the core's terms. Raises CalibrationFileError where the model has other parameters today."""
+    def require_known(self) -> None:
+        """Raises CalibrationFileError where the model has other parameters today."""
+        self.half_car.require_known(PARAMETERS)
+        if self.roll is not None:
+            self.roll.require_known(ROLL_PARAMETERS)
+
+    def for_core(self) -> "Line":
+        """The same in the core's terms. Raises as :meth:`require_known` does."""
+        from gateway.calibration.line import Limits, Line, Seen  # noqa: PLC0415 # as above
+
         known_loads = tuple(Load(*load) for load in self.seen.known_loads)
         return Line(
             members=self.members,
