@@ -55,6 +55,7 @@ NULL: Final = {
     "spectra": "absent where nothing could be transformed, and where the request says `spectra=false`",
     "diagnostics": "empty where rejected before a fit",
     "epoch": "absent where rejected or provisional; the place is null where no batch told it",
+    "way": "null in what early versions stored, and in an early look; what is unknown in it is null",
     "tare": "absent where rejected, and where no tare is in use",
 }
 """When a field is unknown, by the part of Estimate that it shows. Empty: never."""

@@ -20,12 +20,17 @@ MEANINGS: Final = {
     Signal.ROLL_RATE: "about x, positive **left side up**; tells where the load lies sideways, never refuses a batch",
     Signal.LONGITUDINAL_ACCELERATION: "x forward; inspection names swapped axes with it",
     Signal.WHEEL_SPEED: "stands in for `speed` where that is missing",
-    Signal.IGNITION: "1 while it is on; decoded and counted, nothing uses it yet",
+    Signal.IGNITION: "of the journey; 1 while it is on",
     Signal.AMBIENT_TEMPERATURE: "decoded and counted, nothing uses it yet",
     Signal.AXLE_WEIGHT: "a weight that the vehicle itself reports; decoded and counted, nothing uses it yet",
+    Signal.LATITUDE: "of the journey; WGS 84, north positive",
+    Signal.LONGITUDE: "of the journey; WGS 84, east positive",
+    Signal.ODOMETER: "of the journey; only differences count, so a trip's counter will do",
+    Signal.DOOR: "of the journey; above 0 while any door of the load room is open",
 }
 SI_UNITS: Final = {
-    "acceleration": "m/s²", "angular_rate": "rad/s", "speed": "m/s", "mass": "kg", "temperature": "°C", "state": "none"
+    "acceleration": "m/s²", "angular_rate": "rad/s", "speed": "m/s", "angle": "°",
+    "distance": "m", "mass": "kg", "temperature": "°C", "state": "none"
 }  # fmt: skip
 
 INTRODUCTION = """\
@@ -111,6 +116,11 @@ one in `springscale.toml` ([settings](settings.md)).
 
 **roll_rate.** Without it a sensor beside the centre line takes roll for heave, and nothing tells where a load lies
 sideways. Where it fails (silent, stuck, saturated, too slow) a batch counts as if it were not mapped.
+
+**Of the journey.** `latitude`, `longitude`, `odometer`, `ignition` and `door` say where the vehicle is, how far it
+came, and when somebody may have been at the load. All are optional. They weigh nothing: with or without them every
+batch is the same, bit for bit, and a frame that carries nothing else keeps no drive alive. Positions stay degrees, as
+WGS 84 and VSS have them. They are not kept unless the settings ask for it ([settings](settings.md), `[position]`).
 
 **latency_s.** Samples are moved back by it, so that a late speed stands beside the motion it belongs to.
 

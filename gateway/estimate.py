@@ -118,6 +118,65 @@ PLACES: Final = tuple(place.name for place in fields(Weights))
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """Where, in degrees of WGS 84, rounded as the settings say; NaN where nobody knows or nobody may know."""
+
+    latitude_deg: float = math.nan
+    longitude_deg: float = math.nan
+
+    @property
+    def is_known(self) -> bool:
+        return math.isfinite(self.latitude_deg) and math.isfinite(self.longitude_deg)
+
+
+NOWHERE: Final = Place()
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What door and ignition did meanwhile: None where neither was heard of."""
+
+    door_opened: bool | None = None
+    ignition_off: bool | None = None
+
+    def joined(self, other: "Watched") -> "Watched":
+        """Over both times."""
+        return Watched(_either(self.door_opened, other.door_opened), _either(self.ignition_off, other.ignition_off))
+
+
+UNWATCHED: Final = Watched()
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A standstill within a batch, from and to; it may go on in the next one."""
+
+    t_start_ns: int
+    t_end_ns: int
+    watched: Watched = UNWATCHED
+    place: Place = NOWHERE
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """The way of one batch. ``distance_m`` is of the ``known_s`` in which the speed was known.
+
+    Odometer readings are the first and the last within the batch. ``before`` is what was seen between the drive before
+    and this one, in the first batch of a drive alone.
+    """
+
+    distance_m: float = math.nan
+    known_s: float = 0.0
+    moving_s: float = 0.0
+    odometer_start_m: float = math.nan
+    odometer_end_m: float = math.nan
+    start: Place = NOWHERE
+    end: Place = NOWHERE
+    stops: tuple[Stop, ...] = ()
+    before: Watched = UNWATCHED
+
+
+@dataclass(frozen=True, slots=True)
 class Estimate:
     """What a batch taught: payload (kg) and front share (%), or why nothing. Unknown is NaN (null in JSON).
 
@@ -156,6 +215,7 @@ class Estimate:
     payload_cg_left_correlation: float = math.nan
     front_share_cg_left_correlation: float = math.nan
     weights: Weights = Weights()
+    way: Way | None = None  # None before there were ways, and for an early look
 
     @property
     def counted(self) -> bool:
@@ -186,3 +246,9 @@ class Estimate:
         parts += (self.calibration_id, *((self.tare.tare_id,) if self.tare else ()))
         digest = hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()
         return f"{self.t_end_ns}-{digest[:12]}"
+
+
+def _either(one: bool | None, other: bool | None) -> bool | None:
+    if one is None or other is None:
+        return one if other is None else other
+    return one or other

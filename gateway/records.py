@@ -41,6 +41,14 @@ class Signal(StrEnum):
     IGNITION = "ignition"
     AMBIENT_TEMPERATURE = "ambient_temperature"
     AXLE_WEIGHT = "axle_weight"
+    LATITUDE = "latitude"
+    LONGITUDE = "longitude"
+    ODOMETER = "odometer"
+    DOOR = "door"
+
+
+JOURNEY: Final = frozenset({Signal.IGNITION, Signal.LATITUDE, Signal.LONGITUDE, Signal.ODOMETER, Signal.DOOR})
+"""Signals of where the vehicle is and what is done with it: they weigh nothing, and no batch hangs on them."""
 
 
 class Why(StrEnum):
@@ -98,13 +106,15 @@ class Motion:
     """Decoded samples in order of arrival: one row a frame, one column a signal, NaN where it says nothing.
 
     t_ns (n,); columns (n, len(signals)) in SI and vehicle axes (ISO 8855), gravity still in. counters: the
-    message counter (n,) of the frames that carry a signal, where the signal map names one.
+    message counter (n,) of the frames that carry a signal, where the signal map names one. aside (n,): rows of messages
+    that carry nothing but a journey's signals; None where there is no such message.
     """
 
     signals: tuple[Signal, ...]
     t_ns: I64
     columns: F64
     counters: Mapping[Signal, F64] = field(default_factory=dict)
+    aside: Bool | None = None
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -128,7 +138,13 @@ class Motion:
     def rows(self, chosen: Bool | slice) -> "Motion":
         """The chosen rows, in the order they have."""
         counters = {signal: counter[chosen] for signal, counter in self.counters.items()}
-        return Motion(self.signals, self.t_ns[chosen], self.columns[chosen], counters)
+        aside = None if self.aside is None else self.aside[chosen]
+        return Motion(self.signals, self.t_ns[chosen], self.columns[chosen], counters, aside)
+
+    @property
+    def weighing(self) -> "Motion":
+        """Without the rows aside: what there would be if the map named no message of theirs."""
+        return self if self.aside is None else self.rows(~self.aside)
 
     def part(self, begin: int, end: int) -> "Motion":
         """Rows begin to end (exclusive)."""
@@ -143,6 +159,7 @@ def joined(parts: Sequence[Motion]) -> Motion:
         np.concatenate([part.t_ns for part in parts]),
         np.concatenate([part.columns for part in parts]),
         {signal: np.concatenate([part.counters[signal] for part in parts]) for signal in first.counters},
+        None if first.aside is None else np.concatenate([part.aside for part in parts if part.aside is not None]),
     )
 
 

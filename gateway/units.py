@@ -34,6 +34,8 @@ TO_SI: Final[dict[str, dict[str, float]]] = {
         "kn": 1852.0 / 3600.0,
         "knots": 1852.0 / 3600.0,
     },
+    "angle": {"deg": 1.0, "°": 1.0, "degree": 1.0, "degrees": 1.0, "rad": 180.0 / math.pi},
+    "distance": {"m": 1.0, "km": 1000.0, "mi": 1609.344},
     "mass": {"kg": 1.0, "t": 1000.0},
     "temperature": {"degc": 1.0, "°c": 1.0, "deg c": 1.0, "c": 1.0},
     "state": {"": 1.0, "1": 1.0, "bit": 1.0},
@@ -43,8 +45,9 @@ TO_SI: Final[dict[str, dict[str, float]]] = {
 def si_factor(quantity: str, unit: str | None) -> float:
     """Factor that turns a number in ``unit`` into the SI unit of ``quantity``.
 
-    ``quantity`` is one of acceleration (m/s2), angular_rate (rad/s), speed (m/s), mass (kg),
-    temperature (degC) or state (1). Raises SignalMapError for a unit that is missing or unknown.
+    ``quantity`` is one of acceleration (m/s2), angular_rate (rad/s), speed (m/s), angle (a position's, in degrees as
+    WGS 84 and VSS have it), distance (m), mass (kg), temperature (degC) or state (1). Raises SignalMapError for a unit
+    that is missing or unknown.
     """
     known = TO_SI[quantity]
     key = (unit or "").strip().lower()

@@ -53,7 +53,7 @@ PROVENANCE: Final[Mapping[str, str]] = {
 """Columns that no estimate has; `calibration_id` and `tare_id` are among the estimate's own."""
 
 OVER_LIMIT: Final = "over_limit"
-_LEFT_OUT: Final = frozenset({"spectra", "provisional"})  # large; and never true of a whole batch
+_LEFT_OUT: Final = frozenset({"spectra", "provisional", "way"})  # large; never true of a whole batch; of many parts
 
 
 def columns() -> dict[str, str]:

@@ -22,6 +22,7 @@ _COMMANDS = {
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",
     "estimate": "Weigh from log files, one line per batch.",
     "evaluate": "Compare estimates with known loads: the error table.",
+    "events": "What was loaded and unloaded where and when, and the trips between, from log files.",
     "fleet-report": "What a fleet's data set tells of each vehicle, as pages.",
     "line": "Build the line of several vehicles, so that the next one is calibrated by an empty drive.",
     "look": "What an unknown log holds, and a first signal map from it.",
@@ -35,6 +36,7 @@ _COMMANDS = {
     "verification": "Known loads held against what a running service weighed, as dated records.",
 }  # each in the module of its name, or a room of ours
 _ROOMS = {"fleet-report": "fleet", "line": "fleet", "record": "asked", "verification": "asked", "commission": "asked"}
+_ROOMS |= {"events": "logs"}
 
 
 # What a vehicle does without: the extra "workbench", in Debian a package of its own.

@@ -1,5 +1,6 @@
 """springscale estimate: logs to estimates, by the same pipeline as the service."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -44,9 +45,9 @@ def estimate(
     """
     if tare is not None and no_tare:
         raise click.UsageError("give --tare FILE or --no-tare, not both")
-    setup, settings, state = _prepared(config_path, signals, calibration, estimator, window_s)
+    setup, settings, state = prepared(config_path, signals, calibration, estimator, window_s)
     if not no_tare:
-        setup = _tared(setup, tare, state)
+        setup = tared_by(setup, tare, state)
     for log in logs:
         for weighed in estimates_of_logs([log], setup, settings, on_read=_tell):
             record = estimate_to_json(weighed)
@@ -62,7 +63,7 @@ def _tell(report: LogReport) -> None:
         click.echo(remark, err=True)
 
 
-def _prepared(
+def prepared(
     config_path: Path | None,
     signals: str | None,
     calibration: Path | None,
@@ -76,14 +77,14 @@ def _prepared(
         configured = load_settings(config_path)
         if calibration is not None:
             configured = configured.model_copy(update={"calibration": calibration})
-        batch = configured.batch.for_core(window_s=window_s)
+        batch = replace(configured.batch.for_core(window_s=window_s), position_decimals=configured.position.decimals)
         return setup_of(configured, estimator), batch, configured.store.directory
     if signals is None:
         raise click.UsageError("give --config FILE, or --signals FILE (and --calibration FILE)")
     return load_setup(signals, calibration, estimator), batch_settings(window_s), None
 
 
-def _tared(setup: Setup, named: Path | None, state: Path | None) -> Setup:
+def tared_by(setup: Setup, named: Path | None, state: Path | None) -> Setup:
     """With the tare of a file that was named, which must have one for this calibration; else with the service's."""
     if named is None:
         return setup if state is None else setup.with_tare_of(state / FILE_NAME)

@@ -9,7 +9,14 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
-from gateway.config.sections import CommissioningSection, KeepSection, RecordSection, Section, VerificationSection
+from gateway.config.sections import (
+    CommissioningSection,
+    KeepSection,
+    PositionSection,
+    RecordSection,
+    Section,
+    VerificationSection,
+)
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.files.signed import PublicKey, Trust, load_public_keys
@@ -202,6 +209,7 @@ class Settings(BaseSettings):
     record: RecordSection = RecordSection()
     verification: VerificationSection = VerificationSection()
     commissioning: CommissioningSection = CommissioningSection()
+    position: PositionSection = PositionSection()
     uplink: UplinkSection = UplinkSection()
     trust: TrustSection = TrustSection()
     log: LogSection = LogSection()

@@ -62,3 +62,12 @@ class CommissioningSection(Section):
         False,
         description="where [trust] asks for signatures: use what was calibrated here, which nobody signs, all the same",
     )
+
+
+class PositionSection(Section):
+    """What is kept of where the vehicle was, and whether that may leave the box."""
+
+    decimals: int | None = Field(
+        None, ge=0, le=7, description="decimals of a degree kept: 2 is about 1 km, 4 about 10 m [default: none is kept]"
+    )
+    forward: bool = Field(False, description="forward kept positions to the broker of [uplink] too")

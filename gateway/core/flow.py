@@ -84,6 +84,7 @@ class Flow:
         if batch.is_provisional:
             self._is_epoch_over |= batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
             return self._shown(found)
+        found = replace(found, way=self.scheduler.way_of_last)
         shown = self._shown(replace(found, epoch=self._fused(batch, found)))
         self.weighed = remembered(self.weighed, self._epoch, shown, batch.drive_start_ns)
         self._is_epoch_over = self._epoch is None

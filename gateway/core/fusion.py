@@ -95,13 +95,16 @@ def fused(epoch: LoadEpoch | None, estimate: Estimate, could_have_changed: bool 
     where a batch tells it.
     """
     kept = None if could_have_changed else epoch
-    if not _teaches(estimate):
+    if not teaches(estimate):
         return kept
-    payload = _found(estimate, estimate.payload, PAYLOAD_OWN_STD_KG)
-    share = _found(estimate, estimate.front_share, FRONT_SHARE_OWN_STD_PCT)
-    cg_left = _found(estimate, estimate.cg_left, CG_LEFT_OWN_STD_M) if _is_told(estimate.cg_left) else None
+    payload = found_of(estimate, estimate.payload, PAYLOAD_OWN_STD_KG)
+    share = found_of(estimate, estimate.front_share, FRONT_SHARE_OWN_STD_PCT)
+    cg_left = found_of(estimate, estimate.cg_left, CG_LEFT_OWN_STD_M) if is_told(estimate.cg_left) else None
     begun = LoadEpoch(
-        estimate.t_start_ns, _begun(payload), _begun(share), cg_left_m=None if cg_left is None else _begun(cg_left)
+        estimate.t_start_ns,
+        begun_of(payload),
+        begun_of(share),
+        cg_left_m=None if cg_left is None else begun_of(cg_left),
     )
     if kept is None:
         return begun
@@ -117,18 +120,20 @@ def fused(epoch: LoadEpoch | None, estimate: Estimate, could_have_changed: bool 
 
 def _joined(before: Fused | None, found: Found | None) -> Fused | None:
     if before is None or found is None:
-        return before if found is None else _begun(found)
+        return before if found is None else begun_of(found)
     return before.joined(found)
 
 
-def _found(estimate: Estimate, quantity: Quantity, own_name: str) -> Found:
+def found_of(estimate: Estimate, quantity: Quantity, own_name: str) -> Found:
+    """One quantity of an estimate, its variance split; ``own_name`` is that of the diagnostic which tells its own."""
     var = quantity.std**2
     own_var = estimate.diagnostics.get(own_name, math.sqrt(0.5 * var)) ** 2
     own_var = min(max(own_var, LEAST_OWN_VARIANCE * var), var)
     return Found(quantity.number, own_var, var - own_var)
 
 
-def _begun(found: Found) -> Fused:
+def begun_of(found: Found) -> Fused:
+    """The mean of one."""
     return Fused(found.number, 1.0 / found.own_var, found.shared_var, 1)
 
 
@@ -140,10 +145,12 @@ def summary(epoch: LoadEpoch | None) -> Epoch | None:
     return Epoch(epoch.payload_kg.quantity, epoch.front_share_pct.quantity, epoch.payload_kg.n, cg_left)
 
 
-def _teaches(estimate: Estimate) -> bool:
+def teaches(estimate: Estimate) -> bool:
+    """Whether a load can be learnt from it: a whole batch that tells payload and front share."""
     is_whole = estimate.counted and not estimate.is_provisional
-    return is_whole and _is_told(estimate.payload) and _is_told(estimate.front_share)
+    return is_whole and is_told(estimate.payload) and is_told(estimate.front_share)
 
 
-def _is_told(quantity: Quantity) -> bool:
+def is_told(quantity: Quantity) -> bool:
+    """Number and standard deviation are there."""
     return math.isfinite(quantity.number) and math.isfinite(quantity.std) and quantity.std > 0.0

@@ -9,8 +9,10 @@ from collections.abc import Generator, Iterator
 import numpy as np
 
 from gateway.core.batch import Traits, Window, build_batch
+from gateway.core.journey import watched_all, way_of
 from gateway.core.settings import BatchSettings
-from gateway.records import I64, Batch, Bool, Motion, Signal, Why, joined
+from gateway.estimate import UNWATCHED, Watched, Way
+from gateway.records import I64, JOURNEY, Batch, Bool, Motion, Signal, Why, joined
 from gateway.units import NS_PER_S
 
 _NEVER_NS = int(np.iinfo(np.int64).max)  # later than any stamp
@@ -28,7 +30,8 @@ class Scheduler:
     without a row, a step back of the clock, or when its stamps stand all but still: a window holds no
     more rows than a bus can carry in its time. Windows follow one another from its first row. After
     a standstill the next drive begins when the vehicle moves again. Rows that come later than their
-    window are counted in ``n_late_rows``. A row of nothing but a roll rate is kept, and decides nothing.
+    window are counted in ``n_late_rows``. A row of nothing but a roll rate is kept, and decides nothing; so are rows
+    aside, as many of them as of the others at most.
     """
 
     def __init__(self, settings: BatchSettings, traits: Traits) -> None:
@@ -36,16 +39,19 @@ class Scheduler:
         self._traits = traits
         self._rows: list[Motion] = []
         self._loose: list[Motion] = []
-        self._n_rows = 0
+        self._n_rows = self._n_aside = 0
         self._most_rows = min(_MOST_ROWS, round(settings.window_s * _MOST_ROWS_PER_S))
         self._drive_start_ns = 0
         self._window_start_ns = 0
         self._provisional_ns = 0
         self._newest_ns: int | None = None  # None between drives
         self._still_since_ns: int = _MOVING
+        self._between: Watched = UNWATCHED  # what was seen since the last drive ended
+        self._before: Watched = UNWATCHED  # and before the first window that is open now
         self.is_parked = False
         self.n_late_rows = 0
         self._rows_of_last: Motion | None = None
+        self.way_of_last = Way()  # of the batch yielded last
 
     @property
     def drive_start_ns(self) -> int | None:
@@ -83,7 +89,9 @@ class Scheduler:
         decides = _decides(motion)
         if self._newest_ns is None:
             if not decides[0]:
-                return int(np.argmax(decides)) if decides.any() else len(motion)
+                n = int(np.argmax(decides)) if decides.any() else len(motion)
+                self._between = self._between.joined(watched_all([motion.part(0, n)]))
+                return n
             self._begin_drive(int(motion.t_ns[0]))
         t_ns = self._deciding_times(motion.t_ns, decides)
         n, broken_by = self._next_break(t_ns)
@@ -143,7 +151,7 @@ class Scheduler:
         while begin < len(rows):
             mark_ns = self._next_mark_ns()
             end = int(np.searchsorted(newest_ns, mark_ns, side="left"))
-            end = min(end, begin + self._most_rows - self._n_rows)
+            end = min(end, begin + self._n_that_fit(rows, begin))
             if end > begin:
                 self._keep(rows.part(begin, end))
                 self._newest_ns = int(newest_ns[end - 1])
@@ -151,9 +159,21 @@ class Scheduler:
             if begin < len(rows):
                 yield self._reach(mark_ns) if newest_ns[begin] >= mark_ns else self._overflow()
 
+    def _n_that_fit(self, rows: Motion, begin: int) -> int:
+        """How many rows from ``begin`` on the window can still hold; rows aside do not count."""
+        n_left = self._most_rows - self._n_rows
+        if rows.aside is None:
+            return n_left
+        return int(np.searchsorted(np.cumsum(~rows.aside[begin:]), n_left, side="right"))
+
     def _keep(self, part: Motion) -> None:
-        self.n_late_rows += int(np.count_nonzero(part.t_ns < self._window_start_ns))
-        self._n_rows += len(part)
+        if part.aside is not None:
+            part = part.rows(~part.aside | (np.cumsum(part.aside) <= self._most_rows - self._n_aside))
+        n_aside = 0 if part.aside is None else int(np.count_nonzero(part.aside))
+        is_late = part.t_ns < self._window_start_ns
+        self.n_late_rows += int(np.count_nonzero(is_late if part.aside is None else is_late & ~part.aside))
+        self._n_rows += len(part) - n_aside
+        self._n_aside += n_aside
         self._loose.append(part)
         if len(self._loose) == _LOOSE:
             self._rows.append(joined(self._loose))
@@ -170,6 +190,7 @@ class Scheduler:
             return self._build(mark_ns, is_provisional=True)
         batch = self._build(mark_ns)
         self._begin_window(mark_ns)
+        self._before = UNWATCHED
         return batch
 
     def _overflow(self) -> Batch:
@@ -177,16 +198,18 @@ class Scheduler:
         t_end_ns = max(self._newest_ns or 0, self._window_start_ns + 1)
         batch = self._build(t_end_ns, Why.TIME_STAMPS)
         self._begin_window(t_end_ns)
+        self._before = UNWATCHED
         return batch
 
     def _begin_drive(self, t_ns: int) -> None:
         self._drive_start_ns = self._newest_ns = t_ns
         self._still_since_ns = _MOVING
         self._begin_window(t_ns)
+        self._before, self._between = self._between, UNWATCHED
 
     def _begin_window(self, t_ns: int) -> None:
         self._rows = [part.part(0, 0) for part in (*self._rows, *self._loose)[:1]]  # one without rows has signals too
-        self._loose, self._n_rows = [], 0
+        self._loose, self._n_rows, self._n_aside = [], 0, 0
         self._window_start_ns = t_ns
         self._provisional_ns = t_ns + self._ns(self._settings.provisional_every_s)
 
@@ -194,22 +217,26 @@ class Scheduler:
         t_end_ns = min(t_end_ns, self._window_start_ns + self._ns(self._settings.window_s), _NEVER_NS)
         if t_end_ns > self._window_start_ns:
             yield self._build(t_end_ns, ended_by)
-        self._rows, self._loose, self._n_rows = [], [], 0
+        kept = [*self._rows, *self._loose]
+        self._between = watched_all([part.rows(part.t_ns >= t_end_ns) for part in kept])
+        self._rows, self._loose, self._n_rows, self._n_aside = [], [], 0, 0
         self._newest_ns = None
 
     def _skip_until_moving(self, motion: Motion) -> int:
         """How many rows to pass over until the vehicle moves; a moving row wakes the scheduler."""
         moving = np.flatnonzero(self._moving_and_still(motion)[0])
-        if not moving.size:
-            return len(motion)
-        self.is_parked = False
-        return int(moving[0])
+        n = int(moving[0]) if moving.size else len(motion)
+        self._between = self._between.joined(watched_all([motion.part(0, n)]))
+        self.is_parked = not moving.size
+        return n
 
     def _build(self, t_end_ns: int, ended_by: Why | None = None, *, is_provisional: bool = False) -> Batch:
         self._rows, self._loose = [joined([*self._rows, *self._loose])], []
         self._rows_of_last = self._rows[0]
         window = Window(self._window_start_ns, t_end_ns, self._drive_start_ns, ended_by, is_provisional)
-        return build_batch(self._rows[0], window, self._settings, self._traits)
+        batch = build_batch(self._rows[0], window, self._settings, self._traits)
+        self.way_of_last = way_of(self._rows[0], batch, self._settings, self._traits, self._before)
+        return batch
 
     @staticmethod
     def _ns(duration_s: float) -> int:
@@ -217,10 +244,11 @@ class Scheduler:
 
 
 def _decides(rows: Motion) -> Bool:
-    """(n,) False where a row carries nothing but a roll rate: drives and windows do not hang on it."""
+    """(n,) False where a row is aside, or carries nothing but a roll rate: drives and windows do not hang on it."""
+    decides: Bool = np.ones(len(rows), bool) if rows.aside is None else ~rows.aside
     if Signal.ROLL_RATE not in rows.signals:
-        return np.ones(len(rows), bool)
-    known = np.isfinite(rows.columns)
-    has_roll = known[:, rows.signals.index(Signal.ROLL_RATE)]
-    decides: Bool = ~has_roll | (np.count_nonzero(known, axis=1) > 1)
+        return decides
+    known = np.isfinite(rows.columns[:, [signal not in JOURNEY for signal in rows.signals]])
+    has_roll = np.isfinite(rows.columns[:, rows.signals.index(Signal.ROLL_RATE)])
+    decides &= ~has_roll | (np.count_nonzero(known, axis=1) > 1)
     return decides

@@ -23,3 +23,4 @@ class BatchSettings:
     stuck_s: float = 5.0
     speed_frozen_s: float = 60.0
     provisional_every_s: float = 0.0
+    position_decimals: int | None = None  # of a degree; None keeps no position

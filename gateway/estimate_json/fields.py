@@ -22,6 +22,7 @@ from gateway.estimate_json.kinds import (
     Kind,
     weights_to_json,
 )
+from gateway.estimate_json.way import EXAMPLE, WAY
 
 _INTERVAL95: Final = "95 % interval [low, high]"
 
@@ -211,6 +212,7 @@ FIELDS: Final = (
         0.99,
         presence=_LATER,
     ),
+    EstimateField("way", "way", WAY, "how far it went, where it stood, what door and ignition did", EXAMPLE, _LATER),
     EstimateField("vin", "vin", TEXT, "vehicle identification number", presence=_KNOWN),
     EstimateField(
         "provisional",

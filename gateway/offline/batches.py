@@ -12,11 +12,14 @@ from gateway.units import NS_PER_S
 
 
 def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]:
-    """All rows of one log at once, and what the reader met. Raises LogUnreadableError where nothing can be read."""
+    """All rows of one log that weigh, at once, and what the reader met.
+
+    Raises LogUnreadableError where nothing can be read.
+    """
     motions, report, _ = motion_of_log(log, signal_map)
     parts = list(motions)
     report.require_frames()
-    return joined(parts), report
+    return joined(parts).weighing, report
 
 
 @dataclass(frozen=True, slots=True)

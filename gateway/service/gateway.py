@@ -5,7 +5,7 @@ import contextlib
 import logging
 import signal
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 
 from gateway.bus.live import OpenReceiver, around_of
@@ -82,7 +82,7 @@ class Gateway:
         self._restore_board(setup.calibration.id if setup.calibration else None)
         self.source = source_of(settings.bus, setup, open_receiver)
         self.around = around_of(settings.bus.interface, settings.bus.channel, settings.bus.options)
-        flow = setup.flow(settings.batch.for_core(is_live=True))
+        flow = setup.flow(replace(settings.batch.for_core(is_live=True), position_decimals=settings.position.decimals))
         self.keeper = keeper_of(settings.keep, settings.store, setup)
         self.commissioning = commissioning_of(settings, setup, self.keeper, flow, self.store)
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))

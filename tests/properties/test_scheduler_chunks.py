@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.drives import assert_same_batch, drive, joined, later, steady, with_roll, without_rows
+from support.drives import assert_same_batch, drive, joined, later, steady, with_journey, with_roll, without_rows
 
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
@@ -93,6 +93,21 @@ def test_frames_of_a_roll_rate_alone_change_no_other_number(
     for one, other in zip(whole, batches, strict=True):
         assert other.roll_rate_radps is not None
         assert_same_batch(one, replace(other, roll_rate_radps=None))
+
+
+@pytest.mark.parametrize("rolls", [False, True])
+@pytest.mark.parametrize("name", DRIVES)
+@settings(max_examples=3, derandomize=True)
+@given(share_cuts=st.lists(st.floats(0.0, 1.0), max_size=20))
+def test_frames_aside_change_no_batch(name: str, rolls: bool, share_cuts: list[float]) -> None:
+    motion = with_roll(DRIVES[name]) if rolls else DRIVES[name]
+    whole, n_late = batches_of(motion, [], 7.0)
+    journey = with_journey(motion)
+    batches, n_late_beside = batches_of(journey, [round(x * len(journey)) for x in share_cuts], 7.0)
+    assert n_late_beside == n_late
+    assert len(batches) == len(whole)
+    for one, other in zip(whole, batches, strict=True):
+        assert_same_batch(one, other)
 
 
 @pytest.mark.parametrize("name", DRIVES)

@@ -52,6 +52,21 @@ def with_roll(motion: Motion, rate_hz: float = 100.0, seed: int = 5) -> Motion:
     return Motion((*motion.signals, Signal.ROLL_RATE), np.r_[motion.t_ns, t_ns][order], columns[order])
 
 
+def with_journey(motion: Motion, seed: int = 6) -> Motion:
+    """The same rows, and between them frames aside: an odometer and a door, some of them saying nothing."""
+    rng = np.random.default_rng(seed)
+    t_ns = np.arange(motion.t_ns.min() - 2_000_000_000, motion.t_ns.max() + 30_000_000_000, 70_000_000)
+    columns = np.full((len(motion) + len(t_ns), len(motion.signals) + 2), np.nan)
+    columns[: len(motion), :-2] = motion.columns
+    columns[len(motion) :, -2] = (t_ns - t_ns[0]) / 1e8
+    columns[len(motion) :, -1] = np.where(rng.random(len(t_ns)) < 0.3, np.nan, rng.integers(0, 2, len(t_ns)))
+    arrival = np.r_[np.maximum.accumulate(motion.t_ns), t_ns]
+    order = np.argsort(arrival, kind="stable")
+    aside = np.arange(len(arrival)) >= len(motion)
+    signals = (*motion.signals, Signal.ODOMETER, Signal.DOOR)
+    return Motion(signals, np.r_[motion.t_ns, t_ns][order], columns[order], aside=aside[order])
+
+
 def changed(motion: Motion, signal: Signal, from_s: float, to_s: float, to: Callable[[F64], F64]) -> Motion:
     """The samples of one signal between two times, replaced by ``to`` of them."""
     columns = motion.columns.copy()

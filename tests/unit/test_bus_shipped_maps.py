@@ -11,13 +11,18 @@ from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import EXTENDED_ID, Frames, Signal
 
 RAD = math.pi / 180
-A, P, R, V, W, X = (
+A, P, R, V, W, X, LAT, LON, ODO, ON, DOOR = (
     Signal.VERTICAL_ACCELERATION,
     Signal.PITCH_RATE,
     Signal.ROLL_RATE,
     Signal.SPEED,
     Signal.WHEEL_SPEED,
     Signal.LONGITUDINAL_ACCELERATION,
+    Signal.LATITUDE,
+    Signal.LONGITUDE,
+    Signal.ODOMETER,
+    Signal.IGNITION,
+    Signal.DOOR,
 )
 
 
@@ -33,6 +38,15 @@ J1939_FRAMES = [
     (0x18FEE81C | EXTENDED_ID, bits((0, 0xFFFF), (16, 72 * 256), (32, 0xFFFFFFFF)), {V: 20.0}),
     # bytes 2-3: 90 km/h x 256
     (0x0CFEF100 | EXTENDED_ID, bits((0, 0xF3), (8, 90 * 256), (24, 0xFFFFFFFFFF)), {W: 25.0}),
+    # (45.5 + 210) x 1e7 and (-122.25 + 210) x 1e7
+    (0x18FEF3FE | EXTENDED_ID, struct.pack("<II", 2_555_000_000, 877_500_000), {LAT: 45.5, LON: -122.25}),
+    # 5 m a bit; the trip's distance is not available
+    (0x18FEC1FE | EXTENDED_ID, struct.pack("<II", 24_691_357, 0xFFFFFFFF), {ODO: 123_456_785.0}),
+    # bits 1 to 4: 0 at least one open, 1 the last one closing, 2 all closed, 15 not available
+    *(
+        (0x18FE4EFE | EXTENDED_ID, bits((0, raw), (4, 0xF)), told)
+        for raw, told in ((0, {DOOR: 1.0}), (1, {DOOR: 0.5}), (2, {DOOR: 0.0}), (3, {}), (14, {}), (15, {}))
+    ),
 ]
 # -250 deg/s + raw / 128: raw 32256 is 2 deg/s, raw 31360 is -5 deg/s
 J1939_RATES = (0x18F02A45 | EXTENDED_ID, struct.pack("<HHHH", 32256, 31360, 0xFFFF, 0xFFFF))
@@ -42,6 +56,10 @@ FRAMES = {
         (0x120, struct.pack("<hhhBB", -1500, 20, 9810, 7, 1), {A: 9.81, X: -1.5}),
         (0x121, struct.pack("<hhhBB", 10, -400, 30, 7, 1), {P: -2.0 * RAD, R: 0.05 * RAD}),
         (0x130, struct.pack("<HBB", 10_000, 12, 3), {V: 20.0}),
+        (0x131, struct.pack("<ii", 455_000_000, -1_222_500_000), {LAT: 45.5, LON: -122.25}),
+        (0x131, struct.pack("<ii", -(2**31), -(2**31)), {}),  # no fix
+        (0x140, struct.pack("<IBBBB", 123_456_789, 0b0101, 0, 0, 0), {ODO: 123_456_789.0, ON: 1.0, DOOR: 1.0}),
+        (0x140, struct.pack("<IBBBB", 5, 0b1111, 0, 0, 0), {ODO: 5.0}),
     ],
     "canmod_gps": [
         # z: (9.75 + 64) / 0.125 = 590; x rate: (-1.25 + 256) / 0.25 = 1019; y rate: (3.5 + 256) / 0.25 = 1038
@@ -51,6 +69,10 @@ FRAMES = {
             {A: 9.75, P: 3.5 * RAD, R: -1.25 * RAD},
         ),
         (0x007, bits((0, 1), (1, 12_345), (21, 99), length=5), {V: 12.345}),
+        # (45.5 + 90) x 1e6 and (-122.25 + 180) x 1e6
+        (0x003, bits((0, 1), (1, 135_500_000), (29, 57_750_000)), {LAT: 45.5, LON: -122.25}),
+        (0x003, bits((1, 135_500_000), (29, 57_750_000)), {}),
+        (0x006, bits((0, 1), (1, 43_210), (42, 77)), {ODO: 43_210.0}),
     ],
     "j1939": [*(f for f in J1939_FRAMES), (*J1939_RATES, {P: 2.0 * RAD, R: -5.0 * RAD})],
     "j1939_aceinna": [(*J1939_RATES, {P: 5.0 * RAD, R: 2.0 * RAD})],
@@ -67,6 +89,8 @@ FRAMES = {
     "xsens_mti": [
         (0x34, struct.pack(">hhh", 0, 0, 2511), {A: 2511 / 256}),
         (0x32, struct.pack(">hhh", 32, -64, 0), {P: -0.125, R: 0.0625}),
+        # 8.24 and 9.23 bits, fixed point
+        (0x71, struct.pack(">ii", round(45.5 * 2**24), round(-122.25 * 2**23)), {LAT: 45.5, LON: -122.25}),
     ],
 }  # fmt: skip
 

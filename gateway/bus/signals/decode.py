@@ -11,7 +11,7 @@ import numpy as np
 
 from gateway.bus.signals.mapping import IdFilter, MappedMessage, SignalMap
 from gateway.bus.signals.samples import Rejected, SampleReader
-from gateway.records import F64, I64, Frames, Motion, Signal
+from gateway.records import F64, I64, JOURNEY, Frames, Motion, Signal
 
 __all__ = ["Decoder", "Rejected", "SignalCounts"]
 
@@ -30,6 +30,7 @@ class Decoder:
     def __init__(self, signal_map: SignalMap) -> None:
         self.signals = signal_map.signals
         self._messages = [_MessageReader(message, self.signals) for message in signal_map.messages]
+        self._is_aside = np.array([message.is_aside for message in self._messages])
         self._counted = tuple(s for s in self.signals if signal_map.traits[s].counter_modulus)
 
     @property
@@ -54,7 +55,8 @@ class Decoder:
             if len(ours):
                 message.fill(columns, ours, frames, rows[ours])
                 message.count(counters, ours, frames, rows[ours])
-        return Motion(self.signals, frames.t_ns[rows], columns, counters)
+        aside = self._is_aside[message_of] if self._is_aside.any() else None
+        return Motion(self.signals, frames.t_ns[rows], columns, counters, aside)
 
 
 class _MessageReader:
@@ -62,6 +64,7 @@ class _MessageReader:
 
     def __init__(self, message: MappedMessage, signals: tuple[Signal, ...]) -> None:
         self.id_filter: IdFilter = message.id_filter
+        self.is_aside = all(m.signal in JOURNEY for m in message.signals)
         self._length = message.length
         self._readers = [(m.signal, signals.index(m.signal), SampleReader(m)) for m in message.signals]
         self._counters = {m.signal: m.counter for m in message.signals if m.counter is not None}

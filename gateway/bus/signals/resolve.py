@@ -21,6 +21,10 @@ QUANTITIES: Final[Mapping[Signal, str]] = {
     Signal.IGNITION: "state",
     Signal.AMBIENT_TEMPERATURE: "temperature",
     Signal.AXLE_WEIGHT: "mass",
+    Signal.LATITUDE: "angle",
+    Signal.LONGITUDE: "angle",
+    Signal.ODOMETER: "distance",
+    Signal.DOOR: "state",
 }
 LONGEST_BYTES = 64  # of a CAN FD frame
 FEWEST_COUNTER_BITS: Final = 2

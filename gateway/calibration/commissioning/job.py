@@ -30,7 +30,7 @@ class Job(_Table):
 
     vehicle: VehicleTable
     drives: tuple[Drive, ...] = Field(min_length=1)
-    settings: dict[str, float]
+    settings: dict[str, Any]
     like: tuple[Path, ...] = ()
     is_fit: bool = True
     is_planned: bool = Field(False, description="after the fit, tell which load would help most")

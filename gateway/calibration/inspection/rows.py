@@ -14,7 +14,7 @@ from gateway.calibration.inspection.kinds import Kind
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE, Traits
 from gateway.core.settings import BatchSettings
 from gateway.core.timeline import sample_rate_hz
-from gateway.records import Motion, SensorTraits, Signal
+from gateway.records import JOURNEY, Motion, SensorTraits, Signal
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 
 INERTIAL: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
@@ -50,7 +50,7 @@ class Stream:
 
 @dataclass(frozen=True, slots=True)
 class RowFacts:
-    """What one drive's rows say; ``streams`` has every mapped signal."""
+    """What one drive's rows say; ``streams`` has every mapped signal that weighs."""
 
     duration_s: float = 0.0
     streams: Mapping[Signal, Stream] = field(default_factory=dict)
@@ -61,9 +61,17 @@ class RowFacts:
 
 
 def row_facts(motion: Motion, traits: Traits) -> RowFacts:
-    """Facts of the rows in any order; low, middle and high of a stream are its 5, 50 and 95 % quantiles."""
+    """Facts of the rows in any order; low, middle and high of a stream are its 5, 50 and 95 % quantiles.
+
+    A journey's signals are left out: nothing is asked of them here, and where a vehicle was is nobody's business.
+    """
+    motion = motion.weighing
     duration_s = float(np.ptp(motion.t_ns)) / NS_PER_S if len(motion) else 0.0
-    streams = {signal: _stream(motion, signal, traits.get(signal, SensorTraits())) for signal in motion.signals}
+    streams = {
+        signal: _stream(motion, signal, traits.get(signal, SensorTraits()))
+        for signal in motion.signals
+        if signal not in JOURNEY
+    }
     return RowFacts(duration_s, streams)
 
 

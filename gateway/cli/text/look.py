@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from gateway.offline.look import Described, Fit, Heard, Look
-from gateway.records import EXTENDED_ID, Signal
+from gateway.records import EXTENDED_ID, JOURNEY, Signal
 
 MOST_UNKNOWN = 12  # lines of identifiers that nothing describes
 MOST_FITS = 4
@@ -60,7 +60,8 @@ def _readings(seen: Look) -> Iterator[str]:
         yield f"  the sensor leans by {seen.tilt_deg:.0f} degrees"
     for found in seen.found:
         if found.reading.quantity != "acceleration":
-            yield f"{_words(found.role)}: {found.reading.name}, sign {found.sign:+d}: {found.why}"
+            sign = "" if found.role in JOURNEY else f", sign {found.sign:+d}"
+            yield f"{_words(found.role)}: {found.reading.name}{sign}: {found.why}"
 
 
 def _words(role: Signal) -> str:

@@ -12,7 +12,7 @@ from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.offline.look.look import Look
 from gateway.offline.look.readings import Described
 from gateway.offline.look.roles import Found
-from gateway.records import I64, Signal
+from gateway.records import I64, JOURNEY, Signal
 
 MOSTLY: Final = 0.5
 COUNTED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)  # timed by the message counter
@@ -78,7 +78,7 @@ def _entry(found: Found) -> Iterator[str]:
     yield f"signal = {_toml(signal.name)}"
     if found.role in (Signal.SPEED, Signal.WHEEL_SPEED):
         yield "latency_s = 0.0 # CHECK: how late the receiver tells it; 0.2 is usual where it sends five times a second"
-    else:
+    elif found.role not in JOURNEY:
         yield f"sign = {found.sign}"
     condition = _valid_when(found.reading.described, signal)
     if condition is not None:

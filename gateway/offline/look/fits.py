@@ -10,7 +10,7 @@ from gateway.bus.frames import merge_frames
 from gateway.bus.heard import Heard
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map, shipped_map, shipped_maps
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2
-from gateway.records import Signal
+from gateway.records import JOURNEY, Signal
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 NEEDED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
@@ -18,7 +18,7 @@ NEEDED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A shipped map on one channel: which of its signals come, which do not, and what its vertical axis reads."""
+    """A shipped map on one channel: which signals come, which that weigh do not, what its vertical axis reads."""
 
     name: str
     device: str
@@ -49,7 +49,7 @@ def _fits(name: str, heard: Sequence[Heard]) -> Iterator[Fit]:
             continue
         motion = Decoder(signal_map).decode(merge_frames([one.frames for one in ours]))
         found = tuple(signal for signal in motion.signals if len(motion.of(signal)[1]))
-        missing = tuple(signal for signal in motion.signals if signal not in found)
+        missing = tuple(signal for signal in motion.signals if signal not in found and signal not in JOURNEY)
         vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
         if found:
             yield Fit(name, device, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan)

@@ -12,6 +12,7 @@ from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
 from gateway.offline.look.fits import Fit, fits_of
 from gateway.offline.look.heard import heard_in
+from gateway.offline.look.journey import journey_of
 from gateway.offline.look.readings import Described, Reading, databases_of, described, readings_of
 from gateway.offline.look.roles import Found, roles_of, tilt_deg
 from gateway.records import Signal
@@ -71,7 +72,8 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
     messages = (*by_own, *described(others, shipped))
     origin_ns = min(int(one.frames.t_ns.min()) for one in heard)
     readings = tuple(reading for one in messages for reading in readings_of(one, origin_ns))
-    found = roles_of([r for r in readings if r.described in by_own] or readings)
+    chosen = [r for r in readings if r.described in by_own] or readings
+    found = (*roles_of(chosen), *journey_of(chosen))
     up = next((each for each in found if each.role is Signal.VERTICAL_ACCELERATION), None)
     tilt = tilt_deg(readings, up) if up else float("nan")
     fits = fits_of(heard)

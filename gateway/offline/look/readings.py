@@ -15,7 +15,7 @@ from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID, F64
 from gateway.units import NS_PER_S, TO_SI
 
-QUANTITIES: Final = ("acceleration", "angular_rate", "speed")
+QUANTITIES: Final = ("acceleration", "angular_rate", "speed", "angle", "distance")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def _is_same_group(message: DatabaseMessage, heard: Heard) -> bool:
 
 
 def readings_of(found: Described, origin_ns: int) -> Iterator[Reading]:
-    """Its accelerations, angular rates and speeds, as the database's units tell, from frames of its length."""
+    """What its units say is a quantity of ours, from frames of its length."""
     frames = found.heard.frames
     frames = take(frames, frames.length == found.message.length)
     t_s = (frames.t_ns - origin_ns) / NS_PER_S

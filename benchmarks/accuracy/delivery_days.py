@@ -1,0 +1,134 @@
+"""Delivery days of simulated vans: what is loaded and unloaded at each of eight stops, and what the gateway told.
+
+A van of the coverage study is calibrated on six known loads, and is a little another one on its delivery day (worn,
+warm, other tyres). It leaves empty, is loaded at the first stop, then parcels go off, once one comes aboard, and at
+two stops nothing happens. Legs last a little over one window, some over two; the bus sleeps while the van stands.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from benchmarks.accuracy.coverage_drives import MAP_NAME, Scope
+from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, scattered
+from benchmarks.accuracy.vans import fresh_van
+from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
+from gateway.calibration.judgement.learning_curve import calibrated_on
+from gateway.core.flow import Flow, Identity
+from gateway.core.settings import BatchSettings
+from gateway.estimate_json import estimate_to_json
+from gateway.sim.drive import Drive, rural, urban
+from gateway.sim.obstacles import ObstacleRoad, UnevenRoad
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import START_NS, simulate_drive
+from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg
+from gateway.units import NS_PER_S
+from gateway.workbench.wiring import Wiring
+
+ESTIMATOR: Final = "cross_spectrum"
+N_STOPS: Final = 8
+IDLE_STOPS: Final = (3, 6)  # numbers from 0: a break, and nobody at home
+PICK_UP_STOP: Final = 5
+LONG_LEGS: Final = (1, 4, 7)
+LEG_S: Final = (345.0, 655.0)  # short and long
+URBAN_LONGER: Final = 1.35  # stop and go: a window wants that much
+STOP_S: Final = 600.0
+ROAD: Final = ObstacleRoad(UnevenRoad(iso_road("B"), stretch_m=400.0, spread=0.4), potholes_per_km=1.0)
+PARCEL_PARTS: Final = (0.08, 0.22)  # of the rated payload
+N_PARCELS: Final = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Day:
+    """What was aboard on each leg, kg, the share it made, %, and the JSON objects of all estimates of that day."""
+
+    van: str
+    rated_kg: float
+    payload_kg: tuple[float, ...]
+    front_share_pct: tuple[float, ...]
+    distance_m: tuple[float, ...]
+    leg_start_ns: tuple[int, ...]
+    records: tuple[dict[str, Any], ...]
+
+
+def day_of(seed: int, number: int) -> Day:
+    """The ``number``-th day of a study with this seed; it does not depend on the others."""
+    fresh = fresh_van(Scope(), seed, number)
+    calibrated = calibrated_on(fresh.runs, fresh.vehicle, ESTIMATOR)
+    plan_seed, day_seed, *leg_seeds = np.random.SeedSequence([seed, number, 1]).spawn(3 + N_STOPS)
+    today = scattered(fresh.van, FROM_DAY_TO_DAY, np.random.default_rng(day_seed))
+    carried = loads_of_legs(today, np.random.default_rng(plan_seed))
+    signal_map = load_signal_map(SHIPPED_PREFIX + MAP_NAME)
+    flow = Flow(BatchSettings(), signal_map.traits, calibrated, ESTIMATOR, Identity(vehicle_id=f"van-{number}"))
+    start_ns, records, starts_ns, distances_m = START_NS + 6 * 3600 * NS_PER_S, [], [], []
+    for i, (loads, leg_seed) in enumerate(zip(carried, leg_seeds, strict=True)):
+        drive = _leg(i, np.random.default_rng(leg_seed))
+        simulated = simulate_drive(
+            today, loads, ROAD, drive, fresh.sensors, int(leg_seed.generate_state(1)[0]), start_ns
+        )
+        motion = Decoder(signal_map).decode(Wiring(MAP_NAME).frames_of(simulated.recording))
+        records += [{**estimate_to_json(estimate), "spectra": None} for estimate in (*flow.feed(motion), *flow.flush())]
+        starts_ns.append(start_ns)
+        distances_m.append(float(drive.travelled_m[-1]))
+        start_ns += round((drive.duration_s + STOP_S) * NS_PER_S)
+    return Day(
+        van=fresh.van.name,
+        rated_kg=fresh.van.rated_payload_kg,
+        payload_kg=tuple(map(payload_kg, carried)),
+        front_share_pct=tuple(front_share_pct(today, loads) for loads in carried),
+        distance_m=tuple(distances_m),
+        leg_start_ns=tuple(starts_ns),
+        records=tuple(records),
+    )
+
+
+def loads_of_legs(van: Vehicle, rng: np.random.Generator) -> list[tuple[Load, ...]]:
+    """What is aboard on each of the nine legs."""
+    parcels = [_parcel(van, rng) for _ in range(N_PARCELS)]
+    aboard: list[Load] = []
+    legs: list[tuple[Load, ...]] = [()]
+    for stop in range(N_STOPS):
+        if stop == 0:
+            aboard = parcels[:-1]
+        elif stop == PICK_UP_STOP:
+            aboard = [*aboard, parcels[-1]]
+        elif stop not in IDLE_STOPS:
+            aboard = aboard[1:]
+        legs.append(tuple(aboard))
+    return legs
+
+
+def kept_day(folder: Path | None, seed: int, number: int) -> Day:
+    """The day as an earlier call left it in ``folder``; else driven, and left there."""
+    path = None if folder is None else folder / f"day-{seed}-{number}.json"
+    if path is not None and path.exists():
+        told = json.loads(path.read_text(encoding="utf-8"))
+        return Day(told["van"], told["rated_kg"], *(tuple(told[name]) for name in list(_names())[2:]))
+    day = day_of(seed, number)
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps({name: getattr(day, name) for name in _names()}), encoding="utf-8")
+    return day
+
+
+def _names() -> Iterator[str]:
+    yield from Day.__dataclass_fields__
+
+
+def _parcel(van: Vehicle, rng: np.random.Generator) -> Load:
+    return Load(
+        float(rng.uniform(*PARCEL_PARTS)) * van.rated_payload_kg,
+        float(rng.uniform(0.25, 1.0)) * van.wheelbase_m,
+        left_m=float(rng.uniform(-0.2, 0.2)),
+    )
+
+
+def _leg(number: int, rng: np.random.Generator) -> Drive:
+    """Town and country in turn, from rest to rest."""
+    is_urban = number % 3 == 2
+    kind = urban if is_urban else rural
+    return kind(LEG_S[number in LONG_LEGS] * (URBAN_LONGER if is_urban else 1.0), rng)

@@ -1,0 +1,1 @@
+"""Commands that tell from recorded logs what a service would have told."""

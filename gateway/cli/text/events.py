@@ -1,0 +1,44 @@
+"""Load events and trips in words."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from gateway.core.events import Entry, EntryKind
+
+SURE = 0.99
+
+
+def entry_sentence(entry: Entry) -> str:
+    """One line a person can read; times are UTC."""
+    return _event(entry.record) if entry.kind is EntryKind.EVENT else _trip(entry.record)
+
+
+def _event(told: Mapping[str, Any]) -> str:
+    change, half = told["change_kg"], _half(told["change_interval95_kg"])
+    what = f"{abs(change):.0f} kg {'loaded' if change >= 0.0 else 'unloaded'} (± {half:.0f} kg)"
+    if told["is_withdrawn"]:
+        what = "withdrawn, nothing was loaded or unloaded after all"
+    sure = "" if told["probability"] >= SURE else f", {told['probability']:.0%} sure"
+    after = told["after"]
+    where = _place(told["place"])
+    return f"{_span(told)}  {what}{sure}; {after['payload_kg']:.0f} kg aboard then{where}"
+
+
+def _trip(told: Mapping[str, Any]) -> str:
+    payload = told["payload_kg"]
+    load = "load unknown" if payload is None else f"{payload:.0f} kg (± {_half(told['payload_interval95_kg']):.0f} kg)"
+    carried = "" if told["carried_tkm"] is None else f", {told['carried_tkm']:.2f} tonne-kilometres"
+    going = "" if told["is_over"] else ", still going"
+    return f"{_span(told)}  drove {told['distance_m'] / 1000.0:.1f} km with {load}{carried}{going}"
+
+
+def _span(told: Mapping[str, Any]) -> str:
+    return f"{told['t_start'][:10]} {told['t_start'][11:16]} to {told['t_end'][11:16]}"
+
+
+def _half(interval: tuple[float, float]) -> float:
+    return (interval[1] - interval[0]) / 2.0
+
+
+def _place(place: Mapping[str, float] | None) -> str:
+    return "" if place is None else f"; at {place['latitude_deg']}, {place['longitude_deg']}"

@@ -1,0 +1,11 @@
+"""Load events and trips: what was loaded or unloaded where and when, and what was carried how far.
+
+Made of estimates alone (their numbers, their times, the way they went), purely: the service, a log and a restart give
+the same. docs/events.md says how well they are found.
+"""
+
+from gateway.core.events.change import Rules
+from gateway.core.events.entry import Entry, EntryKind
+from gateway.core.events.ledger import HORIZON_NS, Ledger
+
+__all__ = ["HORIZON_NS", "Entry", "EntryKind", "Ledger", "Rules"]

@@ -1,0 +1,99 @@
+"""A stretch of estimates as load events and trips: a pure function of the batches, whenever it is asked."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from gateway.core.events.change import Rules, change_of
+from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json, rounded
+from gateway.core.events.halts import Halt, Link, halts_of, links_of
+from gateway.core.events.load import Load, Weighing, weighings_of
+from gateway.core.events.loads import Loads, loads_of, sides_of
+from gateway.estimate import NOWHERE, Estimate, Quantity
+from gateway.estimate_json.way import place_to_json
+from gateway.records import iso_utc
+
+
+@dataclass(frozen=True)
+class Day:
+    """Batches in the order in which they came, and what follows from them."""
+
+    estimates: tuple[Estimate, ...]
+    rules: Rules
+
+    @cached_property
+    def weighings(self) -> list[Weighing]:
+        return weighings_of(self.estimates)
+
+    @cached_property
+    def halts(self) -> list[Halt]:
+        return halts_of(self.estimates)
+
+    @cached_property
+    def links(self) -> list[Link]:
+        return links_of(self.estimates, self.weighings, self.halts)
+
+    @cached_property
+    def found(self) -> Loads:
+        return loads_of(self.weighings, self.links, self.rules)
+
+    @property
+    def zero(self) -> Quantity:
+        """What the newest batch has taken off for its tare; nothing without one."""
+        tare = self.estimates[-1].tare
+        return Quantity(0.0, 0.0) if tare is None else tare.payload
+
+    def payload_of(self, load: Load) -> Quantity:
+        """As it is told: less the zero that is in use now."""
+        measured = load.payload_kg.quantity
+        return Quantity.normal(measured.number - self.zero.number, measured.std).widened(self.zero.std)
+
+    def events(self) -> list[Entry]:
+        """One entry for each link, however unlikely a change there is; without a revision."""
+        found = self.found.probabilities
+        same = [self.weighings[i].by == self.weighings[i + 1].by for i in range(len(found))]
+        return [self._event(i, probability) for i, probability in enumerate(found) if same[i]]
+
+    def _event(self, at: int, probability: float) -> Entry:
+        link, halts = self.links[at], self.links[at].likely
+        before, after = sides_of(self.weighings, self.found.of_weighing, at)
+        begin_ns = halts[0].t_start_ns if halts else link.t_start_ns
+        end_ns = halts[-1].t_end_ns if halts else link.t_end_ns
+        place = halts[0].place if len(halts) == 1 else NOWHERE
+        newest = self.estimates[-1]
+        first = self.estimates[self.weighings[at + 1].at]  # never moves: the id hangs on it
+        record = {
+            "id": entry_id(EntryKind.EVENT, newest.vehicle_id, first.t_start_ns),
+            "revision": 0,
+            "vehicle_id": newest.vehicle_id,
+            "t_start": iso_utc(begin_ns),
+            "t_end": iso_utc(end_ns),
+            **quantity_json(change_of(before, after, self.rules), "change", "kg", 1),
+            "probability": round(probability, 4),
+            "is_withdrawn": False,
+            "place": place_to_json(place),
+            "stops": [_stop_json(halt) for halt in halts],
+            "before": self._load_json(before),
+            "after": self._load_json(after),
+        }
+        return Entry(EntryKind.EVENT, str(record["id"]), end_ns, record)
+
+    def _load_json(self, load: Load) -> dict[str, Any]:
+        share, cg_left = load.front_share_pct.quantity, load.cg_left_m and load.cg_left_m.quantity
+        told: dict[str, Any] = quantity_json(self.payload_of(load), "payload", "kg", 1)
+        told |= {"front_share_pct": rounded(share.number, 2), "front_share_std_pct": rounded(share.std, 2)}
+        told |= {
+            "cg_left_m": cg_left and rounded(cg_left.number, 4),
+            "cg_left_std_m": cg_left and rounded(cg_left.std, 4),
+        }
+        return told | {"n_batches": load.n_batches}
+
+
+def _stop_json(halt: Halt) -> dict[str, Any]:
+    return {
+        "t_start": iso_utc(halt.t_start_ns),
+        "t_end": iso_utc(halt.t_end_ns),
+        "door_opened": halt.watched.door_opened,
+        "ignition_off": halt.watched.ignition_off,
+        "place": place_to_json(halt.place),
+    }

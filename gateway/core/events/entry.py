@@ -1,0 +1,94 @@
+"""A load event or a trip as it is told: one JSON object with an id that stays and a revision that grows."""
+
+import hashlib
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, Final
+
+from gateway.estimate import Quantity
+
+NEWS_STD_SHARE: Final = 0.25  # a number that moves by less of its standard deviation is no news
+NEWS_PROBABILITY: Final = 0.05
+NEWS_SHRINK: Final = 0.1
+
+
+class EntryKind(StrEnum):
+    """What an entry tells of."""
+
+    EVENT = "event"
+    TRIP = "trip"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One event or trip in one revision. ``record`` is its JSON object; ``t_end_ns`` orders and dates it."""
+
+    kind: EntryKind
+    id: str
+    t_end_ns: int
+    record: dict[str, Any]
+
+    @property
+    def revision(self) -> int:
+        revision: int = self.record["revision"]
+        return revision
+
+    def revised(self, revision: int) -> "Entry":
+        return replace(self, record={**self.record, "revision": revision})
+
+
+def entry_id(kind: EntryKind, vehicle_id: str | None, t_ns: int) -> str:
+    """The same for the same vehicle and moment, whenever it is computed."""
+    digest = hashlib.sha256(f"{kind}|{vehicle_id}|{t_ns}".encode()).hexdigest()
+    return f"{kind}-{t_ns}-{digest[:12]}"
+
+
+def is_news(before: Entry, after: Entry) -> bool:
+    """Whether the second says something that the first did not: a quarter of a standard deviation, a twentieth of
+    certainty, a tenth more exactness, or anything that is no number."""
+    return _differs(before.record, after.record)
+
+
+def quantity_json(quantity: Quantity, name: str, unit: str, digits: int) -> dict[str, Any]:
+    """name_unit, its standard deviation and 95 % interval; None where unknown."""
+    low, high = quantity.interval95
+    interval = None if not math.isfinite(low) else [round(low, digits), round(high, digits)]
+    return {
+        f"{name}_{unit}": rounded(quantity.number, digits),
+        f"{name}_std_{unit}": rounded(quantity.std, digits),
+        f"{name}_interval95_{unit}": interval,
+    }
+
+
+def rounded(x: float, digits: int) -> float | None:
+    """Rounded, never -0.0; None where unknown."""
+    return round(x, digits) + 0.0 if math.isfinite(x) else None
+
+
+def _differs(before: Any, after: Any) -> bool:
+    if isinstance(before, dict) and isinstance(after, dict):
+        if before.keys() != after.keys():
+            return True
+        return any(_field_differs(name, before, after) for name in before if name not in _UNTOLD)
+    if isinstance(before, list) and isinstance(after, list):
+        return len(before) != len(after) or any(_differs(*pair) for pair in zip(before, after, strict=True))
+    return bool(before != after)
+
+
+_UNTOLD: Final = frozenset({"revision", "n_batches", "n_weighed"})
+
+
+def _field_differs(name: str, before: dict[str, Any], after: dict[str, Any]) -> bool:
+    one, other = before[name], after[name]
+    if one is None or other is None or "interval95" in name:
+        return (one is None) is not (other is None)
+    if name == "probability":
+        return bool(abs(one - other) > NEWS_PROBABILITY)
+    if "_std_" in name:
+        return bool(abs(one - other) > NEWS_SHRINK * max(one, other))
+    stem, _, unit = name.rpartition("_")
+    std = before.get(f"{stem}_std_{unit}")
+    if isinstance(std, float):
+        return bool(abs(one - other) > NEWS_STD_SHARE * std)
+    return _differs(one, other)

@@ -1,0 +1,177 @@
+"""Trips: each drive as one line, with what was aboard along its way.
+
+    tonne-kilometres = sum over loads of payload x distance,    std = sum of std x distance
+
+Standard deviations of different loads are added as if their errors were one and the same: most of it is.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Final
+
+from gateway.core.events.day import Day
+from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json, rounded
+from gateway.core.events.halts import SLACK_NS, follows
+from gateway.core.events.load import Load
+from gateway.estimate import NOWHERE, Estimate, Quantity, Way
+from gateway.estimate_json.way import place_to_json
+from gateway.records import iso_utc
+from gateway.units import NS_PER_S
+
+EMPTY_SHARE: Final = 0.03  # of the loaded vehicle's mass: less than this aboard is empty
+ODOMETER_WITHIN: Final = 0.2  # of the distance by speed; further off, one of them is not what it seems
+ODOMETER_SLACK_M: Final = 200.0
+LEAST_TRIP_M: Final = 50.0  # less is moving the vehicle in the yard, or noise of a receiver
+KG_M_PER_TONNE_KM: Final = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """A batch of a trip: how far, and with which load (None: unknown), and what was over the limit."""
+
+    distance_m: float
+    load: Load | None
+    is_overloaded: bool | None
+    is_weighed: bool
+
+
+def trips_of(day: Day) -> list[Entry]:
+    """Every drive that went anywhere, in order; without a revision."""
+    loads = _load_of_each(day)
+    trips = (_trip(day, first, last, loads) for first, last in _drives(day.estimates))
+    return [trip for trip in trips if trip is not None]
+
+
+def _drives(estimates: Sequence[Estimate]) -> Iterator[tuple[int, int]]:
+    """First and last batch (inclusive) of each drive."""
+    first = 0
+    for i in range(len(estimates)):
+        if i + 1 == len(estimates) or not follows(estimates[i], estimates[i + 1]):
+            yield first, i
+            first = i + 1
+
+
+def _load_of_each(day: Day) -> list[Load | None]:
+    """What was aboard during each batch: as weighed, or as the weighings around it agree without a long stop."""
+    of_weighing = {weighing.at: load for weighing, load in zip(day.weighings, day.found.of_weighing, strict=True)}
+    whole = day.estimates
+    ahead: list[Load | None] = []
+    for i in range(len(whole)):
+        goes_on = i > 0 and follows(whole[i - 1], whole[i])
+        ahead.append(of_weighing.get(i, ahead[i - 1] if goes_on else None))
+    back: list[Load | None] = [None] * len(whole)
+    for i in reversed(range(len(whole))):
+        goes_on = i + 1 < len(whole) and follows(whole[i], whole[i + 1])
+        back[i] = of_weighing.get(i, back[i + 1] if goes_on else None)
+    around = _around(len(whole), of_weighing)
+    return [one or other or both for one, other, both in zip(ahead, back, around, strict=True)]
+
+
+def _around(n: int, of_weighing: dict[int, Load]) -> list[Load | None]:
+    """The load on both sides, where it is the same one."""
+    found: list[Load | None] = [None] * n
+    known = sorted(of_weighing)
+    for one, other in pairwise(known):
+        if of_weighing[one] is of_weighing[other]:
+            found[one:other] = [of_weighing[one]] * (other - one)
+    return found
+
+
+def _trip(day: Day, first: int, last: int, loads: Sequence[Load | None]) -> Entry | None:
+    batches = day.estimates[first : last + 1]
+    ways = [one.way for one in batches if one.way is not None]
+    by_speed_m = sum(way.distance_m for way in ways if math.isfinite(way.distance_m))
+    if not ways or by_speed_m < LEAST_TRIP_M:
+        return None
+    duration_s = (batches[-1].t_end_ns - batches[0].t_start_ns) / NS_PER_S
+    distance_m, source = _distance(ways, by_speed_m, duration_s)
+    scale = distance_m / by_speed_m
+    pieces = [
+        _Piece(one.way.distance_m * scale, load, _is_overloaded(day, one, load), one.counted)
+        for one, load in zip(batches, loads[first : last + 1], strict=True)
+        if one.way is not None and math.isfinite(one.way.distance_m)
+    ]
+    begin_ns, end_ns = batches[0].t_start_ns, _arrival_ns(batches)
+    moving_s, known_s = sum(way.moving_s for way in ways), sum(way.known_s for way in ways)
+    newest = day.estimates[-1]
+    record: dict[str, Any] = {
+        "id": entry_id(EntryKind.TRIP, newest.vehicle_id, begin_ns),
+        "revision": 0,
+        "vehicle_id": newest.vehicle_id,
+        "t_start": iso_utc(begin_ns),
+        "t_end": iso_utc(end_ns),
+        "is_over": last + 1 < len(day.estimates),
+        "from": place_to_json(ways[0].start),
+        "to": place_to_json(ways[-1].end if ways[-1].end.is_known else NOWHERE),
+        "distance_m": rounded(distance_m, 0),
+        "distance_by": source,
+        "unknown_s": rounded(max(0.0, duration_s - known_s), 1),
+        "moving_s": rounded(moving_s, 1),
+        "mean_speed_mps": rounded(by_speed_m / moving_s, 2) if moving_s > 0.0 else None,
+        **_carried(day, pieces),
+    }
+    return Entry(EntryKind.TRIP, str(record["id"]), end_ns, record)
+
+
+def _distance(ways: Sequence[Way], by_speed_m: float, duration_s: float) -> tuple[float, str]:
+    """By the odometer where it agrees with the speed, or where the speed was not known all along; and by which."""
+    readings = [(way.odometer_start_m, way.odometer_end_m) for way in ways if math.isfinite(way.odometer_start_m)]
+    if len(readings) == len(ways):
+        odometer_m = readings[-1][1] - readings[0][0]
+        unknown = 1.0 - sum(way.known_s for way in ways) / duration_s if duration_s > 0.0 else 0.0
+        tolerance_m = (ODOMETER_WITHIN + max(0.0, unknown)) * odometer_m + ODOMETER_SLACK_M
+        if odometer_m > 0.0 and abs(odometer_m - by_speed_m) <= tolerance_m:
+            return odometer_m, "odometer"
+    return by_speed_m, "speed"
+
+
+def _carried(day: Day, pieces: Sequence[_Piece]) -> dict[str, Any]:
+    """What was carried how far, over the weighed part of the way."""
+    weighed = [(piece.distance_m, piece.load) for piece in pieces if piece.load is not None]
+    weighed_m = sum(distance_m for distance_m, _ in weighed)
+    whole_m = sum(piece.distance_m for piece in pieces)
+    judged = [piece for piece in pieces if piece.is_overloaded is not None]
+    judged_m = sum(piece.distance_m for piece in judged)
+    payload = tonne_km = Quantity()
+    empty = overloaded = math.nan
+    if weighed_m > 0.0:
+        told = [(distance_m, day.payload_of(load)) for distance_m, load in weighed if load is not None]
+        kg_m = sum(distance_m * quantity.number for distance_m, quantity in told)
+        kg_m_std = sum(distance_m * quantity.std for distance_m, quantity in told)
+        payload = Quantity.normal(kg_m / weighed_m, kg_m_std / weighed_m)
+        tonne_km = Quantity.normal(kg_m / KG_M_PER_TONNE_KM, kg_m_std / KG_M_PER_TONNE_KM)
+        empty_kg = EMPTY_SHARE * day.rules.mass_kg
+        empty = sum(distance_m for distance_m, quantity in told if quantity.number < empty_kg) / weighed_m
+    if judged_m > 0.0:
+        overloaded = sum(piece.distance_m for piece in judged if piece.is_overloaded) / judged_m
+    return {
+        **quantity_json(payload, "payload", "kg", 1),
+        **quantity_json(tonne_km, "carried", "tkm", 4),
+        "weighed_share": rounded(weighed_m / whole_m, 3) if whole_m > 0.0 else None,
+        "empty_share": rounded(empty, 3),
+        "overloaded_share": rounded(overloaded, 3),
+        "n_weighed": sum(piece.is_weighed for piece in pieces),
+    }
+
+
+def _is_overloaded(day: Day, batch: Estimate, load: Load | None) -> bool | None:
+    """Whether the load's own mean is above what the vehicle may weigh; None where nobody said a limit."""
+    gross = batch.weights.gross
+    if load is None or gross.limit_kg is None or not gross.is_known:
+        return None
+    return gross.kg - batch.payload.number + day.payload_of(load).number > gross.limit_kg
+
+
+def _arrival_ns(batches: Sequence[Estimate]) -> int:
+    """When it came to its last stand, where that reaches to the end of the drive."""
+    end_ns = arrival_ns = batches[-1].t_end_ns
+    for batch in reversed(batches):
+        stops = batch.way.stops if batch.way else ()
+        if not stops or abs(stops[-1].t_end_ns - arrival_ns) > SLACK_NS:
+            break
+        arrival_ns = stops[-1].t_start_ns
+        if abs(arrival_ns - batch.t_start_ns) > SLACK_NS:
+            break
+    return min(arrival_ns, end_ns)

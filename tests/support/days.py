@@ -1,0 +1,68 @@
+"""Made-up delivery days: estimates without frames, as the flow would give them."""
+
+from dataclasses import replace
+
+from gateway.core.events import Entry, Ledger, Rules
+from gateway.estimate import UNWATCHED, Estimate, Place, Quantity, Stop, Watched, Way, Weight, Weights
+from gateway.records import Why
+from gateway.units import NS_PER_S
+
+T0_NS = 1_790_000_000_000_000_000
+RULES = Rules(range_kg=1000.0, mass_kg=2000.0)
+OWN_KG, SHARED_KG = 8.0, 12.0
+
+
+def at(minutes: float) -> int:
+    return T0_NS + round(minutes * 60 * NS_PER_S)
+
+
+def batch(
+    begin_min: float,
+    end_min: float,
+    kg: float | None,
+    share_pct: float = 50.0,
+    *,
+    stops: tuple[Stop, ...] = (),
+    before: Watched = UNWATCHED,
+    metres: float = 3000.0,
+    place: Place = Place(),  # noqa: B008 - frozen
+) -> Estimate:
+    """A whole batch; kg None: rejected."""
+    way = Way(metres, 60.0 * (end_min - begin_min), 50.0 * (end_min - begin_min), stops=stops, before=before, end=place)
+    bare = Estimate(at(begin_min), at(end_min), "cross_spectrum", "sha256:1", vehicle_id="van", way=way)
+    if kg is None:
+        return replace(bare, rejected=(Why.TOO_SHORT,))
+    gross = Weight(2000.0 + kg, 20.0, 2500.0, None)
+    return replace(
+        bare,
+        payload=Quantity.normal(kg, (OWN_KG**2 + SHARED_KG**2) ** 0.5),
+        front_share=Quantity.normal(share_pct, 0.5),
+        diagnostics={"payload_own_std_kg": OWN_KG, "front_share_own_std_pct": 0.25},
+        weights=Weights(gross=gross),
+    )
+
+
+def day(*kg_of_leg: float | None, batches: int = 1, door: bool | None = None) -> list[Estimate]:
+    """Legs of 5 minutes a batch, a quarter of an hour apart from one end to the next beginning."""
+    found, minute = [], 0.0
+    for i, kg in enumerate(kg_of_leg):
+        for k in range(batches):
+            before = Watched(door, None) if i and not k else UNWATCHED
+            found.append(batch(minute, minute + 5.0, kg, before=before))
+            minute += 5.0
+        minute += 15.0
+    return found
+
+
+def told(estimates: list[Estimate], rules: Rules = RULES) -> dict[str, Entry]:
+    """The last revision of every entry, by id, in order."""
+    ledger = Ledger(rules)
+    return {entry.id: entry for one in estimates for entry in ledger.add(one)}
+
+
+def events(estimates: list[Estimate]) -> list[dict]:
+    return [entry.record for entry in told(estimates).values() if entry.kind == "event"]
+
+
+def trips(estimates: list[Estimate]) -> list[dict]:
+    return [entry.record for entry in told(estimates).values() if entry.kind == "trip"]

@@ -1,0 +1,160 @@
+"""Load events: what a change of weight between stops becomes, how sure it is, and how later batches correct it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.days import OWN_KG, RULES, T0_NS, at, batch, day, events, told
+
+from gateway.core.events import Ledger
+from gateway.core.events.change import probability
+from gateway.core.events.load import load_of, weighings_of
+from gateway.estimate import Correction, Place, Quantity, Stop, Watched
+
+
+def test_a_delivery_is_told_with_its_weight_time_and_both_loads():
+    first, second = day(400.0, 220.0)
+    (found,) = events([first, second])
+    assert found["change_kg"] == pytest.approx(-180.0)
+    low, high = found["change_interval95_kg"]
+    assert low < -180.0 < high
+    assert found["change_std_kg"] >= round(math.sqrt(2) * OWN_KG, 1)
+    assert (found["before"]["payload_kg"], found["after"]["payload_kg"]) == (400.0, 220.0)
+    assert found["t_start"].endswith(":18:20.000000Z") or found["t_start"] < found["t_end"]
+    assert found["probability"] > 0.999
+    assert not found["is_withdrawn"]
+    assert found["revision"] == 1
+
+
+def test_nothing_loaded_is_nothing_told():
+    assert not events(day(300.0, 305.0, 297.0, 300.0, batches=2))
+
+
+def test_the_shared_error_hides_no_change_and_makes_none():
+    loads = [load_of(weighings_of(day(100.0, kg)), i, i) for kg in (100.0, 160.0) for i in (0, 1)]
+    same, other = probability(loads[0], loads[1], 0.5, RULES), probability(loads[2], loads[3], 0.5, RULES)
+    assert same < 0.1
+    assert other > 0.99
+
+
+def test_the_probability_is_bayes_own():
+    """By brute force: the same prior drawn, the same densities averaged."""
+    weighings = weighings_of(day(100.0, 128.0))
+    before, after = load_of(weighings, 0, 0), load_of(weighings, 1, 1)
+    rng = np.random.default_rng(1)
+    d = RULES.spread_kg * rng.standard_normal(2_000_000)
+    x_var, f_var = 2 * OWN_KG**2, 2 * 0.25**2
+    share_var = f_var + (100.0 * 0.3 / RULES.mass_kg * d) ** 2
+    with_change = np.mean(np.exp(-0.5 * (28.0 - d) ** 2 / x_var) / np.sqrt(x_var) / np.sqrt(share_var))
+    without = np.exp(-0.5 * 28.0**2 / x_var) / np.sqrt(x_var) / np.sqrt(f_var)
+    factor = float(with_change / without)
+    assert probability(before, after, 0.5, RULES) == pytest.approx(factor / (1 + factor), abs=0.01)
+
+
+def test_later_batches_sharpen_the_same_event():
+    whole = day(400.0, 330.0, batches=3)
+    ledger = Ledger(RULES)
+    revisions = [entry for one in whole for entry in ledger.add(one) if entry.kind == "event"]
+    assert len({entry.id for entry in revisions}) == 1
+    assert [entry.revision for entry in revisions] == list(range(1, len(revisions) + 1))
+    assert len(revisions) > 1
+    assert revisions[-1].record["change_std_kg"] < revisions[0].record["change_std_kg"]
+
+
+def test_an_event_that_later_batches_contradict_is_withdrawn():
+    one = day(300.0, 300.0, batches=4)
+    high = replace(one[4], payload=Quantity.normal(334.0, 17.0), front_share=Quantity.normal(50.6, 0.5))
+    whole = [*one[:4], high, *one[5:]]
+    ledger = Ledger(RULES)
+    revisions = [entry.record for each in whole for entry in ledger.add(each) if entry.kind == "event"]
+    assert revisions[0]["probability"] > 0.9
+    assert revisions[-1]["is_withdrawn"]
+    assert revisions[-1]["probability"] < 0.5
+    assert revisions[-1]["id"] == revisions[0]["id"]
+
+
+@pytest.mark.parametrize(("door", "is_told"), [(True, True), (None, True), (False, False)])
+def test_a_door_that_stayed_shut_asks_for_more(door, is_told):
+    found = events(day(300.0, 257.0, door=door))
+    assert bool(found) is is_told
+    if found:
+        assert found[0]["stops"][0]["door_opened"] is door
+
+
+def test_two_stops_without_a_weighing_between_are_both_named():
+    whole = day(400.0, None, 220.0)
+    (found,) = events(whole)
+    assert len(found["stops"]) == 2
+    assert found["place"] is None
+    assert found["t_start"] == found["stops"][0]["t_start"]
+    assert found["t_end"] == found["stops"][1]["t_end"]
+
+
+def test_the_open_door_tells_which_of_two_stops():
+    first, middle, last = day(400.0, None, 220.0)
+    middle = replace(middle, way=replace(middle.way, before=Watched(False, None)))
+    last = replace(last, way=replace(last.way, before=Watched(True, None)))
+    (found,) = events([first, middle, last])
+    assert [stop["door_opened"] for stop in found["stops"]] == [True]
+
+
+def test_a_stop_says_where_and_from_when():
+    arrived = Stop(at(4.0), at(5.0), Watched(True, None), Place(47.1, 8.5))
+    first = batch(0.0, 5.0, 400.0, stops=(arrived,))
+    (found,) = events([first, batch(12.0, 17.0, 200.0)])
+    assert found["place"] == {"latitude_deg": 47.1, "longitude_deg": 8.5}
+    assert found["stops"] == [
+        {
+            "t_start": "2026-09-21T14:17:20.000000Z",
+            "t_end": "2026-09-21T14:25:20.000000Z",
+            "door_opened": True,
+            "ignition_off": None,
+            "place": {"latitude_deg": 47.1, "longitude_deg": 8.5},
+        }
+    ]
+    assert T0_NS == 1_790_000_000_000_000_000
+
+
+def test_a_jump_without_a_stop_must_be_plain():
+    rolling = [batch(5.0 * i, 5.0 * i + 5.0, kg) for i, kg in enumerate((300.0, 300.0, 270.0, 270.0))]
+    assert not events(rolling)
+    dropped = [batch(5.0 * i, 5.0 * i + 5.0, kg) for i, kg in enumerate((300.0, 300.0, 100.0, 100.0))]
+    (found,) = events(dropped)
+    assert found["stops"] == []
+
+
+def test_a_tare_is_no_change_of_load():
+    first, second = day(300.0, 300.0)
+    zero = Quantity(60.0, 3.0), Quantity(0.5, 0.05)
+    tare = Correction("t", *zero, raw_payload=second.payload, raw_front_share=second.front_share)
+    tared = replace(second, payload=Quantity.normal(240.0, 17.3), tare=tare)
+    assert not events([first, tared])
+    third = replace(day(300.0, 300.0, 500.0)[2], tare=None)
+    tare = Correction("t", *zero, raw_payload=third.payload, raw_front_share=third.front_share)
+    third = replace(third, payload=Quantity.normal(440.0, 17.3), tare=tare)
+    (found,) = events([first, tared, third])
+    assert found["before"]["payload_kg"] == pytest.approx(240.0)
+    assert found["change_kg"] == pytest.approx(200.0)
+
+
+def test_another_calibration_is_compared_with_none():
+    first, second = day(300.0, 100.0)
+    assert not events([first, replace(second, calibration_id="sha256:2")])
+
+
+def test_a_restart_in_the_middle_goes_on_as_if_it_had_not_been():
+    whole = day(0.0, 500.0, 500.0, 320.0, 200.0, batches=2)
+    straight = told(whole)
+    for cut in range(1, len(whole)):
+        first = told(whole[:cut])
+        ledger = Ledger(RULES, whole[:cut], first.values())
+        assert {**first, **{e.id: e for one in whole[cut:] for e in ledger.add(one)}} == straight
+
+
+def test_what_is_old_stays_as_it_was_told():
+    whole = day(400.0, 300.0, *[300.0] * 120)
+    ledger = Ledger(RULES)
+    revisions = [(one.t_end_ns, e) for one in whole for e in ledger.add(one) if e.kind == "event"]
+    assert len({e.id for _, e in revisions}) == 1
+    assert max(t_ns for t_ns, _ in revisions) - revisions[0][1].t_end_ns < 13 * 3600 * 10**9
