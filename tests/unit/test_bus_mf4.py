@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.mdf_blocks import write_variable_mf4
 from support.mf4 import can_group, write_mf4
 
 from gateway.bus.frames import join, merge_frames, take
@@ -141,3 +142,17 @@ def test_no_command_pays_for_asammdf_that_reads_no_mf4():
     """python-can imports it, and with it pandas, wherever it is installed: two seconds of every start."""
     code = "import sys, gateway.cli, gateway.bus.logs; sys.exit('asammdf' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_payloads_kept_apart_from_the_records(tmp_path):
+    """As loggers of CAN FD do; the file is made byte by byte after the standard, not by asammdf."""
+    rng = np.random.default_rng(9)
+    lengths = [8, 64, 0, 12, 1, 48]
+    frames = [(0.01 * i, 0x123 + i, i % 2 == 0, rng.bytes(n)) for i, n in enumerate(lengths)]
+    write_variable_mf4(tmp_path / "a.mf4", START_NS, frames)
+    found, report = read(tmp_path / "a.mf4", channel="can1")
+    payloads = [row[:n].tobytes() for row, n in zip(found.payload, found.length, strict=True)]
+    assert payloads == [payload for *_, payload in frames]
+    assert found.can_id.tolist() == [can_id | (EXTENDED_ID if is_29 else 0) for _, can_id, is_29, _ in frames]
+    np.testing.assert_array_equal(found.t_ns, START_NS + 10_000_000 * np.arange(len(frames)))
+    assert report.channels == {"1"}
