@@ -83,6 +83,8 @@ def calibrate(
     """Fit every estimator on the identification parts of CAMPAIGN's runs."""
     if output is None and not wants_plan and not only_checks:
         raise click.UsageError("name the calibration file to write with --output, or ask with --check or --plan")
+    if like and estimators and "cross_spectrum" not in estimators:
+        raise click.UsageError("--like is for cross_spectrum: the ratio index has nothing to inherit")
     if wants_curve and report is None:
         raise click.UsageError("--learning-curve is part of a report: name its directory with --report")
     _require_places(output, report)

@@ -110,6 +110,7 @@ def test_what_is_no_line_is_refused_with_what_to_do(sisters: list[Path], tmp_pat
         (("line", "build", sisters[0], "--output", tmp_path), "is a folder"),
         (("line", "build", sisters[0], "--output", tmp_path / "no" / "line.json"), "make it first"),
         (("line", "show", sisters[0]), "springscale calibration show"),
+        (("calibrate", line, "--like", line, "--estimator", "ratio_index", "--check"), "nothing to inherit"),
         (("line", "show", broken), "does not match its id"),
         (("line", "show", newer), "version 2"),
     ):
