@@ -1,4 +1,4 @@
-"""docs/learning_curve.md, advice.md and coverage.md say what the numbers beside them say, and nothing else.
+"""docs/learning_curve.md, advice.md, coverage.md and their like say what the numbers beside them say, and nothing else.
 
 They come from `python -m benchmarks.accuracy NAME --output DIR`: NAME.md, and its numbers NAME.json.
 """
@@ -16,6 +16,8 @@ from benchmarks.accuracy.coverage_table import ALL_KINDS
 from benchmarks.accuracy.disturbances_page import WELL, disturbances_page, held_or_refused, is_mended
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
+from benchmarks.accuracy.siblings import siblings_page
+from benchmarks.accuracy.siblings.study import Way
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
@@ -23,6 +25,7 @@ PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "advice": advice_page,
     "coverage": coverage_page,
     "disturbances": disturbances_page,
+    "siblings": siblings_page,
 }
 
 
@@ -59,3 +62,16 @@ def test_the_learning_curve_holds_every_size_and_all_27_triples() -> None:
         ("cross_spectrum", 27),
         ("ratio_index", 27),
     }
+
+
+def test_a_sister_is_worth_more_than_priors_and_her_intervals_hold() -> None:
+    rows = {row["estimator"]: row for row in numbers("siblings")["rows"]}
+    assert set(rows) == set(Way)
+    for way in (Way.LIKE_ONE, Way.LIKE_ONE_TWO_DRIVES, Way.LIKE_THREE):
+        for other in (Way.AS_IS, Way.TARED, Way.ALONE):
+            for quantity in ("payload", "front_share"):
+                error = f"{quantity}_mean_abs_pct_with_misses"
+                assert rows[way][error] < 0.5 * rows[other][error]
+        assert rows[way]["payload_coverage"]["share"] >= 0.93
+        assert rows[way]["front_share_coverage"]["share"] >= 0.93
+        assert rows[way]["n_rejected"] <= 0.12 * rows[way]["n_batches"]
