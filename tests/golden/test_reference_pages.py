@@ -14,6 +14,7 @@ import pytest
 from pydantic import BaseModel
 from support.half_car_road import batch_over_road, weighed
 
+from gateway.archive.manifest import ManifestFile
 from gateway.bus.signals import SignalMapFile, load_signal_map
 from gateway.bus.signals.signal_map import SignalEntry
 from gateway.calibration.campaign import CampaignTable, RunTable, VehicleTable, load_campaign
@@ -85,3 +86,14 @@ def test_every_figure_of_the_default_estimator_is_explained() -> None:
     assert shipped is not None
     found = weighed(batch_over_road(225.0, 50.0, seed=1), shipped)
     assert [*found.diagnostics, CG_LEFT_OWN_STD_M] == list(make_estimate.DIAGNOSTICS)  # no roll rate there
+
+
+def test_the_example_of_an_archive_s_manifest_is_one() -> None:
+    [example] = examples_of(make_archive.PAGE.read_text(encoding="utf-8"))
+    told = ManifestFile.model_validate(tomllib.loads(example))
+    assert [(entry.name, entry.since is not None) for entry in told.vehicles] == [
+        ("van-17", False),
+        ("van-17", True),
+        ("WF0XXXTTGXJK12346", False),
+    ]
+    assert not told.vehicles[0].covers(told.vehicles[1])
