@@ -111,7 +111,7 @@ def own_variances(found: Estimate, batch: Batch, calibration: CrossSpectrumCalib
     assert spectra is not None
     assert found.diagnostics["reach"] == 0.0
     inflation = np.array([calibration.payload_inflation, 100.0 * calibration.front_share_inflation])
-    unseen = inflation**2 * np.diag(locate(spectra, calibration).unseen_covariance)
+    unseen = inflation**2 * np.diag(locate(spectra, calibration).rival_covariance)
     return np.array([found.payload.std, found.front_share.std]) ** 2 - drift**2 - unseen
 
 

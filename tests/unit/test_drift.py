@@ -9,6 +9,7 @@ from gateway.core.cross_spectrum.drift import (
     DRIFT_STD,
     DRIFTING,
     NATURE_STD,
+    NATURE_TOGETHER_STD,
     STEADY,
     drift_covariance,
 )
@@ -18,8 +19,16 @@ from gateway.records import F64
 N_FITTED = len(DRIFTING) + 2  # and the load's two
 
 
-def natural_std(entries: list[int], otherwise: F64) -> F64:
-    return np.array([NATURE_STD.get(PARAMETERS[i], usual) for i, usual in zip(entries, otherwise, strict=True)])
+def natural_covariance(entries: list[int], otherwise: F64) -> F64:
+    """Each by itself, and what both axles have in common."""
+    names = [PARAMETERS[i] for i in entries]
+    covariance = np.diag([NATURE_STD.get(name, usual) ** 2 for name, usual in zip(names, otherwise, strict=True)])
+    for i, one in enumerate(names):
+        for j, other in enumerate(names):
+            kind = one.split("_")[0]
+            if {one, other} <= {*NATURE_STD} and kind == other.split("_")[0]:
+                covariance[i, j] += NATURE_TOGETHER_STD.get(kind, 0.0) ** 2
+    return covariance
 
 
 @pytest.mark.parametrize("evidence", [1e-2, 1.0, 1e4])
@@ -33,16 +42,26 @@ def test_it_is_the_covariance_of_the_error_in_a_linear_world(evidence: float) ->
     prior = np.pad(DRIFT_PRECISION, (0, 2))
     found = np.linalg.inv(of_fitted + prior)
     moves = -found @ across
-    in_common = np.linalg.inv(DRIFT_PRECISION) - np.diag(believed**2)
-    drifted = np.pad(in_common + np.diag(natural_std(DRIFTING, believed) ** 2), (0, 2))
-    not_fitted = np.diag(natural_std(STEADY, np.zeros(len(STEADY))) ** 2)
+    drifted = np.pad(natural_covariance(DRIFTING, believed), (0, 2))
+    not_fitted = natural_covariance(STEADY, np.zeros(len(STEADY)))
     exact = found @ (of_fitted + prior @ drifted @ prior + across @ not_fitted @ across.T) @ found
     assert np.allclose(found + drift_covariance(found, moves), exact, rtol=1e-6)
 
 
 def test_nature_scatters_more_than_the_search_believes() -> None:
     assert all(NATURE_STD[name] >= std for name, std in DRIFT_STD.items() if name in NATURE_STD)
+    assert NATURE_TOGETHER_STD["damper"] >= DAMPERS_TOGETHER_STD
     assert {*NATURE_STD} <= {*PARAMETERS}
+
+
+def test_a_day_that_warms_both_axles_hardly_moves_the_share_between_them() -> None:
+    """Front and rear pull it to opposite sides: what they have in common widens by less than what each has alone."""
+    found = np.zeros((N_FITTED, N_FITTED))
+    moves = np.zeros((N_FITTED, len(STEADY)))
+    for end, pull in (("front", 0.1), ("rear", -0.1)):
+        moves[-1, STEADY.index(PARAMETERS.index(f"tyre_{end}_npm"))] = pull
+    alone = 0.1 * NATURE_STD["tyre_front_npm"]
+    assert drift_covariance(found, moves)[-1, -1] == pytest.approx(2.0 * alone**2)
 
 
 def test_dampers_drift_together_more_than_apart() -> None:

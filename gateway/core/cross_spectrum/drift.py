@@ -4,7 +4,7 @@ The search for a load leaves a few of these free, near the calibration. The othe
 further off than the search believes, cannot be told from the load in one batch: they widen the interval.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
@@ -31,16 +31,26 @@ Narrower than nature, for the minutes of a batch repeat one error of the model: 
 
 NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
     {
-        "spring_front_npm": 0.01,  # rubber in parallel with steel, over 10 K
-        "spring_rear_npm": 0.01,
-        "tyre_front_npm": 0.03,  # goes with its pressure, and that with the absolute temperature: 10 K are 3.4 %
-        "tyre_rear_npm": 0.03,
-        "damper_front_nspm": 0.05,  # wear, and the oil's viscosity as far as valves let it through
-        "damper_rear_nspm": 0.05,
+        "spring_front_npm": 0.005,  # bushings that age
+        "spring_rear_npm": 0.005,
+        "tyre_front_npm": 0.015,  # both tyres of an axle, pumped up by a gauge that is read to 2 %
+        "tyre_rear_npm": 0.015,
+        "damper_front_nspm": 0.03,  # wear
+        "damper_rear_nspm": 0.03,
         "payload_mode_hz": 0.6,  # on the floor, on pallets, in a rack
+        "payload_gyration_m2": 0.7,  # a box half a metre long or one and a half
     }
 )
-"""How far vehicle and packing really lie from their calibration; each axle its own."""
+"""How far vehicle and packing really lie from their calibration, each axle by itself; chosen."""
+
+NATURE_TOGETHER_STD: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "spring": 0.01,  # rubber in parallel with steel, over 10 K
+        "tyre": 0.03,  # goes with its pressure, and that with the absolute temperature: 10 K are 3.4 %
+        "damper": 0.05,  # the oil's viscosity, as far as valves let it through
+    }
+)
+"""What both axles have in common beside it: one day's temperature."""
 
 DAMPERS_TOGETHER_STD: Final = 0.03
 """What both axles' dampers have in common beside it: their oil is as warm or cold in front as at the rear."""
@@ -49,22 +59,24 @@ DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
 STEADY: Final = [i for i in range(len(PARAMETERS)) if i not in DRIFTING]
 
 
-_OWN_VAR: Final = np.array(list(DRIFT_STD.values())) ** 2
+def _covariance(by_itself: Mapping[str, float], together: Mapping[str, float], names: Sequence[str]) -> F64:
+    """(k, k) of ``names``, from standard deviations of each by itself and of what both axles have in common."""
+    covariance = np.diag([by_itself.get(name, 0.0) ** 2 for name in names])
+    for kind, std in together.items():
+        is_of_kind = np.array([name.startswith(f"{kind}_") and name in by_itself for name in names], dtype=float)
+        covariance += std**2 * np.outer(is_of_kind, is_of_kind)
+    return covariance
 
 
-def _believed_covariance() -> F64:
-    is_damper = np.array([name.startswith("damper_") for name in DRIFT_STD], dtype=float)
-    together: F64 = DAMPERS_TOGETHER_STD**2 * np.outer(is_damper, is_damper)
-    return together + np.diag(_OWN_VAR)
-
-
-DRIFT_PRECISION: Final = np.linalg.inv(_believed_covariance())
+_BELIEVED: Final = _covariance(DRIFT_STD, {"damper": DAMPERS_TOGETHER_STD}, list(DRIFT_STD))
+_NATURE_OF_DRIFTING: Final = _covariance({**DRIFT_STD, **NATURE_STD}, NATURE_TOGETHER_STD, list(DRIFT_STD))
+_NATURE_OF_STEADY: Final = _covariance(NATURE_STD, NATURE_TOGETHER_STD, [PARAMETERS[i] for i in STEADY])
+DRIFT_PRECISION: Final = np.linalg.inv(_BELIEVED)
 """(k, k) of the DRIFTING parameters: the inverse of what the search believes of them."""
 
 
 _OF_THE_VEHICLE: Final = np.array([name != "gyro_lag_s" for name in DRIFT_STD], dtype=float)  # a lag is the computer's
-_NATURAL_VAR: Final = np.maximum([NATURE_STD.get(name, 0.0) ** 2 for name in DRIFT_STD], _OWN_VAR)
-_NATURAL_PRECISION: Final = np.linalg.inv(_believed_covariance() + np.diag(_NATURAL_VAR - _OWN_VAR))
+_NATURAL_PRECISION: Final = np.linalg.inv(_NATURE_OF_DRIFTING)
 MOST_TENSION: Final = float(2.0 * gammaincinv(int(_OF_THE_VEHICLE.sum()) / 2.0, 1.0 - 1e-4))  # chi-squared quantile
 """A vehicle that drifts as vehicles do exceeds this once in ten thousand batches."""
 
@@ -89,10 +101,5 @@ def drift_covariance(found: F64, moves: F64) -> F64:
     (S. F. Schmidt's consider covariance, Adv. Control Syst. 3, 1966).
     """
     pulls = found[:, : len(DRIFTING)] @ DRIFT_PRECISION
-    more_var = np.maximum(0.0, _nature_var(DRIFTING) - _OWN_VAR)
-    added: F64 = (moves * _nature_var(STEADY)) @ moves.T + (pulls * more_var) @ pulls.T
+    added: F64 = moves @ _NATURE_OF_STEADY @ moves.T + pulls @ (_NATURE_OF_DRIFTING - _BELIEVED) @ pulls.T
     return added
-
-
-def _nature_var(entries: list[int]) -> F64:
-    return np.array([NATURE_STD.get(PARAMETERS[i], 0.0) ** 2 for i in entries])

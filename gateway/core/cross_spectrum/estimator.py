@@ -100,7 +100,7 @@ def _judged(
     of_payload = calibration.payload_inflation * (1.0 + calibration.payload_inflation_per_reach * reach)
     of_share = calibration.front_share_inflation * (1.0 + calibration.front_share_inflation_per_reach * reach)
     wider = np.array([of_payload, of_share])
-    covariance = wider[:, None] * (unseen**2 * located.load_covariance + located.unseen_covariance) * wider
+    covariance = wider[:, None] * (unseen**2 * located.load_covariance + located.rival_covariance) * wider
     not_inflated = located.drift_covariance + np.outer(by_gain, by_gain)
     covariance += not_inflated
     payload_std_kg, share_std = (float(std) for std in np.sqrt(np.diag(covariance)))

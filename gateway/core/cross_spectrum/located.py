@@ -34,9 +34,9 @@ class Located:
 
     own_covariance is the part of it that no other batch shares: what its length and road leave. drift_covariance is
     what a change of the vehicle since its calibration adds, gain_moves (2,) by how much the load moves with the
-    accelerometer's gain: no inflation is due on these, but on unseen_covariance, what peaks add that compete and,
-    without a roll rate, a load that lies sideways. tension is how far what drifts lies off its calibration
-    (drift.tension_of). sideways is None without a roll rate.
+    accelerometer's gain: no inflation is due on these, but on rival_covariance, what peaks add that compete. Without a
+    roll rate drift_covariance holds too what a load does that lies sideways. tension is how far what drifts lies off
+    its calibration (drift.tension_of). sideways is None without a roll rate.
     """
 
     point: Point
@@ -49,7 +49,7 @@ class Located:
     scores: SensorScores
     is_reversed: bool
     is_ambiguous: bool
-    unseen_covariance: F64
+    rival_covariance: F64
     sideways: Sideways | None = None
 
 
@@ -73,8 +73,13 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
     if spectra.roll is None or not has_roll(calibration.parameters):
         peak = _best(whittle, calibration)
         located = _told(whittle, peak, calibration, 0.0)
-        unseen = sideways_covariance(whittle, located.point, peak.found.covariance, calibration)
-        return replace(located, unseen_covariance=located.unseen_covariance + unseen)
+
+        def weigh(other: CrossSpectra) -> F64:
+            sought = _sought(Whittle(other, calibration.ground), peak.found.x, peak.packing, calibration, 0.0, COARSE)
+            return sought.x[-2:]
+
+        unseen = sideways_covariance(whittle.spectra, located.point, calibration, weigh)
+        return replace(located, drift_covariance=located.drift_covariance + unseen)
     rolling = Whittle(spectra.within(ROLL_BAND_HZ), calibration.ground)
     placed = replace(calibration, parameters=level(calibration.parameters))
     peak = _best(whittle, replace(calibration, parameters=upright(calibration.parameters)))
@@ -110,7 +115,7 @@ def _told(whittle: Whittle, peak: _Peak, calibration: CrossSpectrumCalibration, 
         scores=scores_of(whole, point, found.covariance, expected),
         is_reversed=_is_reversed(whittle, point, misfit, calibration),
         is_ambiguous=bool(np.any(np.diag(peak.rivals) > MOST_RIVALRY * np.diag(covariance))),
-        unseen_covariance=peak.rivals,
+        rival_covariance=peak.rivals,
     )
 
 

@@ -4,13 +4,16 @@ A sensor off the centre line takes the roll of such a load for heave. Where no r
 the load may lie anywhere across the floor, and the sensor where it was said to sit, or somewhere, if nobody said.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.measured import CrossSpectra
+from gateway.core.cross_spectrum.model.expected import expected_of_driven
 from gateway.core.cross_spectrum.model.parameters import (
     INDEX,
     PARAMETERS,
@@ -19,40 +22,39 @@ from gateway.core.cross_spectrum.model.parameters import (
     is_positive,
     upright,
 )
+from gateway.core.cross_spectrum.model.slopes import solved_at
 from gateway.core.cross_spectrum.model.usual_roll import TRACK_PER_WHEELBASE, usual_roll
-from gateway.core.cross_spectrum.sensor_change import weighed
 from gateway.records import F64
 
 PAYLOAD_LEFT_PER_TRACK: Final = 1.0 / (3.0 * 3.0**0.5)
 """Standard deviation over the track's width: loads whose middle is evenly spread over its middle two thirds."""
 
-MOST_FEEDBACK: Final = 0.5  # beyond, first order no longer tells; chosen, it doubles the standard deviation
+MOST_FEEDBACK: Final = 0.5  # beyond, proportion no longer tells; chosen, it doubles the standard deviation
 
 
-def sideways_covariance(whittle: Whittle, point: Point, covariance: F64, calibration: CrossSpectrumCalibration) -> F64:
+def sideways_covariance(
+    spectra: CrossSpectra, point: Point, calibration: CrossSpectrumCalibration, weigh: Callable[[CrossSpectra], F64]
+) -> F64:
     """(2, 2) of payload (kg) and front share (0..1), from a place across the vehicle that is not seen.
 
-    First order: load and share move by -C I_xy for each metre, with C the search's covariance and I_xy the information
-    between what it fitted and the place, on average over the load a standard deviation to either side. By symmetry that
-    is nothing for a sensor on the centre line.
-
-    ``whittle`` is of two sensors, ``covariance`` (k, k) of what a search found at ``point``, without a roll in it.
+    ``point`` is the answer to ``spectra``, and ``weigh`` finds payload and share (2,) in others not far from it. It is
+    handed what the sensors would read with the load a standard deviation to either side: half of what the two answers
+    differ by is what such a load does. By symmetry that is nothing for a sensor on the centre line.
     """
     width_m = calibration.track_width_m or TRACK_PER_WHEELBASE * calibration.wheelbase_m
     theta = _rolling(point.theta, calibration, width_m)
-    there = Whittle(whittle.spectra, replace(calibration.ground, track_width_m=width_m))
+    ground = replace(calibration.ground, track_width_m=width_m)
     payload_kg = max(point.payload_kg, 0.0)
     cg_left_std_m = payload_kg * PAYLOAD_LEFT_PER_TRACK * width_m / (calibration.empty_mass_kg + payload_kg)
 
-    def moves_at(cg_left_m: float) -> F64:
-        rolling = Point(theta, point.payload_kg, point.front_share, cg_left_m)
-        along: F64 = there.curvature(rolling, [*weighed(rolling), len(theta) + 2]).information[:-1, -1]
-        return -(covariance @ along)[-2:]
+    def weighed_at(cg_left_m: float) -> F64:
+        model, by = solved_at(theta, (point.payload_kg, point.front_share, cg_left_m), ground, spectra)
+        return weigh(spectra.showing(expected_of_driven(by, model, spectra)))
 
-    moves = 0.5 * (moves_at(-cg_left_std_m) + moves_at(cg_left_std_m))
+    moved = 0.5 * (weighed_at(cg_left_std_m) - weighed_at(-cg_left_std_m)) if payload_kg else np.zeros(2)
     # the load that lies there is the true one: where the answer fell short of it, it is the larger
-    feedback = min(abs(float(moves[0])) * cg_left_std_m / payload_kg, MOST_FEEDBACK) if payload_kg else 0.0
-    widened: F64 = (cg_left_std_m / (1.0 - feedback)) ** 2 * np.outer(moves, moves)
+    feedback = min(abs(float(moved[0])) / payload_kg, MOST_FEEDBACK) if payload_kg else 0.0
+    widened: F64 = np.outer(moved, moved) / (1.0 - feedback) ** 2
     return widened
 
 
