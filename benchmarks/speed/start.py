@@ -60,14 +60,17 @@ def ready_s(folder: Path) -> float:
         environment = os.environ | ONE_THREAD | {"NOTIFY_SOCKET": str(folder / "notify")}
         begun_s = time.monotonic()
         command = [sys.executable, "-m", "gateway", "run", "--config", str(folder / "springscale.toml")]
-        service = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
+        service = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
         try:
             while b"READY=1" not in notified.recv(4096):
                 pass
             return time.monotonic() - begun_s
+        except TimeoutError:
+            service.terminate()
+            raise SystemExit(f"the service did not get ready: {service.communicate()[1]}") from None
         finally:
             service.terminate()
-            service.wait(30.0)
+            service.communicate(timeout=30.0)
 
 
 def install_mb() -> dict[str, float]:
