@@ -115,7 +115,12 @@ class Lines:
             content = read(path)
         except OSError as fault:
             raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
-        return load_like(path, lambda _: content), content
+        held = load_like(path, lambda _: content)
+        try:
+            line_of_files([held])
+        except LineError as fault:
+            raise CalibrationFileError(f"{path}: {fault}") from None
+        return held, content
 
 
 def require_alike(path: Path, vehicle: VehicleTable) -> None:

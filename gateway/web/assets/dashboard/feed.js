@@ -1,7 +1,7 @@
 // Keeps what the page knows in step with the gateway: asks at the start and now and then, follows the stream between.
 
 import { follow } from "/assets/dashboard/event-stream.js";
-import { Refused, TARE, TICKETS, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
+import { COMMISSIONING, Refused, TARE, TICKETS, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
 import { known, learn } from "/assets/dashboard/known.js";
 
 const ASK_EVERY_MS = 5000;
@@ -17,6 +17,7 @@ async function askNow() {
     if (known.verifications && known.verifications.due.n_records !== status.verification.n_records) await askVerifications();
     if (known.tickets?.is_busy || (known.calibrationId ?? status.calibration_id) !== status.calibration_id) await askTickets();
     known.calibrationId = status.calibration_id;
+    if (known.commissioning?.underway || known.commissioning?.is_pending) await askCommissioning();
     if (known.tare && (known.tare.active?.id ?? null) !== status.tare_id) await askTare(); // somebody else changed it
   } catch (error) {
     learn({ isReachable: error instanceof Refused, isRefused: error instanceof Refused });
@@ -32,6 +33,8 @@ async function askBatches() {
 const askSpectra = async () => learn({ spectra: await load("/api/v1/spectra/latest") });
 
 const askTare = async () => learn({ tare: await load(TARE) });
+
+export const askCommissioning = async () => learn({ commissioning: await load(COMMISSIONING) });
 
 async function askVerifications() {
   const [verifications, trend] = await Promise.all([load(VERIFICATIONS), load(TREND)]);
@@ -77,7 +80,7 @@ const giveUpUntilNext = (error) => console.info(error.message);
 /** What needs an answer before the page is whole; asked again whenever the stream comes back. */
 async function catchUp() {
   await askNow();
-  await Promise.all([askOnce(), askSpectra(), askTruth(), askTare(), askVerifications(), askTickets()]);
+  await Promise.all([askOnce(), askSpectra(), askTruth(), askTare(), askVerifications(), askTickets(), askCommissioning()]);
 }
 
 /** Begins; never ends. */

@@ -9,6 +9,9 @@ function toggle(card, isFolded) {
   if (!isFolded) card.dispatchEvent(new Event("unfold", { bubbles: true }));
 }
 
+/** For what is wanted now. */
+export const unfold = (card) => toggle(card, false);
+
 function button(card) {
   const built = document.createElement("button");
   built.type = "button";

@@ -2,6 +2,7 @@
 
 const TOKEN = "springscale-token";
 export const TARE = "/api/v1/calibration/tare";
+export const COMMISSIONING = "/api/v1/calibration/commissioning";
 export const VERIFICATIONS = "/api/v1/calibration/verifications";
 export const TREND = "/api/v1/calibration/trend";
 export const TICKETS = "/api/v1/calibration/tickets";

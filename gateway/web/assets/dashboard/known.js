@@ -8,6 +8,7 @@ export const known = {
   vehicle: null,
   weights: null,
   spectra: null,
+  commissioning: null, // GET /calibration/commissioning
   tare: null, // GET /calibration/tare
   verifications: null, // GET /calibration/verifications
   trend: null, // GET /calibration/trend

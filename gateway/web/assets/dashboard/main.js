@@ -8,6 +8,7 @@ import "/assets/dashboard/health-view.js";
 import "/assets/dashboard/history-view.js";
 import "/assets/dashboard/spectra-view.js";
 import "/assets/dashboard/tare-view.js";
+import "/assets/dashboard/commissioning-view.js";
 import "/assets/dashboard/verification-view.js";
 
 import { feed, lookBack } from "/assets/dashboard/feed.js";
