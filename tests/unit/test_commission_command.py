@@ -1,12 +1,13 @@
 """springscale commission: every step as an option, for scripts; refusals in the service's own words."""
 
 import json
+import shutil
 from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from support.calibrated import calibration_file
 from support.commissioning import Bench, fitted
 from support.web import Gateway, serving
 
@@ -63,7 +64,7 @@ def test_steps_may_come_one_by_one(url: str) -> None:
 def test_a_person_is_asked(url: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(command, "_is_at_terminal", lambda: True)
     file = tmp_path / "sister.json"
-    file.write_text(calibration_file().to_json())
+    shutil.copy(Path(str(files("gateway"))) / "demo" / "paper_van.json", file)
     assert "1: sister.json (uploaded)" in run(url, "upload", str(file)).stdout
     begun = run(url, "start", "--no-follow", answers="0\n690\n710\n2.75\n1.2\ny\n")
     assert begun.exit_code == 0, (begun.output, begun.exception)
