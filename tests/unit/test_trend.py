@@ -7,11 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.stats import theilslopes
 from support.calibrated import calibration_file
 from support.epochs import drive_of, stored
 from support.patience import PATIENCE_S
 
-from gateway.calibration.trend import TrendHistory, Week, found_pct, monday_of, trends_of
+from gateway.calibration.trend import TrendHistory, Week, found_pct, monday_of, theil_sen, trends_of
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
@@ -157,3 +160,12 @@ def test_a_file_that_cannot_be_believed_is_set_aside_and_made_anew(tmp_path: Pat
     assert keeper.fault is None
     assert json.loads(keeper.told())["parameters"][0]["points"][0]["n"] == 1
     store.close()
+
+
+@given(points=st.lists(st.tuples(st.integers(0, 40), st.integers(-5, 5)), min_size=3, max_size=40))
+def test_slope_and_interval_are_scipys(points: list[tuple[int, int]]) -> None:
+    days, numbers = [float(day) for day, _ in points], [float(number) for _, number in points]
+    assume(len(set(days)) > 1)
+    known = theilslopes(numbers, days, alpha=0.99)
+    expected = (known.slope, known.low_slope, known.high_slope)
+    assert theil_sen(days, numbers, 0.99) == pytest.approx(expected, nan_ok=True)
