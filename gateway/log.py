@@ -47,6 +47,7 @@ class Event(StrEnum):
     BUS_REOPENED = "bus reopened"
     ESTIMATE = "estimate"
     PROVISIONAL = "provisional estimate"
+    ENTRY = "load event or trip told"
     REJECTED = "batch rejected"
     REASONS_CHANGED = "reasons of rejection changed"
     STALE = "estimate stale"

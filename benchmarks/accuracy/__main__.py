@@ -15,12 +15,14 @@ import click
 
 from benchmarks.accuracy import advice as on_advice
 from benchmarks.accuracy import coverage as on_coverage
+from benchmarks.accuracy import delivery as on_delivery
 from benchmarks.accuracy import disturbances as on_disturbances
 from benchmarks.accuracy import sensitivity as on_sensitivity
 from benchmarks.accuracy import siblings as on_siblings
 from benchmarks.accuracy.bounds import limits, limits_table
 from benchmarks.accuracy.coverage_drives import Scope
 from benchmarks.accuracy.coverage_page import coverage_page
+from benchmarks.accuracy.delivery_page import delivery_page
 from benchmarks.accuracy.disturbances_page import disturbances_page
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
 from benchmarks.accuracy.sensitivity import sensitivity_page
@@ -123,6 +125,19 @@ def disturbances(n_vans: int, seed: int, workers: int, output: Path | None) -> N
     with counted("calibrating, driving and disturbing vans") as on_van:
         found = on_disturbances.disturbances(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("disturbances", found, disturbances_page(found), output)
+
+
+@studies.command("delivery")
+@click.option("--seeds", "n_days", type=click.IntRange(min=1), default=on_delivery.N_DAYS, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=on_delivery.SEED, show_default=True)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
+@click.option("--kept", type=FILE, default=None, help="directory of days driven before: read from there, left there")
+@_output
+def delivery(n_days: int, seed: int, workers: int, kept: Path | None, output: Path | None) -> None:
+    """Are load events found, and none invented? Simulated delivery days of calibrated vans; ~25 s a day."""
+    with counted("driving delivery days") as on_day:
+        found = on_delivery.delivery(n_days, seed, workers=workers, kept=kept, on_day=on_day)
+    _hand_out("events", found, delivery_page(found), output)
 
 
 @studies.command("sensitivity")

@@ -37,6 +37,12 @@ class FreshVan:
     test_seed: np.random.SeedSequence
 
 
+def van_of(seed: int, number: int) -> Vehicle:
+    """The ``number``-th van of a study with this seed, without its drives."""
+    van_seed, *_ = np.random.SeedSequence([seed, number]).spawn(5)
+    return draw_van(number, np.random.default_rng(van_seed))
+
+
 def fresh_van(scope: Scope, seed: int, number: int) -> FreshVan:
     """The ``number``-th van of a study with this seed; it does not depend on the others."""
     van_seed, load_seed, known_seed, test_seed, sensor_seed = np.random.SeedSequence([seed, number]).spawn(5)

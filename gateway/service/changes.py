@@ -64,6 +64,16 @@ class BatchLog:
         return frozenset(where for where in PLACES if getattr(weights, where).is_over_limit)
 
 
+def told_in_turn(*hearers: Callable[[Estimate], None]) -> Callable[[Estimate], None]:
+    """One hearer of batches for several."""
+
+    def tell(found: Estimate) -> None:
+        for hear in hearers:
+            hear(found)
+
+    return tell
+
+
 class StateLog:
     """Told of the service's state by whoever watches it, often; writes where it is another than before."""
 

@@ -13,7 +13,8 @@ from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError, StoreError
 from gateway.log import Event, log_event
-from gateway.service.changes import BatchLog, StateLog
+from gateway.service.changes import BatchLog, StateLog, told_in_turn
+from gateway.service.day_book import DayBook
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
 from gateway.service.parts import commissioning_of, keeper_of, ring_log_of, source_of, store_of, tickets_of, uplink_of
@@ -93,10 +94,10 @@ class Gateway:
             flow,
             self.store,
             self.board,
-            log_batch,
+            told_in_turn(log_batch, DayBook(setup, self.store, self.board)),
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
-        self.uplink = uplink_of(forwarding, setup, self.store)
+        self.uplink = uplink_of(forwarding, setup, self.store, with_places=settings.position.forward)
         subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
         self.tare = TareDesk(
             settings.store.directory,

@@ -21,7 +21,7 @@ SECONDS_PER_DAY = 86_400.0
 BYTES_PER_MB = 1_000_000
 
 
-def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store) -> Uplink | None:
+def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with_places: bool) -> Uplink | None:
     """None where no broker is configured."""
     if wanted is None:
         return None
@@ -32,7 +32,7 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store) -> Upli
         "estimator": setup.estimator,
         "calibration_id": setup.calibration.id if setup.calibration else None,
     }
-    return Uplink(wanted, Outbox(store.reader(), store, _queue_name(wanted)), birth)
+    return Uplink(wanted, Outbox(store.reader(), store, _queue_name(wanted), with_places=with_places), birth)
 
 
 def _queue_name(wanted: UplinkSettings) -> str:

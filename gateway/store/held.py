@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from gateway.store.rows import DeliveryRow, EstimateRow, Row
+from gateway.store.rows import DeliveryRow, EntryRow, EstimateRow, Row
 
 SEQ_STRIDE: Final = 1 << 20  # each opening of a database begins a new stride
 
@@ -69,6 +69,13 @@ class Held:
             self._append(row)
             return f"{self._epoch}-{row.seq}"
 
+    def add_entry(self, make_row: Callable[[int], EntryRow]) -> str:
+        """Accept an event or a trip; its cursor. Its number is in one row with the estimates', which skip it."""
+        with self._changed:
+            row = make_row(self._take_number_between())
+            self._append(row)
+            return f"{self._epoch}-{row.seq}"
+
     def wait_for_rows(self, timeout_s: float, has_other_work: Callable[[], bool]) -> None:
         """Sleep until a row waits, ``wake`` finds other work, or the time is out."""
         with self._changed:
@@ -117,6 +124,12 @@ class Held:
             rows = (*self._in_flight, *self._waiting)
             return self._epoch, tuple(row for row in rows if isinstance(row, EstimateRow))
 
+    def entries(self) -> tuple[str, tuple[EntryRow, ...]]:
+        """The epoch and the events and trips not yet on disk, oldest first."""
+        with self._changed:
+            rows = (*self._in_flight, *self._waiting)
+            return self._epoch, tuple(row for row in rows if isinstance(row, EntryRow))
+
     def __len__(self) -> int:
         with self._changed:
             return len(self._in_flight) + len(self._waiting)
@@ -141,7 +154,14 @@ class Held:
         self._last_seq, self._next_seq = seq, seq + 1
         return seq, previous
 
+    def _take_number_between(self) -> int:
+        """A new number that no estimate is linked to."""
+        seq, self._next_seq = self._next_seq, self._next_seq + 1
+        return seq
+
     def _renumbered(self, row: Row) -> Row:
+        if isinstance(row, EntryRow):
+            return replace(row, seq=self._take_number_between())
         if not isinstance(row, EstimateRow):
             return row
         seq, previous = self._take_numbers()

@@ -14,7 +14,8 @@ from gateway.history import Delivery, Page
 from gateway.records import json_line
 from gateway.store import records
 from gateway.store.database import is_damaged
-from gateway.store.rows import Chain, EstimateRow
+from gateway.store.entries import EntryWindow, entries
+from gateway.store.rows import Chain, EntryRow, EstimateRow
 from gateway.store.schema import connect_reader
 from gateway.units import NS_PER_S
 
@@ -24,6 +25,7 @@ _FIRST_NS: Final = -(1 << 63)
 _LAST_NS: Final = (1 << 63) - 1
 
 HeldEstimates = Callable[[], tuple[str, tuple[EstimateRow, ...]]]
+HeldEntries = Callable[[], tuple[str, tuple[EntryRow, ...]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +58,7 @@ class StoreReader:
         self,
         path: Path,
         held: HeldEstimates,
+        held_entries: HeldEntries,
         clock_ns: Callable[[], int],
         on_damage: Callable[[], None],
         on_bad_records: Callable[[Sequence[int]], None],
@@ -64,6 +67,7 @@ class StoreReader:
     ) -> None:
         self._path = path
         self._held = held
+        self._held_entries = held_entries
         self._clock_ns = clock_ns
         self._on_damage = on_damage
         self._on_bad_records = on_bad_records
@@ -113,6 +117,42 @@ class StoreReader:
             previous=tuple(rows[seq].previous for seq in shown),
             next_cursor=cursors[-1] if len(seqs) > limit else None,
             last_cursor=cursors[newest] if shown else cursor,
+        )
+
+    def entries(
+        self,
+        *,
+        kind: str | None = None,
+        since_ns: int | None = None,
+        until_ns: int | None = None,
+        limit: int = 100,
+        cursor: str | None = None,
+        upto: str | None = None,
+        newest_first: bool = False,
+    ) -> Page:
+        """Load events and trips, each in its last revision, with since_ns <= t_end_ns < until_ns, as they came.
+
+        Cursors are of one row with those of estimates. Raises ValueError for a cursor we never gave.
+        """
+        epoch, held = self._held_entries()
+        window = EntryWindow(
+            kind,
+            _seq_after(cursor, epoch),
+            _seq_after(upto, epoch),
+            None if since_ns is None else _within_64_bits(since_ns),
+            None if until_ns is None else _within_64_bits(until_ns),
+            newest_first,
+        )
+        with self._connection() as connection:
+            found = entries(connection, held, window, limit + 1)
+        shown = found[:limit]
+        cursors = tuple(f"{epoch}-{seq}" for seq, _, _ in shown)
+        return Page(
+            items=tuple(text for _, _, text in shown),
+            cursors=cursors,
+            previous=(None,) * len(shown),
+            next_cursor=cursors[-1] if len(found) > limit else None,
+            last_cursor=cursors[0 if newest_first else -1] if shown else cursor,
         )
 
     def latest(self) -> Latest:

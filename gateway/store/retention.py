@@ -43,6 +43,7 @@ def remove_old(connection: sqlite3.Connection, kept: Retention, now_ns: int) -> 
     n_removed = 0
     for table, stamp, last in (
         ("estimates", "received_ns", _last_delivered(connection, kept.undelivered_to)),
+        ("entries", "received_ns", _last_delivered(connection, kept.undelivered_to)),
         ("events", "t_ns", _LAST),
     ):
         first_kept = connection.execute(
@@ -58,7 +59,7 @@ def remove_old(connection: sqlite3.Connection, kept: Retention, now_ns: int) -> 
 def remove_share(connection: sqlite3.Connection) -> int:
     """The oldest rows, some of each table -> how many."""
     n_removed = 0
-    for table in ("estimates", "events"):
+    for table in ("estimates", "entries", "events"):
         n_rows = connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
         n_removed += connection.execute(
             f"DELETE FROM {table} WHERE seq IN (SELECT seq FROM {table} ORDER BY seq LIMIT ?)",

@@ -64,7 +64,24 @@ class DeliveryRow:
     seq: int
 
 
-Row = EstimateRow | EventRow | CalibrationRow | DeliveryRow
+@dataclass(frozen=True, slots=True)
+class EntryRow:
+    """A load event or a trip in one revision, numbered in one row with the estimates; it takes the earlier's place."""
+
+    INSERT: ClassVar[str] = (
+        "INSERT INTO entries (seq, id, kind, t_end_ns, received_ns, text) VALUES (?, ?, ?, ?, ?, ?)"
+        " ON CONFLICT (seq) DO NOTHING"
+    )
+
+    seq: int
+    id: str
+    kind: str
+    t_end_ns: int
+    received_ns: int
+    text: str
+
+
+Row = EstimateRow | EventRow | CalibrationRow | DeliveryRow | EntryRow
 
 
 def bound(row: Row) -> tuple[Any, ...]:

@@ -74,9 +74,27 @@ MIGRATIONS: Final[tuple[str, ...]] = (
     """
     ALTER TABLE estimates ADD COLUMN previous INTEGER;
     """,
+    # load events and trips, each in its last revision, numbered in one row with the estimates
+    """
+    CREATE TABLE entries (
+        seq INTEGER PRIMARY KEY,
+        id TEXT NOT NULL,
+        kind TEXT NOT NULL,
+        t_end_ns INTEGER NOT NULL,
+        received_ns INTEGER NOT NULL,
+        text TEXT NOT NULL
+    );
+    CREATE INDEX entries_by_id ON entries (id);
+    CREATE INDEX entries_by_time ON entries (kind, t_end_ns);
+    CREATE TRIGGER last_revision AFTER INSERT ON entries
+    BEGIN
+        DELETE FROM entries WHERE id = NEW.id AND seq < NEW.seq;
+    END;
+    """,
 )
 FIRST_WITH_SUMS: Final = 3
 FIRST_WITH_PREVIOUS: Final = 4
+FIRST_WITH_ENTRIES: Final = 5
 
 
 def connect_writer(path: Path, migrations: Sequence[str] = MIGRATIONS) -> sqlite3.Connection:

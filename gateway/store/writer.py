@@ -18,7 +18,7 @@ from gateway.store.database import FILE_NAME, Database, is_damaged
 from gateway.store.held import Held
 from gateway.store.reader import StoreReader
 from gateway.store.retention import Retention
-from gateway.store.rows import CalibrationRow, Chain, EstimateRow, EventRow
+from gateway.store.rows import CalibrationRow, Chain, EntryRow, EstimateRow, EventRow
 
 IDLE_S: Final = 60.0  # without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5
@@ -94,6 +94,11 @@ class Store:
         """Accept something that happened to the service."""
         self._held.add(EventRow(self._clock_ns(), kind, json_line(detail)))
 
+    def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str) -> str:
+        """Accept a load event or a trip in a new revision -> its cursor; it takes the place of the one before."""
+        received_ns = self._clock_ns()
+        return self._held.add_entry(lambda seq: EntryRow(seq, entry_id, kind, t_end_ns, received_ns, text))
+
     def write_calibration(self, calibration_id: str, text: str) -> None:
         """Keep the calibration that estimates will name."""
         self._held.add(CalibrationRow(calibration_id, self._clock_ns(), text))
@@ -114,6 +119,7 @@ class Store:
         return StoreReader(
             self._path,
             self._held_estimates,
+            self._held.entries,
             self._clock_ns,
             self._suspect_damage,
             self._suspect_records,

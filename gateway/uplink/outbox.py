@@ -2,28 +2,33 @@
 
 import json
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from gateway.history import Delivery, Page
 from gateway.records import json_line
 
+BRANCHES: Final = {"event": "events", "trip": "trips"}
+
 
 @dataclass(frozen=True, slots=True)
 class Letter:
-    """One estimate or rejection: its place in the store, its idempotent id, its JSON without spectra.
+    """One estimate or rejection, load event or trip: its place in the store, its idempotent id, its JSON.
 
-    The JSON has a ``sequence`` of its own: which store it comes from, its number there, and the number before it.
+    ``branch`` is the topic below the vehicle's. An estimate has no spectra, and a ``sequence`` of its own: which store
+    it comes from, its number there, and the number before it.
     """
 
     cursor: str
     id: str
     text: str
+    branch: str = "estimates"
 
 
 class History(Protocol):
     """The store's reading side, as far as the outbox needs it."""
 
     def estimates(self, *, cursor: str | None, limit: int, with_spectra: bool) -> Page: ...
+    def entries(self, *, cursor: str | None, limit: int, upto: str | None) -> Page: ...
     def delivery(self, uplink: str) -> Delivery: ...
 
 
@@ -40,25 +45,24 @@ class Outbox:
     new one remembers counts then, and without that everything it holds goes out; ids are idempotent.
     """
 
-    def __init__(self, history: History, memory: Memory, name: str) -> None:
+    def __init__(self, history: History, memory: Memory, name: str, *, with_places: bool = False) -> None:
+        """``with_places`` lets positions go out where the store keeps them."""
         self._history = history
         self._memory = memory
         self._name = name
+        self._with_places = with_places
         self._delivered: str | None = None  # until the store was asked
         self._handed_out: str | None = None
 
     def next_letters(self, limit: int) -> list[Letter]:
         """Up to ``limit`` letters behind the last one handed out. Raises what the store's reader raises."""
-        page = self._behind(self._handed_out, limit)
-        if page.cursors and _epoch(self._handed_out) != _epoch(page.cursors[0]):
-            self._take_place(_epoch(page.cursors[0]))
-            page = self._behind(self._handed_out, limit)
-        if page.cursors:
-            self._handed_out = page.cursors[-1]
-        return [
-            _letter(cursor, previous, json.loads(text))
-            for cursor, previous, text in zip(page.cursors, page.previous, page.items, strict=True)
-        ]
+        letters = self._behind(self._handed_out, limit)
+        if letters and _epoch(self._handed_out) != _epoch(letters[0].cursor):
+            self._take_place(_epoch(letters[0].cursor))
+            letters = self._behind(self._handed_out, limit)
+        if letters:
+            self._handed_out = letters[-1].cursor
+        return letters
 
     def delivered(self, letter: Letter) -> None:
         """The broker has this letter and all before it."""
@@ -73,8 +77,25 @@ class Outbox:
         """How much waits and how much retention removed undelivered, as the store has it."""
         return self._history.delivery(self._name)
 
-    def _behind(self, cursor: str | None, limit: int) -> Page:
-        return self._history.estimates(cursor=cursor, limit=limit, with_spectra=False)
+    def _behind(self, cursor: str | None, limit: int) -> list[Letter]:
+        """Estimates, and what was told beside them, by their numbers; where there is more of one, the other waits."""
+        page = self._history.estimates(cursor=cursor, limit=limit, with_spectra=False)
+        beside = self._history.entries(cursor=cursor, limit=limit, upto=page.next_cursor)
+        letters = [
+            _letter(place, previous, self._shown(json.loads(text)))
+            for place, previous, text in zip(page.cursors, page.previous, page.items, strict=True)
+        ]
+        for place, text in zip(beside.cursors, beside.items, strict=True):
+            record = self._shown(json.loads(text))
+            kind = record["id"].partition("-")[0]
+            letters.append(Letter(place, f"{record['id']}-{record['revision']}", json_line(record), BRANCHES[kind]))
+        last = min((_number(place) for place in (beside.next_cursor, page.next_cursor) if place), default=None)
+        kept = [one for one in letters if last is None or _number(one.cursor) <= last]
+        return sorted(kept, key=lambda one: _number(one.cursor))
+
+    def _shown(self, record: dict[str, Any]) -> dict[str, Any]:
+        """What may leave the box."""
+        return record if self._with_places else without_places(record)
 
     def _take_place(self, epoch: str) -> None:
         """Go on where the database that is there now remembers us; an uplink it never saw begins at its first row."""
@@ -83,6 +104,21 @@ class Outbox:
             known = f"{epoch}-0"
             self._memory.write_delivery(self._name, known)  # from here on, what retention removes is counted
         self._delivered = self._handed_out = known
+
+
+def without_places(record: dict[str, Any]) -> dict[str, Any]:
+    """The same object, every place in it null, however deep."""
+    return {name: _bare(part) for name, part in record.items()}
+
+
+def _bare(part: Any) -> Any:
+    if isinstance(part, dict):
+        return None if "latitude_deg" in part else without_places(part)
+    return [_bare(one) for one in part] if isinstance(part, list) else part
+
+
+def _number(cursor: str) -> int:
+    return int(cursor.partition("-")[2])
 
 
 def _letter(cursor: str, previous: int | None, record: dict[str, Any]) -> Letter:

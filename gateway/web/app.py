@@ -42,6 +42,7 @@ from gateway.web.routes import (
     VerificationDesk,
     api_router,
     commissioning_router,
+    events_router,
     export_router,
     health_router,
     j1939_router,
@@ -121,6 +122,7 @@ def create_app(
     app.include_router(tickets_router(tickets or NoTicketDesk()))
     app.include_router(commissioning_router(commissioning or NoCommissioningDesk()))
     app.include_router(export_router(reader))
+    app.include_router(events_router(reader))
     app.include_router(record_router(record or NoFrameLog()))
     app.include_router(weights_router(board, scales))
     app.include_router(j1939_router(board, scales))

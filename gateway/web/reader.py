@@ -22,3 +22,15 @@ class Reader(Protocol):
         newest_first: bool = False,
         with_spectra: bool = True,
     ) -> Page: ...
+
+    def entries(
+        self,
+        *,
+        kind: str | None = None,
+        since_ns: int | None = None,
+        until_ns: int | None = None,
+        limit: int = 100,
+        cursor: str | None = None,
+        upto: str | None = None,
+        newest_first: bool = False,
+    ) -> Page: ...

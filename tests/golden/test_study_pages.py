@@ -13,6 +13,7 @@ import pytest
 from benchmarks.accuracy.coverage_drives import TRIPS
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.coverage_table import ALL_KINDS
+from benchmarks.accuracy.delivery_page import delivery_page
 from benchmarks.accuracy.disturbances_page import WELL, disturbances_page, held_or_refused, is_mended
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
@@ -26,6 +27,7 @@ PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "coverage": coverage_page,
     "disturbances": disturbances_page,
     "siblings": siblings_page,
+    "events": delivery_page,
 }
 
 
@@ -53,6 +55,15 @@ def test_every_disturbance_is_held_refused_or_mended() -> None:
         assert min(held_or_refused(line, "payload"), held_or_refused(line, "front_share")) >= WELL, name
         if DISTURBANCES[name].is_mended:
             assert is_mended(line, undisturbed), name
+
+
+def test_every_plain_change_of_load_is_told_and_none_is_invented() -> None:
+    found = numbers("events")
+    assert len(found["vans"]) >= 20
+    told = found["found"]
+    assert told["found_above_3_std"]["n"] == told["found_above_3_std"]["n_told"] >= 50
+    assert told["stops_without_change"]["n_told"] == told["under_way"]["n_told"] == 0
+    assert told["stops_without_change"]["n"] >= 30
 
 
 def test_the_learning_curve_holds_every_size_and_all_27_triples() -> None:

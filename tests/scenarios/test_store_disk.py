@@ -205,6 +205,7 @@ def test_a_question_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     reader = StoreReader(
         tmp_path / "springscale.db",
         held=lambda: ("ab", ()),
+        held_entries=lambda: ("ab", ()),
         clock_ns=lambda: 0,
         on_damage=lambda: None,
         on_bad_records=lambda seqs: None,

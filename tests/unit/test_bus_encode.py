@@ -15,6 +15,11 @@ TYPICAL = {
     Signal.SPEED: (15.0, 1.0),
     Signal.LONGITUDINAL_ACCELERATION: (0.0, 1.0),
     Signal.WHEEL_SPEED: (15.0, 1.0),
+    Signal.IGNITION: (1.0, 0.0),
+    Signal.LATITUDE: (47.0, 0.1),
+    Signal.LONGITUDE: (8.0, 0.1),
+    Signal.ODOMETER: (50_000.0, 100.0),
+    Signal.DOOR: (1.0, 0.0),
 }
 
 
@@ -82,4 +87,4 @@ def test_messages_are_merged_in_order_of_time():
         t_ns[rate] = t_ns[rate] + 3_000_000
     frames = encode_signals(signal_map, t_ns, samples)
     assert (np.diff(frames.t_ns) >= 0).all()
-    assert len(frames) == 150
+    assert len(frames) == 50 * 5

@@ -60,12 +60,12 @@ def change_of(before: Load, after: Load, rules: Rules) -> Quantity:
     """By how many kg the load changed.
 
     Both groups' own errors are in it, and of what they share the part that cannot be the same: a shared error depends
-    on the load, smoothly, so loads that are d apart have 2 (d / range)^2 of its variance between them, all of it (2)
-    from one end of the payload range to the other.
+    on the load, smoothly, so loads that are d apart have 2 (2 d / range)^2 of its variance between them, all of it (2)
+    from half the payload range on.
     """
     difference = after.payload_kg.mean - before.payload_kg.mean
     shared_var = 0.5 * (before.payload_kg.shared_var + after.payload_kg.shared_var)
-    apart = min(abs(difference) / rules.range_kg, 1.0)
+    apart = min(abs(difference) / (0.5 * rules.range_kg), 1.0)
     var = _own_var(before.payload_kg, after.payload_kg) + 2.0 * shared_var * apart**2
     return Quantity.normal(difference, math.sqrt(var))
 

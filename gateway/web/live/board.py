@@ -114,6 +114,10 @@ class Board:
             self._show(estimate_from_json(record), self._clock())
             self.fanout.publish(StreamEvent.of(kind_of(estimate), json_line(record), cursor))
 
+    def publish_entry(self, kind: str, text: str, cursor: str) -> None:
+        """Send a load event or a trip, in a new revision, to every subscriber."""
+        self.fanout.publish(StreamEvent.of(kind, text, cursor))
+
     def restore(self, estimate: str | None, rejection: str | None, age_s: float | None) -> None:
         """Show what an earlier run of the service stored, as old as it is.
 

@@ -16,14 +16,15 @@ from gateway.web.reader import Reader
 GRACE_S: Final = 0.2  # for the last words of a stream that ends
 RETRY_MS: Final = 3000
 _REPLAY_PAGE: Final = 5  # events in memory for each client that reads what it missed
+_MOST_BESIDE: Final = 500  # events and trips between so many estimates
 _REMEMBERED: Final = 1024  # replayed rows that may still arrive live: a row is published right after it is stored
 
 EVENT_SCHEMA: Final[dict[str, Any]] = {
     "type": "object",
-    "description": "one server-sent event; data is JSON: an Estimate, or {detail} where the stream ends",
+    "description": "one server-sent event; data is JSON: an Estimate, a LoadEvent, a Trip, or {detail} at its end",
     "properties": {
         "id": {"type": "string", "description": "cursor: send it as Last-Event-ID to go on behind it"},
-        "event": {"enum": ["estimate", "rejection", "provisional", "lagged", "closing"]},
+        "event": {"enum": ["estimate", "rejection", "provisional", "event", "trip", "lagged", "closing"]},
         "data": {"type": "string"},
     },
     "required": ["event", "data"],
@@ -103,7 +104,22 @@ class EventStream(Response):
         rows = zip(page.items, page.cursors, strict=True)
         kinds = {True: REJECTION, False: ESTIMATE}  # the store keeps no provisional ones
         events = [StreamEvent.of(kinds[bool(json.loads(text)["rejected"])], text, place) for text, place in rows]
-        return events, page.next_cursor
+        beside = self._reader.entries(cursor=behind, upto=page.next_cursor, limit=_MOST_BESIDE)
+        events += [
+            StreamEvent.of(entry_kind(text), text, place)
+            for text, place in zip(beside.items, beside.cursors, strict=True)
+        ]
+        return sorted(events, key=_number), page.next_cursor
+
+
+def entry_kind(text: str) -> str:
+    """event or trip, as its id begins."""
+    kind: str = json.loads(text)["id"].partition("-")[0]
+    return kind
+
+
+def _number(event: StreamEvent) -> int:
+    return int((event.cursor or "-0").partition("-")[2])
 
 
 async def _hung_up(receive: Receive) -> None:

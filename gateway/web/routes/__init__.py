@@ -20,6 +20,7 @@ from gateway.web.routes.calibration import (
 )
 from gateway.web.routes.commissioning import CommissioningDesk, NoCommissioningDesk, commissioning_router
 from gateway.web.routes.estimates import api_router
+from gateway.web.routes.events import events_router
 from gateway.web.routes.export import export_router
 from gateway.web.routes.health import health_router
 from gateway.web.routes.j1939 import j1939_router
@@ -53,6 +54,7 @@ __all__ = [
     "VerificationDesk",
     "api_router",
     "commissioning_router",
+    "events_router",
     "export_router",
     "health_router",
     "j1939_router",

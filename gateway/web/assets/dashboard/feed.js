@@ -30,6 +30,20 @@ async function askBatches() {
   return page.last_cursor;
 }
 
+const ENTRIES = "order=newest_first&limit=200";
+
+async function askDay() {
+  const [events, trips] = await Promise.all([load(`/api/v1/events?${ENTRIES}`), load(`/api/v1/trips?${ENTRIES}`)]);
+  learn({ events: events.items, trips: trips.items });
+}
+
+/** With the newest revision of one entry; an older one that comes late changes nothing. */
+function revised(entries, entry) {
+  const before = (entries ?? []).find((one) => one.id === entry.id);
+  if (before && before.revision >= entry.revision) return entries;
+  return [entry, ...(entries ?? []).filter((one) => one.id !== entry.id)];
+}
+
 const askSpectra = async () => learn({ spectra: await load("/api/v1/spectra/latest") });
 
 const askTare = async () => learn({ tare: await load(TARE) });
@@ -72,6 +86,10 @@ function onEvent(kind, record) {
   } else if (kind === "estimate" || kind === "rejection") {
     learn({ early: null, batches: remembered(record) });
     askSoon();
+  } else if (kind === "event") {
+    learn({ events: revised(known.events, record) });
+  } else if (kind === "trip") {
+    learn({ trips: revised(known.trips, record) });
   }
 }
 
@@ -81,6 +99,7 @@ const giveUpUntilNext = (error) => console.info(error.message);
 async function catchUp() {
   await askNow();
   await Promise.all([askOnce(), askSpectra(), askTruth(), askTare(), askVerifications(), askTickets(), askCommissioning()]);
+  await askDay();
 }
 
 /** Begins; never ends. */

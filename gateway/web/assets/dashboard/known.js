@@ -13,6 +13,8 @@ export const known = {
   verifications: null, // GET /calibration/verifications
   trend: null, // GET /calibration/trend
   tickets: null, // GET /calibration/tickets
+  events: null, // load events, newest first
+  trips: null, // likewise
   reasons: new Map(), // reason -> {happened, advice}
   batches: null, // newest first, rejections included
   early: null, // the provisional estimate of the batch under way

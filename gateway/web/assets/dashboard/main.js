@@ -6,6 +6,7 @@ import "/assets/dashboard/load-view.js";
 import "/assets/dashboard/van-view.js";
 import "/assets/dashboard/health-view.js";
 import "/assets/dashboard/history-view.js";
+import "/assets/dashboard/day-view.js";
 import "/assets/dashboard/spectra-view.js";
 import "/assets/dashboard/tare-view.js";
 import "/assets/dashboard/commissioning-view.js";

@@ -1,0 +1,56 @@
+"""The service's day book: what each batch tells of loads and trips, stored and shown."""
+
+import json
+import logging
+from collections.abc import Mapping
+from typing import Any, Final
+
+from gateway.core.events import HORIZON_NS, Entry, EntryKind, Ledger, Rules
+from gateway.errors import StoreError
+from gateway.estimate import Estimate
+from gateway.estimate_json import INSTANT, estimate_from_json
+from gateway.log import Event, log_event
+from gateway.records import json_line
+from gateway.setup import Setup
+from gateway.store import Store, StoreReader
+from gateway.web import Board
+
+MOST: Final = 600  # batches, and entries, of one day that a restarted service looks at
+
+
+class DayBook:
+    """Told of every estimate once it is stored and shown; by the pipeline's thread alone."""
+
+    def __init__(self, setup: Setup, store: Store, board: Board) -> None:
+        """Goes on from what the store remembers of the last day."""
+        self._store = store
+        self._board = board
+        rules = Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules()
+        try:
+            self._ledger = ledger_of(store.reader(), rules)
+        except (StoreError, TimeoutError, ValueError, KeyError) as fault:  # the last two: another version's records
+            log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
+            self._ledger = Ledger(rules)
+
+    def __call__(self, found: Estimate) -> None:
+        """Store and show what it tells."""
+        for entry in self._ledger.add(found):
+            text = json_line(entry.record)
+            cursor = self._store.write_entry(entry.kind, entry.id, entry.t_end_ns, text)
+            self._board.publish_entry(entry.kind, text, cursor)
+            log_event(Event.ENTRY, level=logging.DEBUG, id=entry.id, revision=entry.revision)
+
+
+def ledger_of(reader: StoreReader, rules: Rules) -> Ledger:
+    """The ledger as it was when the service stopped. Raises what the store's reader raises."""
+    page = reader.estimates(limit=MOST, newest_first=True, with_spectra=False)
+    estimates = [estimate_from_json(json.loads(text)) for text in reversed(page.items)]
+    from_ns = estimates[-1].t_end_ns - HORIZON_NS if estimates else 0
+    told = reader.entries(since_ns=from_ns, limit=MOST, newest_first=True) if estimates else None
+    known = [_entry(json.loads(text)) for text in told.items] if told else []
+    return Ledger(rules, [one for one in estimates if one.t_end_ns > from_ns], known)
+
+
+def _entry(record: Mapping[str, Any]) -> Entry:
+    kind = EntryKind(record["id"].partition("-")[0])
+    return Entry(kind, record["id"], INSTANT.read(record["t_end"]), dict(record))

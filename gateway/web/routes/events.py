@@ -1,0 +1,233 @@
+"""/api/v1/events and /api/v1/trips: what was loaded where, and what was carried how far; as pages and as files."""
+
+import asyncio
+import csv
+import io
+import json
+from collections.abc import AsyncIterator, Callable, Sequence
+from typing import Annotated, Any, Final, Literal
+
+from fastapi import APIRouter, Query
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.json_schema import SkipJsonSchema
+from starlette.responses import Response, StreamingResponse
+
+from gateway.core.events import EntryKind
+from gateway.core.events.table import COLUMNS, cells_of
+from gateway.history import Page
+from gateway.records import json_line
+from gateway.web.instant import Instant
+from gateway.web.reader import Reader
+from gateway.web.routes.estimates import Cursor
+from gateway.web.schemas import problem_responses
+from gateway.web.settings import PAGE_LIMIT
+
+_PAGE: Final = 100  # entries in memory at a time, for each file that is being sent
+_PATHS: Final = {EntryKind.EVENT: "events", EntryKind.TRIP: "trips"}
+
+
+class Span(BaseModel):
+    """Which part of them."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    since: Instant | SkipJsonSchema[None] = Field(None, description="those that end at or after this")
+    until: Instant | SkipJsonSchema[None] = Field(None, description="those that end before this")
+
+
+class EntriesQuery(Span):
+    """Which part of them, how many, and in which order."""
+
+    limit: int = Field(100, ge=1, le=PAGE_LIMIT)
+    cursor: Cursor | SkipJsonSchema[None] = Field(None, description="next_cursor or last_cursor of an earlier answer")
+    order: Literal["oldest_first", "newest_first"] = Field(
+        "oldest_first", description="oldest_first to follow what comes, newest_first for the last ones"
+    )
+
+
+class Place(BaseModel):
+    """WGS 84, rounded as the settings say."""
+
+    latitude_deg: float
+    longitude_deg: float
+
+
+class Stop(BaseModel):
+    """A standstill at which the load can have changed; null: nothing is known of it."""
+
+    t_start: str
+    t_end: str
+    door_opened: bool | None
+    ignition_off: bool | None
+    place: Place | None
+
+
+class CarriedLoad(BaseModel):
+    """What was aboard, by all batches of that load."""
+
+    payload_kg: float
+    payload_std_kg: float
+    payload_interval95_kg: list[float]
+    front_share_pct: float
+    front_share_std_pct: float
+    cg_left_m: float | None
+    cg_left_std_m: float | None
+    n_batches: int
+
+
+class LoadEvent(BaseModel):
+    """The load changed, from t_start to t_end; a higher revision of the same id corrects it."""
+
+    id: str
+    revision: int
+    vehicle_id: str | None
+    t_start: str
+    t_end: str
+    change_kg: float = Field(description="positive: loaded")
+    change_std_kg: float
+    change_interval95_kg: list[float]
+    probability: float = Field(description="that the load changed at all, 0 to 1")
+    is_withdrawn: bool = Field(description="true: later batches say that nothing changed")
+    place: Place | None
+    stops: list[Stop]
+    before: CarriedLoad
+    after: CarriedLoad
+
+
+class Trip(BaseModel):
+    """One drive; unknown is null."""
+
+    model_config = ConfigDict(populate_by_name=True)
+
+    id: str
+    revision: int
+    vehicle_id: str | None
+    t_start: str
+    t_end: str
+    is_over: bool
+    from_: Place | None = Field(alias="from")
+    to: Place | None
+    distance_m: float
+    distance_by: Literal["odometer", "speed"]
+    unknown_s: float
+    moving_s: float
+    mean_speed_mps: float | None
+    payload_kg: float | None
+    payload_std_kg: float | None
+    payload_interval95_kg: list[float] | None
+    carried_tkm: float | None
+    carried_std_tkm: float | None
+    carried_interval95_tkm: list[float] | None
+    weighed_share: float | None
+    empty_share: float | None
+    overloaded_share: float | None
+    n_weighed: int
+
+
+class _EntriesPage(BaseModel):
+    next_cursor: str | None
+    last_cursor: str | None
+
+
+class EventsPage(_EntriesPage):
+    """Load events in the order in which their last revisions came."""
+
+    items: list[LoadEvent]
+
+
+class TripsPage(_EntriesPage):
+    """Trips in the order in which their last revisions came."""
+
+    items: list[Trip]
+
+
+def events_router(reader: Reader) -> APIRouter:
+    """The routes of both."""
+    router = APIRouter(prefix="/api/v1", tags=["events"])
+
+    @router.get("/events", response_model=EventsPage, responses=problem_responses(422, 503))
+    async def events(query: Annotated[EntriesQuery, Query()]) -> Response:
+        """What was loaded and unloaded. A revised one comes again, behind all that was there: follow next_cursor."""
+        return await _page(reader, EntryKind.EVENT, query)
+
+    @router.get("/trips", response_model=TripsPage, responses=problem_responses(422, 503))
+    async def trips(query: Annotated[EntriesQuery, Query()]) -> Response:
+        """Every drive with its load and tonne-kilometres. A revised one comes again: follow next_cursor."""
+        return await _page(reader, EntryKind.TRIP, query)
+
+    for kind, path in _PATHS.items():
+        router.add_api_route(f"/{path}.csv", _file_of(reader, kind, "csv"), **_described("text/csv", path))
+        router.add_api_route(f"/{path}.jsonl", _file_of(reader, kind, "jsonl"), **_described("application/jsonl", path))
+    return router
+
+
+async def _page(reader: Reader, kind: EntryKind, query: EntriesQuery) -> Response:
+    try:
+        page = await asyncio.to_thread(
+            reader.entries,
+            kind=kind,
+            since_ns=query.since,
+            until_ns=query.until,
+            limit=query.limit,
+            cursor=query.cursor,
+            newest_first=query.order == "newest_first",
+        )
+    except ValueError as error:
+        raise RequestValidationError([{"loc": ("query", "cursor"), "msg": str(error)}]) from None
+    tail = json_line({"next_cursor": page.next_cursor, "last_cursor": page.last_cursor})[1:]
+    return Response(f'{{"items":[{",".join(page.items)}],{tail}', media_type="application/json")
+
+
+def _file_of(reader: Reader, kind: EntryKind, ending: str) -> Callable[..., Any]:
+    async def whole(span: Annotated[Span, Query()]) -> Response:
+        async def page_behind(cursor: str | None) -> Page:
+            return await asyncio.to_thread(
+                reader.entries, kind=kind, since_ns=span.since, until_ns=span.until, limit=_PAGE, cursor=cursor
+            )
+
+        first = await page_behind(None)  # before the answer begins: what goes wrong here is still a problem
+        encode = csv_lines(kind) if ending == "csv" else json_lines
+
+        async def pieces() -> AsyncIterator[str]:
+            yield encode(first.items)
+            cursor = first.next_cursor
+            while cursor is not None:
+                page = await page_behind(cursor)
+                yield encode(page.items)
+                cursor = page.next_cursor
+
+        named = {"content-disposition": f'attachment; filename="springscale-{_PATHS[kind]}.{ending}"'}
+        media_type = "text/csv; charset=utf-8" if ending == "csv" else "application/jsonl"
+        return StreamingResponse(pieces(), media_type=media_type, headers=named)
+
+    whole.__name__ = f"{_PATHS[kind]}_{ending}"
+    whole.__doc__ = f"All {_PATHS[kind]} as one file, each in its last revision."
+    return whole
+
+
+def json_lines(items: Sequence[str]) -> str:
+    """Each text on a line of its own."""
+    return "".join(f"{item}\n" for item in items)
+
+
+def csv_lines(kind: EntryKind) -> Callable[[Sequence[str]], str]:
+    """An encoder of its own for one file: the first call begins with the head line."""
+    pending = io.StringIO()
+    writer = csv.DictWriter(pending, COLUMNS[kind], restval="")
+    writer.writeheader()
+
+    def encode(items: Sequence[str]) -> str:
+        writer.writerows(cells_of(kind, json.loads(item)) for item in items)
+        lines = pending.getvalue()
+        pending.seek(0)
+        pending.truncate()
+        return lines
+
+    return encode
+
+
+def _described(media_type: str, what: str) -> dict[str, Any]:
+    content = {media_type: {"schema": {"type": "string"}}}
+    ok = {"content": content, "description": f"the {what}"}
+    return {"methods": ["GET"], "response_class": Response, "responses": {200: ok, **problem_responses(422, 503)}}

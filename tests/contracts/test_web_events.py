@@ -1,0 +1,76 @@
+"""Events and trips over HTTP: pages to follow, files, the stream; every revision at least once."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import jsonschema_rs
+import pytest
+from support.days import RULES, day
+from support.web import Client, Gateway
+
+from gateway.core.events import Ledger
+from gateway.records import json_line
+
+DAY = day(0.0, 500.0, 500.0, 320.0, 200.0, batches=2)
+
+
+@pytest.fixture
+def gateway(tmp_path: Path):
+    with Gateway(tmp_path) as opened:
+        ledger = Ledger(RULES)
+        for one in DAY:
+            opened.publish(one)
+            for entry in ledger.add(one):
+                cursor = opened.store.write_entry(entry.kind, entry.id, entry.t_end_ns, json_line(entry.record))
+                opened.board.publish_entry(entry.kind, json_line(entry.record), cursor)
+        yield opened
+
+
+def test_events_and_trips_of_a_day(gateway):
+    client = Client(gateway.app)
+    events = client.get("/api/v1/events").json()
+    assert sorted(round(one["change_kg"]) for one in events["items"]) == [-180, -120, 500]
+    assert events["next_cursor"] is None
+    trips = client.get("/api/v1/trips").json()["items"]
+    assert len(trips) == 5
+    assert {one["is_over"] for one in trips} == {True, False}
+
+
+def test_the_cursor_leads_through_all_of_them(gateway):
+    client, found, cursor = Client(gateway.app), [], ""
+    while cursor is not None:
+        page = client.get(f"/api/v1/trips?limit=2{cursor and f'&cursor={cursor}'}").json()
+        found += [one["id"] for one in page["items"]]
+        cursor = page["next_cursor"]
+    assert len(found) == len(set(found)) == 5
+
+
+def test_what_is_told_is_as_the_schema_says(gateway):
+    validator = jsonschema_rs.validator_for(
+        json.loads((Path(__file__).parents[2] / "docs/events.schema.json").read_text())
+    )
+    client = Client(gateway.app)
+    for path in ("events", "trips"):
+        for one in client.get(f"/api/v1/{path}").json()["items"]:
+            validator.validate(one)
+
+
+@pytest.mark.parametrize(("question", "status"), [("cursor=nonsense", 422), ("limit=0", 422), ("since=when", 422)])
+def test_wrong_questions_are_refused(gateway, question, status):
+    assert Client(gateway.app).get(f"/api/v1/events?{question}").status_code == status
+
+
+def test_files(gateway):
+    client = Client(gateway.app)
+    lines = client.get("/api/v1/events.jsonl").text.splitlines()
+    assert [json.loads(one)["id"] for one in lines] == [
+        one["id"] for one in client.get("/api/v1/events").json()["items"]
+    ]
+    table = list(csv.DictReader(io.StringIO(client.get("/api/v1/events.csv").text)))
+    assert sorted(round(float(row["change_kg"])) for row in table) == [-180, -120, 500]
+    assert float(table[0]["change_low95_kg"]) < float(table[0]["change_kg"]) < float(table[0]["change_high95_kg"])
+    assert {row["after_n_batches"] for row in table}
+    trips = list(csv.DictReader(io.StringIO(client.get("/api/v1/trips.csv").text)))
+    assert sum(float(row["carried_tkm"]) for row in trips) > 0.0
