@@ -1,0 +1,49 @@
+"""The service's day book: what it stores is what a log tells, and a restart in the middle changes nothing of it."""
+
+import json
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from support.days import day, told
+from support.patience import PATIENCE_S
+
+from gateway.core.events import Rules
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
+from gateway.service.day_book import DayBook
+from gateway.setup import load_setup
+from gateway.store import Store
+from gateway.web import Board
+
+WHOLE = day(0.0, 500.0, 500.0, 320.0, 200.0, batches=2)
+
+
+def run(directory: Path, estimates: list[Estimate]) -> dict[str, dict]:
+    """One run of the service over these; what is stored afterwards, by id."""
+    with closing(Store.open(directory)) as store:
+        book = DayBook(load_setup("springscale:reference"), store, Board())
+        for one in estimates:
+            store.write_estimate(estimate_to_json(one))
+            book(one)
+        assert store.flush(PATIENCE_S)
+        return {record["id"]: record for record in map(json.loads, store.reader().entries(limit=1000).items)}
+
+
+@pytest.mark.parametrize("cut", [0, 1, 3, 5, 8, len(WHOLE)])
+def test_what_is_stored_is_what_a_log_tells_whatever_the_restarts(tmp_path: Path, cut: int) -> None:
+    run(tmp_path, WHOLE[:cut])
+    stored = run(tmp_path, WHOLE[cut:])
+    assert stored == {entry.id: entry.record for entry in told(WHOLE, Rules()).values()}
+
+
+def test_what_was_told_is_sent_to_whoever_listens(tmp_path: Path) -> None:
+    board = Board()
+    sent: list[tuple[str, str]] = []
+    board.fanout.publish = lambda event: sent.append((event.cursor, event.wire.decode()))  # type: ignore[method-assign]
+    with closing(Store.open(tmp_path)) as store:
+        book = DayBook(load_setup("springscale:reference"), store, board)
+        for one in WHOLE:
+            book(one)
+    assert {wire.split("\n")[1] for _, wire in sent} == {"event: event", "event: trip"}
+    assert all(cursor for cursor, _ in sent)
