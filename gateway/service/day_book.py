@@ -5,7 +5,7 @@ import logging
 from collections.abc import Mapping
 from typing import Any, Final
 
-from gateway.core.events import HORIZON_NS, Entry, EntryKind, Ledger, Rules
+from gateway.core.events import HORIZON, Entry, EntryKind, Ledger, Rules
 from gateway.errors import StoreError
 from gateway.estimate import Estimate
 from gateway.estimate_json import INSTANT, estimate_from_json
@@ -15,14 +15,14 @@ from gateway.setup import Setup
 from gateway.store import Store, StoreReader
 from gateway.web import Board
 
-MOST: Final = 600  # batches, and entries, of one day that a restarted service looks at
+MOST: Final = 2 * HORIZON  # entries that so many batches can tell
 
 
 class DayBook:
     """Told of every estimate once it is stored and shown; by the pipeline's thread alone."""
 
     def __init__(self, setup: Setup, store: Store, board: Board) -> None:
-        """Goes on from what the store remembers of the last day."""
+        """Goes on from what the store remembers of the last batches."""
         self._store = store
         self._board = board
         rules = Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules()
@@ -43,12 +43,11 @@ class DayBook:
 
 def ledger_of(reader: StoreReader, rules: Rules) -> Ledger:
     """The ledger as it was when the service stopped. Raises what the store's reader raises."""
-    page = reader.estimates(limit=MOST, newest_first=True, with_spectra=False)
+    page = reader.estimates(limit=HORIZON, newest_first=True, with_spectra=False)
     estimates = [estimate_from_json(json.loads(text)) for text in reversed(page.items)]
-    from_ns = estimates[-1].t_end_ns - HORIZON_NS if estimates else 0
-    told = reader.entries(since_ns=from_ns, limit=MOST, newest_first=True) if estimates else None
+    told = reader.entries(since_ns=estimates[0].t_start_ns, limit=MOST, newest_first=True) if estimates else None
     known = [_entry(json.loads(text)) for text in told.items] if told else []
-    return Ledger(rules, [one for one in estimates if one.t_end_ns > from_ns], known)
+    return Ledger(rules, estimates, known)
 
 
 def _entry(record: Mapping[str, Any]) -> Entry:

@@ -9,6 +9,7 @@ from support.days import OWN_KG, RULES, T0_NS, at, batch, day, events, told
 
 from gateway.core.events import Ledger
 from gateway.core.events.change import probability
+from gateway.core.events.ledger import SETTLED
 from gateway.core.events.load import load_of, weighings_of
 from gateway.estimate import Correction, Place, Quantity, Stop, Watched
 
@@ -153,8 +154,19 @@ def test_a_restart_in_the_middle_goes_on_as_if_it_had_not_been():
 
 
 def test_what_is_old_stays_as_it_was_told():
-    whole = day(400.0, 300.0, *[300.0] * 120)
+    whole = day(400.0, 300.0, *[300.0] * 200)
     ledger = Ledger(RULES)
-    revisions = [(one.t_end_ns, e) for one in whole for e in ledger.add(one) if e.kind == "event"]
+    revisions = [(n, e) for n, one in enumerate(whole) for e in ledger.add(one) if e.kind == "event"]
     assert len({e.id for _, e in revisions}) == 1
-    assert max(t_ns for t_ns, _ in revisions) - revisions[0][1].t_end_ns < 13 * 3600 * 10**9
+    assert max(n for n, _ in revisions) <= SETTLED + 1
+
+
+def test_a_load_after_a_long_rest_is_told_and_the_trip_before_it_is_over():
+    before, after = (
+        day(0.0, 300.0, batches=2)[:2],
+        [batch(days * 1440.0, days * 1440.0 + 5.0, 300.0) for days in (9.0, 9.01)],
+    )
+    (found,) = events([*before, *after])
+    assert found["change_kg"] == pytest.approx(300.0)
+    first, *_ = [e.record for e in told([*before, *after]).values() if e.kind == "trip"]
+    assert first["is_over"]

@@ -6,6 +6,6 @@ the same. docs/events.md says how well they are found.
 
 from gateway.core.events.change import Rules
 from gateway.core.events.entry import Entry, EntryKind
-from gateway.core.events.ledger import HORIZON_NS, Ledger
+from gateway.core.events.ledger import HORIZON, Ledger
 
-__all__ = ["HORIZON_NS", "Entry", "EntryKind", "Ledger", "Rules"]
+__all__ = ["HORIZON", "Entry", "EntryKind", "Ledger", "Rules"]

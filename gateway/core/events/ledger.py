@@ -19,18 +19,17 @@ from gateway.core.events.loads import EVEN
 from gateway.core.events.trips import trips_of
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json, estimate_to_json
-from gateway.units import NS_PER_S
 
 TOLD_FROM: Final = 0.9  # a change less likely than this is not told; one that was is withdrawn below one half
-HORIZON_NS: Final = 24 * 3600 * NS_PER_S  # batches older than this are no longer looked at
-SETTLED_NS: Final = 12 * 3600 * NS_PER_S  # and what is older than this stays as it was told
+HORIZON: Final = 300  # batches that are looked at, a day of driving however long the vehicle rested between
+SETTLED: Final = 150  # what ended before the last so many stays as it was told
 
 
 class Ledger:
-    """One vehicle's events and trips of the last day."""
+    """One vehicle's events and trips of its last batches."""
 
     def __init__(self, rules: Rules, estimates: Iterable[Estimate] = (), known: Iterable[Entry] = ()) -> None:
-        """Go on from what was: estimates of the last day, and the last revision of each entry that was told."""
+        """Go on from what was: the last estimates, and the last revision of each entry that was told of them."""
         self._rules = rules
         self._estimates = tuple(estimates)
         self._known = {entry.id: entry for entry in known}
@@ -39,21 +38,19 @@ class Ledger:
         """What one more batch, answered or not, tells that was not told before. Early looks tell nothing."""
         if estimate.is_provisional:
             return []
-        now_ns = estimate.t_end_ns
-        self._estimates = tuple(
-            one for one in (*self._estimates, as_stored(estimate)) if abs(now_ns - one.t_end_ns) < HORIZON_NS
-        )
-        self._known = {each: entry for each, entry in self._known.items() if abs(now_ns - entry.t_end_ns) < HORIZON_NS}
+        self._estimates = (*self._estimates, as_stored(estimate))[-HORIZON:]
+        first_ns, settled_ns = self._estimates[0].t_start_ns, self._estimates[-SETTLED:][0].t_start_ns
+        self._known = {each: entry for each, entry in self._known.items() if entry.t_end_ns >= first_ns}
         told = []
         for entry in self._entries():
-            if now_ns - entry.t_end_ns < SETTLED_NS and (news := self._news(entry)) is not None:
+            if entry.t_end_ns >= settled_ns and (news := self._news(entry)) is not None:
                 self._known[news.id] = news
                 told.append(news)
         return told
 
     def _entries(self) -> Iterator[Entry]:
         day = Day(self._estimates, self._rules)
-        yield from trips_of(day)
+        yield from trips_of(day, is_cut=len(self._estimates) == HORIZON)
         yield from day.events()
 
     def _news(self, entry: Entry) -> Entry | None:

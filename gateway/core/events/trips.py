@@ -37,10 +37,10 @@ class _Piece:
     is_weighed: bool
 
 
-def trips_of(day: Day) -> list[Entry]:
-    """Every drive that went anywhere, in order; without a revision."""
+def trips_of(day: Day, *, is_cut: bool = False) -> list[Entry]:
+    """Every drive that went anywhere, in order; without a revision. ``is_cut``: the first may lack its beginning."""
     loads = _load_of_each(day)
-    trips = (_trip(day, first, last, loads) for first, last in _drives(day.estimates))
+    trips = (_trip(day, first, last, loads) for first, last in _drives(day.estimates) if first or not is_cut)
     return [trip for trip in trips if trip is not None]
 
 
