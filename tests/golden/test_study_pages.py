@@ -17,6 +17,7 @@ from benchmarks.accuracy.delivery_page import delivery_page
 from benchmarks.accuracy.disturbances_page import WELL, disturbances_page, held_or_refused, is_mended
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
+from benchmarks.accuracy.sensitivity import sensitivity_page
 from benchmarks.accuracy.siblings import siblings_page
 from benchmarks.accuracy.siblings.study import Way
 
@@ -28,6 +29,7 @@ PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "disturbances": disturbances_page,
     "siblings": siblings_page,
     "events": delivery_page,
+    "sensitivity": sensitivity_page,
 }
 
 
