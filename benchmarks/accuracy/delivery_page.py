@@ -52,8 +52,10 @@ def delivery_page(found: Mapping[str, Any]) -> str:
             f"{kg['mean_std_kg']:.1f} kg | {_share(kg['n_held'], kg['n'])} |",
             "",
             "Where two stops lie between weighings, the change is that of both together. On these days the batches' "
-            f"own 95 % intervals held the payload {_share(batches['n_held'], batches['n'])}; what calibration leaves "
-            "open of a van that has changed since is in every change of load as well ([coverage](coverage.md)).",
+            f"own 95 % intervals held the payload {_share(batches['n_held'], batches['n'])}. That is too few, and the "
+            "reason is known: these vans were calibrated with each load in one place, and their parcels lie all along "
+            "the bed. The pitch inertia of such a load is taken for less weight, which no interval allows for yet "
+            "([method](method.md#where-it-does-not-work)).",
             "",
             "## Trips",
             "",
