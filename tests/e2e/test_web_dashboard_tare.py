@@ -79,7 +79,10 @@ def test_nothing_happens_where_the_question_is_not_confirmed(
 ) -> None:
     with serving(gateway.app) as server:
         watched.page.goto(server.url)
-        for end in (lambda: watched.page.keyboard.press("Escape"), watched.page.get_by_text("Cancel").click):
+        for end in (
+            lambda: watched.page.keyboard.press("Escape"),
+            watched.page.get_by_role("button", name="Cancel", exact=True).click,
+        ):
             watched.page.get_by_role("button", name="Re-zero").click()
             watched.page.locator("#tare-empty").check()
             end()
@@ -98,7 +101,7 @@ def test_a_refusal_is_told_where_it_was_asked(gateway: Gateway, pipeline: FakePi
         pipeline.weigh(200.0)  # meanwhile
         page.get_by_role("button", name="Set the zero").click()
         expect(page.get_by_role("alert")).to_contain_text("+200.0 kg off, a tare corrects up to")
-        page.get_by_text("Cancel").click()
+        page.get_by_role("button", name="Cancel", exact=True).click()
         gateway.publish(make_estimate(0))  # news, whatever they are
         expect(page.locator("#tare-offer")).to_contain_text("not possible: the payload is +200.0 kg off")
         expect(page.locator("#tare-set")).to_be_disabled()
@@ -126,4 +129,5 @@ def test_it_wants_a_token_that_may_operate_and_does_not_keep_it(
         assert page.evaluate("Object.values({...sessionStorage, ...localStorage})") == [reader]
         assert page.evaluate("document.getElementById('tare-token-text').value") == ""
         assert not any("spr_" in address for address in watched.addresses)
+        gateway.board.close()
         gateway.board.close()

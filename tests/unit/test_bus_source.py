@@ -269,7 +269,7 @@ def test_other_identifiers_error_and_remote_frames_do_not_reach_the_inbox():
     source = LiveSource("virtual", "mixed", MAP)
     source.start()
     with can.Bus(interface="virtual", channel="mixed", ignore_config=True) as bus:
-        bus.send(can.Message(arbitration_id=0x131, is_extended_id=False, data=bytes(4)))
+        bus.send(can.Message(arbitration_id=0x13F, is_extended_id=False, data=bytes(4)))
         bus.send(can.Message(arbitration_id=0x130, is_extended_id=True, data=bytes(4)))
         bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, is_remote_frame=True))
         bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, data=b"\1\2\3\4"))
