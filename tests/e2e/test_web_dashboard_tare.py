@@ -123,7 +123,7 @@ def test_it_wants_a_token_that_may_operate_and_does_not_keep_it(
         page.get_by_role("button", name="Set the zero").click()
         expect(page.get_by_role("alert")).to_have_text("this needs a token with scope operate")
         assert history(desk) == []
-        page.get_by_label("Token that may operate").fill(operator)
+        page.get_by_label("Token that may operate, used this once").fill(operator)
         page.get_by_role("button", name="Set the zero").click()
         expect(page.locator("#tare-active")).to_contain_text("by workshop")
         assert page.evaluate("Object.values({...sessionStorage, ...localStorage})") == [reader]
