@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections import Counter, defaultdict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import Any, Final
@@ -95,6 +95,14 @@ class Event(StrEnum):
 def log_event(event: Event, *, level: int = logging.INFO, **fields: object) -> None:
     """Write one event; fields keep their names, so that programs can ask for them."""
     LOGGER.log(level, event.value, extra={"fields": fields})
+
+
+def tell_event(
+    event: Event, fields: Mapping[str, Any], keep: Callable[[str, Mapping[str, Any]], object], level: int = logging.INFO
+) -> None:
+    """To the log, and by ``keep`` to whoever remembers what happened."""
+    log_event(event, level=level, **fields)
+    keep(event.value.replace(" ", "_"), fields)
 
 
 class FloodGate(logging.Filter):

@@ -14,7 +14,7 @@ from gateway.core.flow import Flow
 from gateway.core.tare import Refusal, Weighed, Zero, zero_of
 from gateway.errors import ConfigurationError, TareRefusedError
 from gateway.files.kept import KeptFiles
-from gateway.log import Event, log_event
+from gateway.log import Event, log_event, tell_event
 from gateway.records import iso_utc, json_line
 
 SERVICE = "service"  # who ended a tare where nobody asked for it
@@ -207,8 +207,7 @@ class TareDesk:
 
     def _tell(self, event: Event, fields: Mapping[str, Any], level: int = logging.INFO) -> None:
         """To the log, and to whoever keeps what happened."""
-        log_event(event, level=level, **fields)
-        self._on_event(event.value.replace(" ", "_"), fields)
+        tell_event(event, fields, self._on_event, level)
 
     def _use(self) -> None:
         active = self._active()

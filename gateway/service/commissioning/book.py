@@ -8,7 +8,7 @@ from typing import Any
 
 from gateway.errors import CommissioningRefusedError, ConfigurationError
 from gateway.files.kept import KeptFiles
-from gateway.log import Event, log_event
+from gateway.log import Event, log_event, tell_event
 from gateway.records import iso_utc
 from gateway.service.commissioning.record import FILE_NAME, Record, Underway, load_record, save_record
 
@@ -65,8 +65,7 @@ class Book:
 
     def tell(self, event: Event, fields: Mapping[str, Any], level: int = logging.INFO) -> None:
         """To the log, and to whoever keeps what happened."""
-        log_event(event, level=level, **fields)
-        self._on_event(event.value.replace(" ", "_"), fields)
+        tell_event(event, fields, self._on_event, level)
 
     def now(self) -> str:
         """By the wall clock."""

@@ -9,7 +9,7 @@ from gateway.calibration.known_weight import WeightRefusal, known_weight_of
 from gateway.calibration.ticket_file import FILE_NAME, Ticket, TicketFit, TicketHistory, Withdrawal
 from gateway.core.weights import NOT_CALIBRATED
 from gateway.errors import CommissioningRefusedError, WeightRefusedError
-from gateway.log import Event, log_event
+from gateway.log import Event, log_event, tell_event
 from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.commissioning import Book, Jobs
 from gateway.service.commissioning.record import Made
@@ -93,7 +93,9 @@ class TicketDesk:
             ticket = ticket.model_copy(update={"id": ticket.content_id()})
             self._require_new(ticket, base)
             self._keep(self._file.history.with_ticket(ticket), base)
-            self._tell(Event.TICKET_ADDED, {"ticket_id": ticket.id, "by": by, "payload_kg": ticket.payload_kg})
+            tell_event(
+                Event.TICKET_ADDED, {"ticket_id": ticket.id, "by": by, "payload_kg": ticket.payload_kg}, self._on_event
+            )
             self._fit_if_wanted()
             return json_line(ticket.model_dump(mode="json"))
 
@@ -105,7 +107,7 @@ class TicketDesk:
                 raise WeightRefusedError(WeightRefusal.NO_SUCH_TICKET, "there is no such ticket that still stands")
             end = Withdrawal(at=self._book.now(), by=by)
             self._keep(self._file.history.withdrawn(ticket_id, end), self._refit.base(self._file.history))
-            self._tell(Event.TICKET_WITHDRAWN, {"ticket_id": ticket_id, "by": by})
+            tell_event(Event.TICKET_WITHDRAWN, {"ticket_id": ticket_id, "by": by}, self._on_event)
             self._fit_if_wanted()
             return json_line(self._state())
 
@@ -182,11 +184,8 @@ class TicketDesk:
         if fit.fault is not None:
             log_event(Event.NOT_REFITTED, level=logging.WARNING, fault=fit.fault)
         elif fit.ticket_ids:
-            self._tell(Event.REFITTED, {"calibration_id": fit.calibration_id, "n_tickets": len(fit.ticket_ids)})
-
-    def _tell(self, event: Event, fields: dict[str, Any]) -> None:
-        log_event(event, **fields)
-        self._on_event(event.value.replace(" ", "_"), fields)
+            told = {"calibration_id": fit.calibration_id, "n_tickets": len(fit.ticket_ids)}
+            tell_event(Event.REFITTED, told, self._on_event)
 
     def _state(self) -> dict[str, Any]:
         history = self._file.history

@@ -1,22 +1,21 @@
 """/api/v1/events and /api/v1/trips: what was loaded where, and what was carried how far; as pages and as files."""
 
 import asyncio
-import csv
-import io
-import json
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Query
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
-from starlette.responses import Response, StreamingResponse
+from starlette.responses import Response
 
 from gateway.core.events import EntryKind
 from gateway.core.events.table import COLUMNS, cells_of
 from gateway.history import Page
 from gateway.records import json_line
+from gateway.web.as_file import CSV, JSON_LINES, csv_lines, file_responses, json_lines, sent_as_file
 from gateway.web.instant import Instant
 from gateway.web.reader import Reader
 from gateway.web.routes.estimates import Cursor
@@ -158,7 +157,7 @@ def events_router(reader: Reader) -> APIRouter:
 
     for kind, path in _PATHS.items():
         router.add_api_route(f"/{path}.csv", _file_of(reader, kind, "csv"), **_described("text/csv", path))
-        router.add_api_route(f"/{path}.jsonl", _file_of(reader, kind, "jsonl"), **_described("application/jsonl", path))
+        router.add_api_route(f"/{path}.jsonl", _file_of(reader, kind, "jsonl"), **_described(JSON_LINES, path))
     return router
 
 
@@ -186,48 +185,15 @@ def _file_of(reader: Reader, kind: EntryKind, ending: str) -> Callable[..., Any]
                 reader.entries, kind=kind, since_ns=span.since, until_ns=span.until, limit=_PAGE, cursor=cursor
             )
 
-        first = await page_behind(None)  # before the answer begins: what goes wrong here is still a problem
-        encode = csv_lines(kind) if ending == "csv" else json_lines
-
-        async def pieces() -> AsyncIterator[str]:
-            yield encode(first.items)
-            cursor = first.next_cursor
-            while cursor is not None:
-                page = await page_behind(cursor)
-                yield encode(page.items)
-                cursor = page.next_cursor
-
-        named = {"content-disposition": f'attachment; filename="springscale-{_PATHS[kind]}.{ending}"'}
-        media_type = "text/csv; charset=utf-8" if ending == "csv" else "application/jsonl"
-        return StreamingResponse(pieces(), media_type=media_type, headers=named)
+        is_csv = ending == "csv"
+        encode = csv_lines(COLUMNS[kind], partial(cells_of, kind)) if is_csv else json_lines
+        name = f"springscale-{_PATHS[kind]}.{ending}"
+        return await sent_as_file(page_behind, encode, CSV if is_csv else JSON_LINES, name)
 
     whole.__name__ = f"{_PATHS[kind]}_{ending}"
     whole.__doc__ = f"All {_PATHS[kind]} as one file, each in its last revision."
     return whole
 
 
-def json_lines(items: Sequence[str]) -> str:
-    """Each text on a line of its own."""
-    return "".join(f"{item}\n" for item in items)
-
-
-def csv_lines(kind: EntryKind) -> Callable[[Sequence[str]], str]:
-    """An encoder of its own for one file: the first call begins with the head line."""
-    pending = io.StringIO()
-    writer = csv.DictWriter(pending, COLUMNS[kind], restval="")
-    writer.writeheader()
-
-    def encode(items: Sequence[str]) -> str:
-        writer.writerows(cells_of(kind, json.loads(item)) for item in items)
-        lines = pending.getvalue()
-        pending.seek(0)
-        pending.truncate()
-        return lines
-
-    return encode
-
-
 def _described(media_type: str, what: str) -> dict[str, Any]:
-    content = {media_type: {"schema": {"type": "string"}}}
-    ok = {"content": content, "description": f"the {what}"}
-    return {"methods": ["GET"], "response_class": Response, "responses": {200: ok, **problem_responses(422, 503)}}
+    return {"methods": ["GET"], "response_class": Response, "responses": file_responses(media_type, f"the {what}")}
