@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from benchmarks.accuracy.cells import number_cell, rejected_cell, share_cell
 from benchmarks.accuracy.coverage_table import ALL_KINDS, roll_in_words
 from gateway.calibration.judgement.coverage import PROMISED
 
@@ -73,46 +74,30 @@ def _verdict(coverage: Mapping[str, Any] | None) -> str:
     low, high = coverage["low"], coverage["high"]
     promised = f"{100 * PROMISED[0]:.0f} to {100 * PROMISED[1]:.0f} %"
     if high < PROMISED[0]:
-        return f"{_share(coverage)}: too narrow, the limits lie below {promised}."
+        return f"{share_cell(coverage)}: too narrow, the limits lie below {promised}."
     if low > PROMISED[1]:
-        return f"{_share(coverage)}: too wide, the limits lie above {promised}."
-    return f"{_share(coverage)}: agrees with {promised}."
+        return f"{share_cell(coverage)}: too wide, the limits lie above {promised}."
+    return f"{share_cell(coverage)}: agrees with {promised}."
 
 
 def _cells(line: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         line["kind"], "yes" if line["has_roll_rate"] else "no", _name(line),
-        str(line["n_runs"]), str(line["n_batches"]), _rejected(line),
+        str(line["n_runs"]), str(line["n_batches"]), rejected_cell(line),
         *_of_target(line, "payload"),
         *_of_target(line, "front_share"),
-        _number(line["cg_left_mean_abs_mm"]), _share(line["cg_left_coverage"]),
+        number_cell(line["cg_left_mean_abs_mm"]), share_cell(line["cg_left_coverage"]),
     )  # fmt: skip
 
 
 def _of_target(line: Mapping[str, Any], target: str) -> tuple[str, ...]:
     return (
-        _number(line[f"{target}_mean_abs_pct"]),
-        _number(line[f"{target}_mean_abs_pct_with_misses"]),
-        _share(line[f"{target}_coverage"]),
-        _share(line[f"{target}_coverage_by_van"]),
+        number_cell(line[f"{target}_mean_abs_pct"]),
+        number_cell(line[f"{target}_mean_abs_pct_with_misses"]),
+        share_cell(line[f"{target}_coverage"]),
+        share_cell(line[f"{target}_coverage_by_van"]),
     )
-
-
-def _rejected(line: Mapping[str, Any]) -> str:
-    """How many, and why."""
-    reasons = ", ".join(f"{n} {why}" for why, n in line["rejected_by_reason"].items())
-    return f"{line['n_rejected']}: {reasons}" if reasons else str(line["n_rejected"])
 
 
 def _name(line: Mapping[str, Any]) -> str:
     return str(line["estimator"]).replace("_", " ")
-
-
-def _number(x: float | None) -> str:
-    return "none" if x is None else f"{x:.2f}"
-
-
-def _share(coverage: Mapping[str, Any] | None) -> str:
-    if coverage is None:
-        return "none"
-    return f"{100 * coverage['share']:.0f} % ({100 * coverage['low']:.0f} to {100 * coverage['high']:.0f})"

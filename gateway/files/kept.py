@@ -29,7 +29,7 @@ class KeptFiles:
 
     def read(self, name: str) -> bytes:
         """What a plain file holds. FileNotFoundError where there is none."""
-        with self._opened() as folder:
+        with opened_folder(self.directory) as folder:
             file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
             if not stat.S_ISREG(os.fstat(file).st_mode):
                 os.close(file)
@@ -44,7 +44,7 @@ class KeptFiles:
         """Replace the file in one step, readable by its owner alone; on disk when this returns."""
         self.directory.mkdir(parents=True, exist_ok=True)
         fresh = f".{name}.new"
-        with self._opened() as folder:
+        with opened_folder(self.directory) as folder:
             with suppress(FileNotFoundError):  # left by a kill
                 os.unlink(fresh, dir_fd=folder)
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -60,7 +60,7 @@ class KeptFiles:
 
     def set_aside(self, name: str) -> str:
         """Rename what lies under ``name`` out of the way, whatever it is -> the new name."""
-        with self._opened() as folder:
+        with opened_folder(self.directory) as folder:
             stem = f"{name}.broken-{datetime.now(UTC):%Y%m%dT%H%M%S}"
             taken = _names(folder)
             aside = next(one for n in itertools.count() if (one := f"{stem}-{n}" if n else stem) not in taken)
@@ -70,7 +70,7 @@ class KeptFiles:
     def set_aside_earlier(self, name: str) -> list[str]:
         """What was set aside under this name and still lies there, oldest first."""
         try:
-            with self._opened() as folder:
+            with opened_folder(self.directory) as folder:
                 return sorted(other for other in _names(folder) if other.startswith(f"{name}.broken-"))
         except FileNotFoundError:
             return []
@@ -88,7 +88,7 @@ class KeptFiles:
         """Alone among all processes that lock this directory. TimeoutError where another does not let go."""
         self.directory.mkdir(parents=True, exist_ok=True)
         end_s = time.monotonic() + LOCK_TIMEOUT_S
-        with self._opened() as folder:
+        with opened_folder(self.directory) as folder:
             while True:
                 try:
                     fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -99,13 +99,15 @@ class KeptFiles:
                     time.sleep(_LOCK_POLL_S)
             yield
 
-    @contextmanager
-    def _opened(self) -> Iterator[int]:
-        folder = os.open(self.directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-        try:
-            yield folder
-        finally:
-            os.close(folder)
+
+@contextmanager
+def opened_folder(directory: Path) -> Iterator[int]:
+    """A directory's handle, to work in it whatever its path leads to meanwhile. Raises OSError."""
+    folder = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        yield folder
+    finally:
+        os.close(folder)
 
 
 def _names(folder: int) -> set[str]:

@@ -1,13 +1,10 @@
 """kill -9 at any moment: every block that was on disk is there afterwards, and the log can be read and gone on with."""
 
 import random
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
+from support.killed import told_before_kill
 from support.patience import PATIENCE_S
 
 from gateway.bus.logs.open import open_log
@@ -32,18 +29,7 @@ for n in itertools.count(1):
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_kill_loses_no_block_that_was_told_of(tmp_path: Path, seed: int) -> None:
-    recorder = subprocess.Popen(
-        [sys.executable, "-c", RECORDER, str(tmp_path)],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=Path(__file__).parents[1],
-    )
-    assert recorder.stdout is not None
-    told = [recorder.stdout.readline()]
-    time.sleep(random.Random(seed).uniform(0.0, 0.2))
-    recorder.send_signal(signal.SIGKILL)
-    rest, _ = recorder.communicate(timeout=PATIENCE_S)
-    told += [line for line in rest.splitlines(keepends=True) if line.endswith("\n")]
+    told = told_before_kill(RECORDER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.2))
 
     log = RingLog(tmp_path, "can0", RingLimits(10**9, 10**9, 0, block_s=3600.0))
     log.start()

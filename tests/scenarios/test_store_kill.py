@@ -2,16 +2,12 @@
 
 import json
 import random
-import signal
 import sqlite3
-import subprocess
-import sys
-import time
 from contextlib import closing
 from pathlib import Path
 
 import pytest
-from support.patience import PATIENCE_S
+from support.killed import told_before_kill
 
 from gateway.store import Store
 
@@ -33,16 +29,7 @@ for n in itertools.count(first):
 
 def write_until_killed(directory: Path, first: int, after_s: float) -> list[int]:
     """Numbers known to be committed when the writer was killed ``after_s`` after its first commit."""
-    tests = Path(__file__).parents[1]
-    writer = subprocess.Popen(
-        [sys.executable, "-c", WRITER, str(directory), str(first)], stdout=subprocess.PIPE, text=True, cwd=tests
-    )
-    assert writer.stdout is not None
-    committed = [int(writer.stdout.readline())]
-    time.sleep(after_s)
-    writer.send_signal(signal.SIGKILL)
-    rest, _ = writer.communicate(timeout=PATIENCE_S)
-    return committed + [int(line) for line in rest.splitlines(keepends=True) if line.endswith("\n")]
+    return [int(line) for line in told_before_kill(WRITER, directory, first, after_s=after_s)]
 
 
 @pytest.mark.parametrize("seed", [1, 2])

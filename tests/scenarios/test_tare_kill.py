@@ -1,14 +1,10 @@
 """kill -9 at any moment: every tare that was answered is there afterwards, and the file is whole."""
 
 import random
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
-from support.patience import PATIENCE_S
+from support.killed import told_before_kill
 
 from gateway.calibration.tare_file import FILE_NAME, MOST_ENTRIES, load_tares
 
@@ -31,18 +27,7 @@ for n in itertools.count():
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_kill_loses_no_tare_that_was_answered(tmp_path: Path, seed: int) -> None:
-    tarer = subprocess.Popen(
-        [sys.executable, "-c", TARER, str(tmp_path)],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=Path(__file__).parents[1],
-    )
-    assert tarer.stdout is not None
-    answered = [tarer.stdout.readline()]
-    time.sleep(random.Random(seed).uniform(0.0, 0.15))
-    tarer.send_signal(signal.SIGKILL)
-    rest, _ = tarer.communicate(timeout=PATIENCE_S)
-    answered += [line for line in rest.splitlines(keepends=True) if line.endswith("\n")]
+    answered = told_before_kill(TARER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.15))
     kept = [entry.id for entry in load_tares(tmp_path / FILE_NAME).entries]
     known = [line.strip() for line in answered][1 - MOST_ENTRIES :]  # one more may have been kept, unanswered
     assert set(known) <= set(kept)

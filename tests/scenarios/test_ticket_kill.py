@@ -1,14 +1,10 @@
 """kill -9 at any moment: every ticket that was answered is there afterwards, and the file is whole."""
 
 import random
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
-from support.patience import PATIENCE_S
+from support.killed import told_before_kill
 
 from gateway.calibration.ticket_file import FILE_NAME, TicketHistory
 from gateway.service.proving.history_file import HistoryFile
@@ -31,19 +27,7 @@ for n in itertools.cycle(range(1, 30)):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_kill_loses_no_ticket_that_was_answered(tmp_path: Path, seed: int) -> None:
-    hander = subprocess.Popen(
-        [sys.executable, "-c", HANDER, str(tmp_path)],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=Path(__file__).parents[1],
-    )
-    assert hander.stdout is not None
-    assert hander.stdout.readline() == "ready\n"
-    answered = [hander.stdout.readline()]
-    time.sleep(random.Random(seed).uniform(0.0, 0.3))
-    hander.send_signal(signal.SIGKILL)
-    rest, _ = hander.communicate(timeout=PATIENCE_S)
-    answered += [line for line in rest.splitlines(keepends=True) if line.endswith("\n")]
+    answered = told_before_kill(HANDER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.3), ready="ready\n")
     file = HistoryFile(tmp_path / FILE_NAME, TicketHistory())
     assert file.fault is None
     assert {line.strip() for line in answered} <= {ticket.id for ticket in file.history.tickets}

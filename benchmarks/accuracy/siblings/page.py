@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from benchmarks.accuracy.cells import number_cell, rejected_cell, share_cell
+
 COLUMNS: Final = (
     "Calibration of the sibling", "Batches", "Rejected",
     "Payload, mean abs. error %", "with misses", "95 % covers",
@@ -46,24 +48,9 @@ def siblings_page(found: Mapping[str, Any]) -> str:
 
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     return (
-        row["estimator"], str(row["n_batches"]), _rejected(row),
-        _number(row["payload_mean_abs_pct"]), _number(row["payload_mean_abs_pct_with_misses"]),
-        _share(row["payload_coverage"]),
-        _number(row["front_share_mean_abs_pct"]), _number(row["front_share_mean_abs_pct_with_misses"]),
-        _share(row["front_share_coverage"]),
+        row["estimator"], str(row["n_batches"]), rejected_cell(row),
+        number_cell(row["payload_mean_abs_pct"]), number_cell(row["payload_mean_abs_pct_with_misses"]),
+        share_cell(row["payload_coverage"]),
+        number_cell(row["front_share_mean_abs_pct"]), number_cell(row["front_share_mean_abs_pct_with_misses"]),
+        share_cell(row["front_share_coverage"]),
     )  # fmt: skip
-
-
-def _rejected(row: Mapping[str, Any]) -> str:
-    reasons = ", ".join(f"{n} {why}" for why, n in row["rejected_by_reason"].items())
-    return f"{row['n_rejected']}: {reasons}" if reasons else str(row["n_rejected"])
-
-
-def _number(x: float | None) -> str:
-    return "none" if x is None else f"{x:.2f}"
-
-
-def _share(coverage: Mapping[str, Any] | None) -> str:
-    if coverage is None:
-        return "none"
-    return f"{100 * coverage['share']:.0f} % ({100 * coverage['low']:.0f} to {100 * coverage['high']:.0f})"

@@ -3,14 +3,15 @@
 import errno
 import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
 
 from gateway.bus.ring.block import BlockHead
 from gateway.bus.ring.segment import Segment, create_segment, mended_segment, name_of, names_in, open_segment
+from gateway.files.kept import opened_folder
 from gateway.log import Event, log_event
 
 SEGMENT_S: Final = 3600.0
@@ -64,7 +65,7 @@ class RingFolder:
         segment = next((one for one in self.segments() if one.name == name), None)
         if segment is None:
             return None
-        with self._opened() as folder:
+        with opened_folder(self.directory) as folder:
             try:
                 return open_segment(folder, segment.name), segment.n_bytes
             except FileNotFoundError:  # let go just now
@@ -77,7 +78,7 @@ class RingFolder:
         """
         self.directory.mkdir(parents=True, exist_ok=True, mode=0o750)
         if self._segments is None:
-            with self._opened() as folder:
+            with opened_folder(self.directory) as folder:
                 self._segments = self._found(folder)
 
     def is_over_day(self, n_bytes: int) -> bool:
@@ -91,7 +92,7 @@ class RingFolder:
         """One more block, on disk when this returns. Raises OSError; then the next call begins with a new segment."""
         try:
             self.read()
-            with self._opened() as folder:
+            with opened_folder(self.directory) as folder:
                 self._require_room(folder, len(block))
                 self._let_go(folder, self._limits.max_bytes - len(block))
                 growing = self._to_grow(folder, len(block), head.first_ns)
@@ -155,14 +156,6 @@ class RingFolder:
         self._segments = (*kept, Segment(name))
         os.fsync(folder)  # the new name, too, outlives a power cut
         return self._growing
-
-    @contextmanager
-    def _opened(self) -> Iterator[int]:
-        folder = os.open(self.directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-        try:
-            yield folder
-        finally:
-            os.close(folder)
 
 
 def _write_all(file: BinaryIO, block: bytes) -> None:

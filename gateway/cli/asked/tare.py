@@ -6,8 +6,10 @@ import click
 
 from gateway.cli.asked.service import Service, asks_service
 from gateway.cli.options import as_json
+from gateway.cli.text.commission import end_text
 from gateway.estimate import Z95
 from gateway.records import json_line
+from gateway.words import one_or_more
 
 PATH: Final = "/api/v1/calibration/tare"
 CLEAR_STDS: Final = 2.0  # an offset of more standard deviations than this speaks for a drift
@@ -61,7 +63,7 @@ def _state_text(state: dict[str, Any]) -> str:
         lines.append(f"a tare now would take off {_zero_text(zero)}, weighed {span}{_advice(zero)}")
     else:
         lines.append(f"no tare now ({offer['reason']}): {offer['detail']}")
-    lines += [f"  {_tare_text(entry)}{_end_text(entry['ended'])}" for entry in state["history"]]
+    lines += [f"  {_tare_text(entry)}{end_text(entry['ended'])}" for entry in state["history"]]
     return "\n".join(lines)
 
 
@@ -79,12 +81,4 @@ def _tare_text(entry: dict[str, Any]) -> str:
 def _zero_text(zero: dict[str, Any]) -> str:
     payload = f"{zero['payload_kg']:+.1f} ± {Z95 * zero['payload_std_kg']:.1f} kg"
     share = f"{zero['front_share_pct']:+.2f} ± {Z95 * zero['front_share_std_pct']:.2f} pp"
-    return f"{payload} and {share} (95 %) from {_batches(zero['n_batches'])}"
-
-
-def _batches(n: int) -> str:
-    return "one batch" if n == 1 else f"{n} batches"
-
-
-def _end_text(ended: dict[str, Any] | None) -> str:
-    return "" if ended is None else f", {ended['why']} {ended['at'][:19]}Z by {ended['by']}"
+    return f"{payload} and {share} (95 %) from {one_or_more(zero['n_batches'], 'batch', 'batches')}"

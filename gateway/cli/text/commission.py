@@ -2,6 +2,8 @@
 
 from typing import Any, Final
 
+from gateway.words import one_or_more
+
 STEPS: Final = {
     "line": "choose the line that this vehicle is of",
     "vehicle": "state its axle weights, wheelbase, and where the sensor sits",
@@ -22,7 +24,7 @@ def state_text(state: dict[str, Any]) -> str:
         lines.append(f"none can be made here: {state['why_not']}")
     else:
         lines.append("nothing is under way: `springscale commission start` begins")
-    lines += [f"  {_made_text(made)}{_end_text(made['ended'])}" for made in state["history"]]
+    lines += [f"  {_made_text(made)}{end_text(made['ended'])}" for made in state["history"]]
     return "\n".join(lines)
 
 
@@ -63,9 +65,10 @@ def lines_text(items: list[dict[str, Any]]) -> str:
 def _made_text(made: dict[str, Any]) -> str:
     line = f"of the line {made['line']['name']}" if made["line"]["name"] else "without a line"
     note = f" ({made['note']})" if made["note"] else ""
-    windows = "one window" if made["n_batches"] == 1 else f"{made['n_batches']} windows"
+    windows = one_or_more(made["n_batches"], "window", "windows")
     return f"{made['id'][:19]} {made['vehicle_name']} {line}, {windows}, made {made['at'][:19]}Z by {made['by']}{note}"
 
 
-def _end_text(ended: dict[str, Any] | None) -> str:
+def end_text(ended: dict[str, Any] | None) -> str:
+    """Since when something made is out of use, why, and who said so; nothing of what is in use."""
     return "" if ended is None else f", {ended['why']} {ended['at'][:19]}Z by {ended['by']}"

@@ -23,7 +23,6 @@ from gateway.calibration.judgement import (
     verdicts_of,
 )
 from gateway.calibration.plan import LoadPlan, plan_next
-from gateway.errors import ConfigurationError
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import half_car_section
 from gateway.reports.calibration.learning import learning_section
@@ -35,6 +34,7 @@ from gateway.reports.calibration.text import decimal, span
 from gateway.reports.charts import Chart, Section
 from gateway.reports.charts.live import plotly_json, plotly_script
 from gateway.reports.charts.still import save_still
+from gateway.reports.folder import made_folder
 from gateway.words import counted
 
 OnChart = Callable[[int, int], None]  # (charts drawn, charts in all)
@@ -89,7 +89,7 @@ def _write(
     on_chart: OnChart,
     curve: LearningCurve | None = None,
 ) -> Path:
-    _make(directory)
+    made_folder(directory)
     charts = list(_charts(sections))
     for done, chart in enumerate(charts, 1):
         save_still(chart, directory / "figures")
@@ -111,14 +111,6 @@ def _write(
     report = directory / "report.html"
     report.write_text(page_html(page), encoding="utf-8")
     return report
-
-
-def _make(directory: Path) -> None:
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as fault:
-        why = f"no report can be written there ({fault.strerror}): name a directory"
-        raise ConfigurationError(f"{directory}: {why}") from None
 
 
 def _charts(sections: list[Section]) -> Iterator[Chart]:

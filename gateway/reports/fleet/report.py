@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from gateway.archive.fleet import Fleet, Vehicle
-from gateway.errors import ConfigurationError
 from gateway.reports.charts import Chart, Section
 from gateway.reports.charts.html import PLOTLY_FILE, Page, contents_html, document, prose, section_html
 from gateway.reports.charts.live import plotly_json, plotly_script
@@ -19,6 +18,7 @@ from gateway.reports.fleet.figures import fleet_json
 from gateway.reports.fleet.overview import fleet_sections, looks_of
 from gateway.reports.fleet.text import page_of, percent, whole
 from gateway.reports.fleet.vehicle import vehicle_sections
+from gateway.reports.folder import made_folder
 from gateway.words import counted
 
 OnPage = Callable[[int, int], None]  # (pages written, pages in all)
@@ -26,7 +26,7 @@ OnPage = Callable[[int, int], None]  # (pages written, pages in all)
 
 def write_fleet_report(directory: Path, fleet: Fleet, source: str, on_page: OnPage = lambda done, of: None) -> Path:
     """Every page and the numbers; the path of report.html. Raises ConfigurationError where it cannot be written."""
-    _make(directory / "vehicles")
+    made_folder(directory / "vehicles")
     (directory / PLOTLY_FILE).write_text(plotly_script(), encoding="utf-8")
     for done, vehicle in enumerate(fleet.vehicles):
         on_page(done, len(fleet.vehicles) + 1)
@@ -74,11 +74,3 @@ def _page(title: str, head: str, sections: Sequence[Section], first: str, plotly
 def _charts(sections: Sequence[Section]) -> Iterator[Chart]:
     for section in sections:
         yield from section.charts
-
-
-def _make(directory: Path) -> None:
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as fault:
-        why = f"no report can be written there ({fault.strerror}): name a directory"
-        raise ConfigurationError(f"{directory}: {why}") from None

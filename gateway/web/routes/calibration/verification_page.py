@@ -7,6 +7,7 @@ from html import escape
 from typing import Any, Final
 
 from gateway.web.door.headers import content_security_policy
+from gateway.words import one_or_more
 
 _STYLE: Final = """
 body { font: 11pt/1.4 system-ui, sans-serif; color: #111; max-width: 48rem; margin: 2rem auto; padding: 0 1rem; }
@@ -31,7 +32,7 @@ def verification_page(record: Mapping[str, Any]) -> str:
     axles = rule["permitted_axle_error_pct"]
     asked = f"at most {rule['permitted_error_pct']:g} % of the known gross weight"
     asked += "" if axles is None else f", and at most {axles:g} % of each axle's"
-    asked += f"; {_loads(rule['loads'])} at least"
+    asked += f"; {one_or_more(rule['loads'], 'load', 'loads')} at least"
     facts = {
         "Vehicle": record["vehicle_id"] or "",
         "Date": _moment(record["at"]),
@@ -71,7 +72,7 @@ def verification_page(record: Mapping[str, Any]) -> str:
 
 def _load(load: Mapping[str, Any]) -> Sequence[str]:
     return (
-        f"{_moment(load['t_start'])} to {_moment(load['t_end'])}, {_batches(load['n_batches'])}",
+        f"{_moment(load['t_start'])} to {_moment(load['t_end'])}, {one_or_more(load['n_batches'], 'batch', 'batches')}",
         f"{load['known_payload_kg']:.0f}",
         f"{load['payload_kg']:.0f} ± {1.96 * load['payload_std_kg']:.0f}",
         f"{load['error_kg']:+.1f}",
@@ -103,11 +104,3 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def _moment(text: str) -> str:
     return f"{text[:10]} {text[11:16]} UTC"
-
-
-def _loads(n: int) -> str:
-    return "one load" if n == 1 else f"{n} loads"
-
-
-def _batches(n: int) -> str:
-    return "one batch" if n == 1 else f"{n} batches"

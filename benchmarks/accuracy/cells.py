@@ -1,0 +1,22 @@
+"""What stands in a cell of a study's table: a number, a share with its limits, what was refused."""
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def rejected_cell(line: Mapping[str, Any]) -> str:
+    """How many, and why."""
+    reasons = ", ".join(f"{n} {why}" for why, n in line["rejected_by_reason"].items())
+    return f"{line['n_rejected']}: {reasons}" if reasons else str(line["n_rejected"])
+
+
+def number_cell(x: float | None) -> str:
+    """Two decimals."""
+    return "none" if x is None else f"{x:.2f}"
+
+
+def share_cell(coverage: Mapping[str, Any] | None) -> str:
+    """A share and its limits, percent."""
+    if coverage is None:
+        return "none"
+    return f"{100 * coverage['share']:.0f} % ({100 * coverage['low']:.0f} to {100 * coverage['high']:.0f})"
