@@ -3,7 +3,7 @@
 weighed(estimate, vehicle, unsprung)    # as it leaves; ``unsprung`` is what calibration found
 """
 
-from gateway.core.weights.limits import RELEASE_SHARE, is_over_limit
+from gateway.core.weights.limits import RELEASE_SHARE, Limits, is_over_limit, over_limit_probability
 from gateway.core.weights.on_the_road import weighed, weights_of
 from gateway.core.weights.place import Place, place_of
 from gateway.core.weights.sideways import NOWHERE, Sideways
@@ -13,10 +13,12 @@ __all__ = [
     "NOT_CALIBRATED",
     "NOWHERE",
     "RELEASE_SHARE",
+    "Limits",
     "Place",
     "Sideways",
     "Unsprung",
     "is_over_limit",
+    "over_limit_probability",
     "place_of",
     "unsprung_kg",
     "weighed",
