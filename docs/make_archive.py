@@ -217,7 +217,8 @@ def _meaning(column: str) -> str:
     if column == one.name or len(one.columns) < 2:
         return one.description or ""
     if one.name == "weights":
-        return "its standard deviation" if column.endswith("_std_kg") else "on the road, standing on level ground"
+        of_weights = {"_std_kg": "its standard deviation", "_limit_kg": "what it may be"}
+        return next((words for end, words in of_weights.items() if column.endswith(end)), one.description or "")
     return f"{'lower' if '_low95' in column else 'upper'} end of its 95 % interval"
 
 

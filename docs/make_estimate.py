@@ -112,14 +112,20 @@ ON_THE_ROAD = """\
 ## Weights on the road
 
 `weights` holds one object for each of {places}.
-It has `kg` and `std_kg`, `limit_kg` as the campaign's `[vehicle]` has it (null: not stated), `is_over_limit` (this
-number is above it; warnings with hysteresis are at `/api/v1/weights/latest`), `is_unsprung_estimated` (calibration
-found the unsprung mass in it, as nobody stated one; false where the weight is unknown), and `lacks`: null where the
-weight is known, else the first thing that is missing:
+It has `kg` and `std_kg`, `limit_kg` (null: not stated), `is_over_limit` (this number is above it; warnings with
+hysteresis are at `/api/v1/weights/latest`), `is_unsprung_estimated` (calibration found the unsprung mass in it, as
+nobody stated one; false where the weight is unknown), and `lacks`: null where the weight is known, else the first thing
+that is missing:
 
 | `lacks` | meaning |
 |---|---|
 {rows}
+
+Limits are those of `[vehicle]` in the [settings](settings.md), one by one; where it states none, the one of the
+campaign's [`[vehicle]`](campaign.md#vehicle) that the calibration was made with stands. So a limit is changed without
+calibrating: `systemctl restart springscale` puts it in force, `springscale check-config` says which stand.
+`springscale estimate --config` and the [archive's manifest](archive.md#the-manifest) take the same keys. A limit is
+part of no `id`: a batch weighed again under another limit is the same batch.
 
 Weights are static, of the vehicle on level ground, unsprung masses included. An axle bears its share of the sprung
 mass. Its wheels bear half of that each, and the left ones more, the right ones less, by the axle's part of the moment
@@ -137,7 +143,7 @@ CSV = """\
 ## In a CSV file
 
 `/api/v1/export.csv` has one line a batch. An interval becomes two columns, as named above. Reasons are joined by
-blanks. Fields without a column are in the JSON alone.
+blanks, and so are the places in `over_limit`. Fields without a column are in the JSON alone.
 """
 
 

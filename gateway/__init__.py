@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
     from gateway.core.settings import BatchSettings
+    from gateway.core.weights.limits import Limits
     from gateway.errors import SpringscaleError
     from gateway.estimate import Estimate, Quantity
     from gateway.estimate_json import estimate_to_json, table_row
@@ -21,6 +22,7 @@ __all__ = (
     "BatchSettings",
     "CalibrationFile",
     "Estimate",
+    "Limits",
     "Quantity",
     "Setup",
     "Spectra",
@@ -38,6 +40,7 @@ _HOMES = {
     "BatchSettings": "gateway.core.settings",
     "CalibrationFile": "gateway.calibration.file.calibration_file",
     "Estimate": "gateway.estimate",
+    "Limits": "gateway.core.weights.limits",
     "Quantity": "gateway.estimate",
     "Setup": "gateway.setup",
     "Spectra": "gateway.records",

@@ -11,25 +11,34 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.tare import Tare
+from gateway.core.weights import Limits
 from gateway.errors import ConfigurationError
 from gateway.files.signed import Read
 
+NO_OTHER = Limits()  # than the calibration's
 NOBODY = Identity()  # a log without a configuration belongs to no named vehicle
 
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """Everything that turns frames into estimates, loaded and checked."""
+    """Everything that turns frames into estimates, loaded and checked.
+
+    ``limits`` are those in force; where there is none the calibration's stands.
+    """
 
     signal_map: SignalMap
     calibration: CalibrationFile | None
     estimator: str
     identity: Identity
     tare: Tare | None = None
-    calibrated: CalibratedVehicle | None = field(init=False)  # the calibration, as the core knows it
+    limits: Limits = NO_OTHER
+    calibrated: CalibratedVehicle | None = field(init=False)  # the calibration, as the core knows it, limits in force
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "calibrated", self.calibration.for_core() if self.calibration else None)
+        calibrated = self.calibration.for_core() if self.calibration else None
+        if calibrated is not None:
+            calibrated = replace(calibrated, vehicle=self.limits.on(calibrated.vehicle))
+        object.__setattr__(self, "calibrated", calibrated)
 
     def flow(self, settings: BatchSettings) -> Flow:
         """A fresh pipeline."""
@@ -51,10 +60,12 @@ def load_setup(
     estimator: str | None = None,
     identity: Identity = NOBODY,
     read: Read = Path.read_bytes,
+    limits: Limits = NO_OTHER,
 ) -> Setup:
     """Loads the signal map and the calibration file; the best estimator of the file where none is named.
 
-    ``read`` sees to their signatures where they are required (files.signed).
+    ``limits`` stand before those that the calibration was made with. ``read`` sees to the files' signatures where
+    they are required (files.signed).
 
     Raises SignalMapError, CalibrationFileError, or ConfigurationError where the file lacks the estimator.
     """
@@ -65,7 +76,7 @@ def load_setup(
             f"{calibration}: holds no calibration for the estimator {chosen!r}, only for "
             f"{', '.join(held.estimators)}: choose one of these or calibrate again"
         )
-    return Setup(load_signal_map(signals, read), held, chosen, identity)
+    return Setup(load_signal_map(signals, read), held, chosen, identity, limits=limits)
 
 
 def setup_of(settings: Settings, estimator: str | None = None, read: Read | None = None) -> Setup:
@@ -75,7 +86,14 @@ def setup_of(settings: Settings, estimator: str | None = None, read: Read | None
     """
     identity = Identity(settings.vehicle.id, settings.vehicle.vin)
     read = read or settings.trust.for_reading().read
-    setup = load_setup(settings.signals, settings.calibration, estimator or settings.estimator, identity, read)
+    setup = load_setup(
+        settings.signals,
+        settings.calibration,
+        estimator or settings.estimator,
+        identity,
+        read,
+        Limits.of(settings.vehicle),
+    )
     wanted = settings.vehicle.calibrated_as
     if wanted and setup.calibration and setup.calibration.vehicle.name != wanted:
         raise ConfigurationError(

@@ -13,7 +13,7 @@ from gateway.archive.places import MISSING, Place
 from gateway.archive.receipts import Slot
 from gateway.errors import ConfigurationError
 from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, REASONS, WEIGHTS, EstimateField, Kind
-from gateway.estimate_json.kinds import COUNT, INTERVAL, TEXT, WHOLE
+from gateway.estimate_json.kinds import COUNT, INTERVAL, OVER_LIMIT, TEXT, WHOLE, places_over_limit
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -52,7 +52,6 @@ PROVENANCE: Final[Mapping[str, str]] = {
 }
 """Columns that no estimate has; `calibration_id` and `tare_id` are among the estimate's own."""
 
-OVER_LIMIT: Final = "over_limit"
 _LEFT_OUT: Final = frozenset({"spectra", "provisional", "way"})  # large; never true of a whole batch; of many parts
 
 
@@ -144,7 +143,7 @@ def _cells(one: EstimateField, told: Any) -> Sequence[Any]:
     if one.name == "diagnostics":
         return [told.get(name) for name in DIAGNOSTICS]
     if one.kind is WEIGHTS:
-        return [*one.kind.cells(told), [place for place, weight in told.items() if weight["is_over_limit"]]]
+        return [*one.kind.cells(told)[:-1], places_over_limit(told)]
     if one.kind is INTERVAL:
         return list(told)
     return [_cell(one.kind, told)]

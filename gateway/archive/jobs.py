@@ -97,6 +97,7 @@ def plan(
         "calibration": setup.calibration.id if setup.calibration else None,
         "signals": signals_id(setup),
         "settings": asdict(settings),
+        "limits": setup.limits.stated(),
     }
     identity = Identity(assignment.vehicle, assignment.vin)
     for month, lead_in, own, next_ns in _months(_in_order(logs, facts, assignment.span_ns)):

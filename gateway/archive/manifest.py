@@ -21,7 +21,9 @@ from gateway.archive.places import Place, place_of
 from gateway.bus.logs import is_named_as_log
 from gateway.calibration.tare_file import TareHistory, history_of
 from gateway.config import BatchSection, EstimatorName
+from gateway.config.sections import OF_CALIBRATION, LimitKg
 from gateway.core.settings import BatchSettings
+from gateway.core.weights import Limits
 from gateway.errors import ConfigurationError
 from gateway.setup import Setup, load_setup
 from gateway.toml_file import checked
@@ -48,11 +50,16 @@ class Table(BaseModel):
 
 
 class Means(Table):
-    """By what logs are read: at the top for every vehicle, in an entry for this one."""
+    """By what logs are read and weights judged: at the top for every vehicle, in an entry for this one."""
 
     signals: str | None = Field(None, description="signal map: a TOML file, or springscale:NAME")
     calibration: str | None = Field(None, description="calibration file; without it batches carry reasons only")
     estimator: EstimatorName | None = Field(None, description="which estimator answers [default: the file's first]")
+    gross_limit_kg: LimitKg = Field(None, description=f"permitted gross weight {OF_CALIBRATION}")
+    front_axle_limit_kg: LimitKg = Field(None, description=f"permitted load of the front axle {OF_CALIBRATION}")
+    rear_axle_limit_kg: LimitKg = Field(None, description=f"permitted load of the rear axle {OF_CALIBRATION}")
+    front_wheel_limit_kg: LimitKg = Field(None, description=f"permitted load of each front wheel {OF_CALIBRATION}")
+    rear_wheel_limit_kg: LimitKg = Field(None, description=f"the same at the rear {OF_CALIBRATION}")
 
 
 class VehicleEntry(Means):
@@ -173,10 +180,12 @@ class _Loader:
             return path.read_bytes()
         return self.base.read(Path(path).relative_to(Path(self.base.url)).as_posix())
 
-    def setup(self, signals: str, calibration: str | None, estimator: str | None) -> Setup:
+    def setup(self, signals: str, calibration: str | None, estimator: str | None, limits: Limits) -> Setup:
         """One for all vehicles that share it."""
         named = signals if signals.startswith("springscale:") else self.path(signals)
-        return load_setup(named, self.path(calibration) if calibration else None, estimator, read=self.read)
+        return load_setup(
+            named, self.path(calibration) if calibration else None, estimator, read=self.read, limits=limits
+        )
 
 
 def _assignment(base: Place, told: ManifestFile, entry: VehicleEntry, load: Any, where: str) -> Assignment:
@@ -184,7 +193,8 @@ def _assignment(base: Place, told: ManifestFile, entry: VehicleEntry, load: Any,
     if signals is None:
         raise ConfigurationError(f"{where}.signals: missing; give it here, or at the top for every vehicle")
     try:
-        setup = load(signals, entry.calibration or told.calibration, entry.estimator or told.estimator)
+        limits = Limits.of(told).overridden_by(Limits.of(entry))
+        setup = load(signals, entry.calibration or told.calibration, entry.estimator or told.estimator, limits)
     except ConfigurationError as fault:
         raise ConfigurationError(f"{where}: {fault}") from None
     folder = entry.logs or entry.name

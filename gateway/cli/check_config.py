@@ -8,10 +8,11 @@ import click
 from gateway.calibration.tare_file import FILE_NAME
 from gateway.cli.options import FILE, as_json, trusted_keys
 from gateway.config import load_settings
+from gateway.core.weights import Limits
 from gateway.errors import ConfigurationError, UntrustedFileError
 from gateway.records import json_line
 from gateway.service.startable import startable_faults
-from gateway.setup import setup_of
+from gateway.setup import Setup, setup_of
 from gateway.uplink import uplink_settings
 
 
@@ -51,6 +52,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,
         "trusted_keys": [key.fingerprint for key in trust.keys],
+        "limits": limits_in_force(setup),
         "uplink": forwarding.broker if forwarding else None,
     }
     if as_json:
@@ -61,3 +63,13 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
         click.echo(f"Its files are signed as required, by {' or '.join(key.fingerprint for key in trust.keys)}.")
     if setup.calibration is None:
         click.echo("No calibration is configured: batches will carry spectra and rejected = no_calibration.")
+    elif limits := limits_in_force(setup):
+        click.echo(f"It may weigh: {', '.join(f'{name} {kg:g} kg' for name, kg in limits.items())}.")
+    else:
+        click.echo("No limit is known: nothing can be told to weigh too much. See [vehicle] gross_limit_kg.")
+
+
+def limits_in_force(setup: Setup) -> dict[str, float]:
+    """By name, those of the settings and those that the calibration was made with."""
+    of_calibration = Limits.of(setup.calibrated.vehicle) if setup.calibrated else Limits()
+    return of_calibration.overridden_by(setup.limits).stated()

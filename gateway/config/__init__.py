@@ -10,8 +10,10 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
 from gateway.config.sections import (
+    OF_CALIBRATION,
     CommissioningSection,
     KeepSection,
+    LimitKg,
     PositionSection,
     RecordSection,
     Section,
@@ -30,7 +32,7 @@ ESTIMATOR_NAMES: tuple[EstimatorName, ...] = get_args(EstimatorName)
 
 
 class VehicleSection(Section):
-    """Who this vehicle is."""
+    """Who this vehicle is, and what it may weigh."""
 
     id: str = Field("vehicle", min_length=1, max_length=64, description="name under which the fleet knows the vehicle")
     calibrated_as: str | None = Field(
@@ -39,6 +41,13 @@ class VehicleSection(Section):
     vin: str | None = Field(
         None, pattern=r"^[A-HJ-NPR-Z0-9]{17}$", description="vehicle identification number (ISO 3779)"
     )
+    gross_limit_kg: LimitKg = Field(None, description=f"permitted gross weight {OF_CALIBRATION}")
+    front_axle_limit_kg: LimitKg = Field(None, description=f"permitted load of the front axle {OF_CALIBRATION}")
+    rear_axle_limit_kg: LimitKg = Field(None, description=f"permitted load of the rear axle {OF_CALIBRATION}")
+    front_wheel_limit_kg: LimitKg = Field(
+        None, description=f"permitted load of each front wheel or its tyre, both of twin tyres {OF_CALIBRATION}"
+    )
+    rear_wheel_limit_kg: LimitKg = Field(None, description=f"the same at the rear {OF_CALIBRATION}")
 
 
 class BusSection(Section):

@@ -1,8 +1,12 @@
 """Tables of springscale.toml about what a service keeps on its disk, and how it is calibrated and verified there."""
 
 from pathlib import Path
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
+
+LimitKg = Annotated[float | None, Field(gt=0.0, le=100_000.0, allow_inf_nan=False)]  # more is no road vehicle's
+OF_CALIBRATION = "[default: as the calibration has it]"
 
 
 class Section(BaseModel):

@@ -87,7 +87,15 @@ def _weight_of(told: Mapping[str, Any]) -> Weight:
 
 
 def _weight_cells(shown: Mapping[str, Mapping[str, Any]]) -> list[Any]:
-    return [shown[place][name] for place in PLACES for name in ("kg", "std_kg")]
+    """The columns of :data:`WEIGHT_COLUMNS`; places over their limit joined by a space."""
+    numbers = [shown[place][name] for place in PLACES for name in ("kg", "std_kg")]
+    limits = [shown[place]["limit_kg"] for place in PLACES]
+    return [*numbers, *limits, " ".join(places_over_limit(shown))]
+
+
+def places_over_limit(shown: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Of the JSON object of weights, those that bear more than they may."""
+    return [place for place in PLACES if shown[place]["is_over_limit"]]
 
 
 TEXT: Final = Kind(str | None, _as_is, _as_is)
@@ -110,5 +118,10 @@ REASONS: Final = Kind(
     lambda shown: [" ".join(shown)],
 )
 WEIGHTS: Final = Kind(dict[str, dict[str, Any]], weights_to_json, _weights_of, _weight_cells)
-WEIGHT_COLUMNS: Final = tuple(f"{place}{unit}" for place in PLACES for unit in ("_kg", "_std_kg"))
+OVER_LIMIT: Final = "over_limit"
+WEIGHT_COLUMNS: Final = (
+    *(f"{place}{unit}" for place in PLACES for unit in ("_kg", "_std_kg")),
+    *(f"{place}_limit_kg" for place in PLACES),
+    OVER_LIMIT,
+)
 SPECTRA: Final = Kind(dict[str, list[float | None]] | None, spectra_to_json, spectra_from_json)

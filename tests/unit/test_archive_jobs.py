@@ -91,6 +91,7 @@ def test_the_name_of_a_job_follows_from_its_inputs_alone(van: Assignment, tmp_pa
         'id = "van"\nvin = "WF0XXXTTGXJK12345"',
         'id = "van"\nsignals = "springscale:canmod_gps"',
         'id = "van"\ncalibration = "other.json"',
+        'id = "van"\ngross_limit_kg = 1850.0',
     ],
 )
 def test_another_input_makes_another_job(van: Assignment, tmp_path: Path, entry: str) -> None:

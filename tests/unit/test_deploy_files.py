@@ -4,12 +4,14 @@ import os
 import re
 import shutil
 import subprocess
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 from support.patience import PATIENCE_S
 
 from gateway.config import load_settings
+from gateway.core.weights import Limits
 from gateway.web import Scope, TokenFile
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
@@ -32,7 +34,14 @@ def test_every_commented_key_of_the_shipped_configuration_is_a_setting(tmp_path:
 
 
 def test_defaults_that_the_shipped_configuration_tells_are_the_defaults(tmp_path: Path) -> None:
-    examples = ("calibration", "calibrated_as", "vin", "tls_certificate", "tls_key")
+    examples = [
+        "calibration",
+        "calibrated_as",
+        "vin",
+        "tls_certificate",
+        "tls_key",
+        *(one.name for one in fields(Limits)),
+    ]
     kept = [
         line
         for line in (DEPLOY / "springscale.toml").read_text().splitlines()

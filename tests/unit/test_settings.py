@@ -156,7 +156,7 @@ def test_a_number_out_of_all_bounds_is_refused_in_words_or_can_be_used(tmp_path:
     refusals = []
     for n, number in enumerate(NUMBERS):
         try:
-            settings = loaded(tmp_path, f'{LEAST}vehicle.id = "van-17"\n[{section}]\n{key} = {number}\n')
+            settings = loaded(tmp_path, f'{LEAST}vehicle.id = "van-17"\n{section}.{key} = {number}\n')
         except ConfigurationError as fault:
             refusals.append(str(fault))
             continue

@@ -1,13 +1,31 @@
-"""Limits: whose count, and how probable it is that a weight is over one."""
+"""Limits: whose count, where they are told, and how probable it is that a weight is over one."""
 
+import json
 import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from support.archive import write_manifest
+from support.calibrated import calibration_file
+from support.estimates import make_estimate
+from support.web import Client, Gateway
 
+from gateway.archive.manifest import load_manifest
+from gateway.calibration.file.calibration_file import content_id
+from gateway.cli import springscale
+from gateway.config import load_settings
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import Limits, over_limit_probability
+from gateway.core.weights import Limits, over_limit_probability, weighed
+from gateway.errors import ConfigurationError
+from gateway.estimate import Estimate, Quantity
+from gateway.estimate_json import table_row
+from gateway.setup import Setup, load_setup, setup_of
+from gateway.uplink import Outbox
 
 KG = st.floats(0.0, 50_000.0)
 STD_KG = st.floats(0.01, 500.0)
@@ -52,3 +70,129 @@ def test_what_is_stated_stands_before_the_vehicles_own() -> None:
     limited = Limits(gross_limit_kg=1900.0, front_wheel_limit_kg=500.0).on(vehicle)
     assert Limits.of(limited) == Limits(gross_limit_kg=1900.0, rear_axle_limit_kg=1100.0, front_wheel_limit_kg=500.0)
     assert Limits().on(vehicle) == vehicle
+
+
+def named_anew(told: dict[str, Any]) -> str:
+    """A calibration file's text after a change, with its id."""
+    return json.dumps({**told, "id": content_id(told)})
+
+
+def configured(folder: Path, vehicle: str = "") -> Path:
+    """springscale.toml beside a calibration that allows 2000 kg, and nothing else."""
+    folder.mkdir(exist_ok=True)
+    told = json.loads(calibration_file().to_json())
+    told["vehicle"] |= {"unsprung_front_kg": 80.0, "unsprung_rear_kg": 80.0, "rear_axle_limit_kg": 1100.0}
+    (folder / "vehicle.json").write_text(named_anew(told))
+    state = f'[store]\ndirectory = "{folder / "state"}"\n'
+    path = folder / "springscale.toml"
+    path.write_text(
+        'signals = "springscale:reference"\ncalibration = "vehicle.json"\nestimator = "ratio_index"\n'
+        f'{state}[bus]\ninterface = "virtual"\n[vehicle]\nid = "van-17"\n{vehicle}'
+    )
+    return path
+
+
+def loaded(folder: Path, vehicle: str = "") -> Setup:
+    return setup_of(load_settings(configured(folder, vehicle)))
+
+
+def batch(setup: Setup) -> Estimate:
+    """500 kg aboard, a little more of all on the rear axle: 1900 kg gross, 940 kg on the rear axle."""
+    assert setup.calibrated is not None
+    found = replace(make_estimate(1), payload=Quantity.normal(500.0, 6.0), front_share=Quantity.normal(50.575, 0.1))
+    return weighed(found, setup.calibrated.vehicle)
+
+
+def test_settings_stand_before_the_calibration_which_stands_where_they_say_nothing(tmp_path: Path) -> None:
+    as_calibrated = loaded(tmp_path / "a")
+    assert as_calibrated.calibrated is not None
+    assert Limits.of(as_calibrated.calibrated.vehicle) == Limits(gross_limit_kg=2000.0, rear_axle_limit_kg=1100.0)
+    as_set = loaded(tmp_path / "b", "gross_limit_kg = 1850.0\nfront_wheel_limit_kg = 500.0")
+    assert as_set.calibrated is not None
+    assert Limits.of(as_set.calibrated.vehicle) == Limits(
+        gross_limit_kg=1850.0, rear_axle_limit_kg=1100.0, front_wheel_limit_kg=500.0
+    )
+    assert as_set.calibrated.id == as_calibrated.calibrated.id
+
+
+def test_the_environment_sets_a_limit_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SPRINGSCALE_VEHICLE__GROSS_LIMIT_KG", "1700")
+    assert loaded(tmp_path).limits.gross_limit_kg == 1700.0
+
+
+@pytest.mark.parametrize("wrong", ["0", "-3500.0", "3_500_000.0", "nan", "inf", '"heavy"'])
+def test_a_limit_that_no_vehicle_has_is_named(wrong: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"springscale.toml: vehicle\.rear_axle_limit_kg"):
+        loaded(tmp_path, f"rear_axle_limit_kg = {wrong}")
+
+
+def test_another_limit_is_the_same_batch_with_another_verdict(tmp_path: Path) -> None:
+    as_calibrated, as_set = batch(loaded(tmp_path / "a")), batch(loaded(tmp_path / "b", "gross_limit_kg = 1850.0"))
+    assert (as_calibrated.weights.gross.limit_kg, as_calibrated.weights.gross.is_over_limit) == (2000.0, False)
+    assert (as_set.weights.gross.limit_kg, as_set.weights.gross.is_over_limit) == (1850.0, True)
+    assert as_set.weights.gross.kg == as_calibrated.weights.gross.kg == pytest.approx(1900.0)
+    assert as_set.id == as_calibrated.id
+
+
+def test_the_table_tells_limits_and_which_are_passed(tmp_path: Path) -> None:
+    row = table_row(batch(loaded(tmp_path, "gross_limit_kg = 1850.0\nfront_axle_limit_kg = 900.0")))
+    assert [row[f"{place}_limit_kg"] for place in ("gross", "front_axle", "rear_axle")] == [1850.0, 900.0, 1100.0]
+    assert row["rear_left_limit_kg"] is None
+    assert row["over_limit"] == "gross front_axle"
+
+
+def test_a_vehicle_that_nobody_can_ask_tells_its_overload(tmp_path: Path) -> None:
+    """In the letter to the broker, in the stream's words, in metrics, in VSS: by the limit of the settings."""
+    setup = loaded(tmp_path, "gross_limit_kg = 1850.0")
+    with Gateway(tmp_path / "state", calibrated=setup.calibrated) as gateway:
+        gateway.publish(batch(setup))
+        [letter] = Outbox(gateway.store.reader(), gateway.store, "fleet").next_letters(10)
+        told = json.loads(letter.text)["weights"]
+        ask = Client(gateway.app)
+        metrics = ask.get("/metrics").text
+        points = {point["path"]: point["value"] for point in ask.get("/api/v1/vss").json()}
+        figures = ask.get("/api/v1/vehicle").json()["figures"]
+        latest = ask.get("/api/v1/estimates/latest").json()["weights"]["gross"]
+    assert told["gross"]["kg"] == pytest.approx(1900.0)
+    assert (told["gross"]["limit_kg"], told["gross"]["is_over_limit"]) == (1850.0, True)
+    assert told["rear_axle"]["is_over_limit"] is False
+    assert latest == told["gross"]
+    assert 'springscale_weight_limit_kilograms{where="gross"} 1850.0' in metrics
+    assert 'springscale_overload{where="gross"} 1.0' in metrics
+    assert points["Vehicle.GrossWeight"] == figures["gross_limit_kg"] == 1850.0
+
+
+def test_check_config_says_which_limits_stand(tmp_path: Path) -> None:
+    path = configured(tmp_path, "gross_limit_kg = 1850.0")
+    said = CliRunner().invoke(springscale, ["check-config", str(path), "--json"])
+    assert json.loads(said.output)["limits"] == {"gross_limit_kg": 1850.0, "rear_axle_limit_kg": 1100.0}
+    words = CliRunner().invoke(springscale, ["check-config", str(path)]).output
+    assert "It may weigh: gross_limit_kg 1850 kg, rear_axle_limit_kg 1100 kg." in words
+
+
+def test_no_limit_is_told_too(tmp_path: Path) -> None:
+    path = configured(tmp_path)
+    told = json.loads((tmp_path / "vehicle.json").read_text())
+    told["vehicle"] |= {"gross_limit_kg": None, "rear_axle_limit_kg": None}
+    (tmp_path / "vehicle.json").write_text(named_anew(told))
+    assert "No limit is known" in CliRunner().invoke(springscale, ["check-config", str(path)]).output
+
+
+def test_an_archive_is_judged_by_its_manifests_limits(tmp_path: Path) -> None:
+    """The top's for every vehicle, an entry's for this one."""
+    path = write_manifest(
+        tmp_path, "van-1", 'id = "van-2"\nrear_axle_limit_kg = 900.0', more="gross_limit_kg = 1850.0\n"
+    )
+    one, other = load_manifest(str(path)).assignments
+    assert one.setup.limits == Limits(gross_limit_kg=1850.0)
+    assert other.setup.limits == Limits(gross_limit_kg=1850.0, rear_axle_limit_kg=900.0)
+    assert other.setup.calibrated is not None
+    assert other.setup.calibrated.vehicle.rear_axle_limit_kg == 900.0
+
+
+def test_in_python_limits_are_given_by_name(tmp_path: Path) -> None:
+    configured(tmp_path)
+    limits = Limits(gross_limit_kg=1850.0)
+    setup = load_setup("springscale:reference", tmp_path / "vehicle.json", "ratio_index", limits=limits)
+    assert setup.calibrated is not None
+    assert setup.calibrated.vehicle.gross_limit_kg == 1850.0

@@ -25,15 +25,18 @@ class Limits:
         """As ``told`` has them, by the same names."""
         return cls(**{one.name: getattr(told, one.name) for one in fields(cls)})
 
-    def stated(self) -> dict[str, float]:
+    def overridden_by(self, nearer: Self) -> Self:
+        """With those that ``nearer`` states in place of these."""
+        return replace(self, **nearer.stated())
+
+    def stated(self) -> dict[str, Any]:
         """Those that somebody said, by name."""
         numbers = {one.name: getattr(self, one.name) for one in fields(self)}
         return {name: kg for name, kg in numbers.items() if kg is not None}
 
     def on(self, vehicle: Vehicle) -> Vehicle:
         """``vehicle`` with these limits; where there is none here it keeps its own."""
-        stated: dict[str, Any] = self.stated()
-        return replace(vehicle, **stated)
+        return replace(vehicle, **self.stated())
 
 
 def over_limit_probability(kg: float, std_kg: float, limit_kg: float | None) -> float:

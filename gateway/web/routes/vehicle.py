@@ -10,7 +10,10 @@ from gateway.status import SignalHealth, Status
 
 
 class VehicleFigures(BaseModel):
-    """The vehicle as its calibration campaign stated it. Masses and share are of the sprung mass; unknown is null."""
+    """The vehicle as its calibration campaign stated it, with the limits in force.
+
+    Masses and share are of the sprung mass; unknown is null.
+    """
 
     name: str
     empty_mass_kg: float
