@@ -1,4 +1,4 @@
-"""The sending side, for replay and simulation only: frames onto a bus, paced by their stamps."""
+"""The sending side: frames onto a bus, by replay and simulation paced by their stamps, or as `broadcast` asks."""
 
 import threading
 import time

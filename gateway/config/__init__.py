@@ -11,6 +11,7 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 
 from gateway.config.sections import (
     OF_CALIBRATION,
+    BroadcastSection,
     CommissioningSection,
     KeepSection,
     LimitKg,
@@ -220,8 +221,22 @@ class Settings(BaseSettings):
     commissioning: CommissioningSection = CommissioningSection()
     position: PositionSection = PositionSection()
     uplink: UplinkSection = UplinkSection()
+    broadcast: BroadcastSection = BroadcastSection()
     trust: TrustSection = TrustSection()
     log: LogSection = LogSection()
+
+    @model_validator(mode="after")
+    def _listens_only(self) -> "Settings":
+        sends, hears = (
+            f"{self.broadcast.interface} {self.broadcast.channel}",
+            f"{self.bus.interface} {self.bus.channel}",
+        )
+        if sends.casefold() == hears.casefold():
+            raise ValueError(
+                f"[broadcast] {sends} is the bus that is listened to, where nothing is ever sent: "
+                "give [broadcast] an interface of its own"
+            )
+        return self
 
     @classmethod
     def settings_customise_sources(

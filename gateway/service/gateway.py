@@ -5,19 +5,29 @@ import contextlib
 import logging
 import signal
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 
 from gateway.bus.live import OpenReceiver, around_of
 from gateway.bus.signals import Decoder
 from gateway.config import Settings
-from gateway.errors import SpringscaleError, StoreError
+from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
 from gateway.service.changes import BatchLog, StateLog, told_in_turn
 from gateway.service.day_book import DayBook
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
-from gateway.service.parts import commissioning_of, keeper_of, ring_log_of, source_of, store_of, tickets_of, uplink_of
+from gateway.service.parts import (
+    board_of,
+    broadcaster_of,
+    commissioning_of,
+    keeper_of,
+    ring_log_of,
+    source_of,
+    store_of,
+    tickets_of,
+    uplink_of,
+)
 from gateway.service.pipeline import Pipeline
 from gateway.service.proving import Proving
 from gateway.service.reload import LoadSettings, Reloader, tls_of
@@ -28,7 +38,6 @@ from gateway.setup import Setup
 from gateway.status import State
 from gateway.uplink import uplink_settings
 from gateway.web import (
-    Board,
     KnownLoads,
     Scales,
     TokenFile,
@@ -79,8 +88,7 @@ class Gateway:
         if setup_fault is not None:
             log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=setup_fault)
             self.store.write_event("setup_fault", {"fault": setup_fault})
-        self.board = Board(stale_after_s=settings.web.stale_after_s)
-        self._restore_board(setup.calibration.id if setup.calibration else None)
+        self.board = board_of(settings.web.stale_after_s, self.store, setup)
         self.source = source_of(settings.bus, setup, open_receiver)
         self.around = around_of(settings.bus.interface, settings.bus.channel, settings.bus.options)
         flow = setup.flow(replace(settings.batch.for_core(is_live=True), position_decimals=settings.position.decimals))
@@ -110,7 +118,9 @@ class Gateway:
         self.proving = Proving(
             settings.store.directory, settings.verification, subject, self.store, self.tare.zeros, tickets
         )
-        self._beside = tuple(part for part in (self.keeper, self.proving, self.ring_log) if part is not None)
+        self.broadcaster = broadcaster_of(settings.broadcast, self.board)
+        parts = (self.keeper, self.proving, self.ring_log, self.broadcaster)
+        self._beside = tuple(part for part in parts if part is not None)
         self.status = StatusReport(
             settings,
             setup,
@@ -155,20 +165,11 @@ class Gateway:
             self.pipeline.roll_rate_fault,
             self.keeper.fault,
             self.ring_log.fault if self.ring_log else None,
+            self.broadcaster.fault if self.broadcaster else None,
             *self.proving.faults,
             self.commissioning.fault,
         )
         return tuple(fault for fault in faults if fault)
-
-    def _restore_board(self, calibration_id: str | None) -> None:
-        """Show what was known before; a disk that refuses even to be read is no reason not to start."""
-        try:
-            self.board.restore(**asdict(self.store.reader().latest()))
-        except (StoreError, ValueError, KeyError) as fault:  # the last two: another version's record
-            log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
-        heard = self.board.heard()
-        if heard is not None and heard.calibration_id != calibration_id:
-            log_event(Event.CALIBRATION_CHANGED, calibration_id=calibration_id, before=heard.calibration_id)
 
     @property
     def url(self) -> str:
@@ -270,8 +271,9 @@ class Gateway:
             return f"the pipeline died: {self.pipeline.failure!r}"
         if not self.store.is_alive():
             return "the database writer died"
-        if self.uplink is not None and not self.uplink.is_alive():
-            return "the uplink died"
+        for name, part in (("uplink", self.uplink), ("sender of weights", self.broadcaster)):
+            if part is not None and not part.is_alive():
+                return f"the {name} died"
         if serving.done():
             return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: is it taken?"
         return None

@@ -1,14 +1,20 @@
 """The parts of a service, each built from its section of the settings."""
 
+import logging
+from dataclasses import asdict
 from importlib.metadata import version
 
+from gateway.bus.broadcast import Broadcaster, Sender
 from gateway.bus.live import LiveSource, OpenReceiver
 from gateway.bus.ring import RingLimits, RingLog
 from gateway.calibration.kept import Shelf, ShelfLimits
 from gateway.calibration.kept.shelf import FOLDER
 from gateway.config import BusSection, Settings, StoreSection
-from gateway.config.sections import KeepSection
+from gateway.config.sections import BroadcastSection, KeepSection
 from gateway.core.flow import Flow
+from gateway.errors import StoreError
+from gateway.estimate import Estimate
+from gateway.log import Event, log_event
 from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle, Worker, why_not_allowed
 from gateway.service.keeper import BatchKeeper
 from gateway.service.proving import TicketDesk
@@ -16,6 +22,7 @@ from gateway.service.tare_desk import Subject
 from gateway.setup import Setup
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings
+from gateway.web import Board
 
 SECONDS_PER_DAY = 86_400.0
 BYTES_PER_MB = 1_000_000
@@ -47,6 +54,20 @@ def store_of(wanted: StoreSection, forwarding: UplinkSettings | None) -> Store:
         undelivered_to=None if forwarding is None else _queue_name(forwarding),
     )
     return Store.open(wanted.directory, keep)
+
+
+def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
+    """It shows what was known before; a disk that refuses even to be read is no reason not to start."""
+    board = Board(stale_after_s=stale_after_s)
+    try:
+        board.restore(**asdict(store.reader().latest()))
+    except (StoreError, ValueError, KeyError) as fault:  # the last two: another version's record
+        log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
+    heard = board.heard()
+    calibration_id = setup.calibration.id if setup.calibration else None
+    if heard is not None and heard.calibration_id != calibration_id:
+        log_event(Event.CALIBRATION_CHANGED, calibration_id=calibration_id, before=heard.calibration_id)
+    return board
 
 
 def keeper_of(wanted: KeepSection, store: StoreSection, setup: Setup) -> BatchKeeper:
@@ -102,6 +123,19 @@ def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | No
         silence_s=wanted.silence_s,
         open_receiver=open_receiver,
     )
+
+
+def broadcaster_of(wanted: BroadcastSection, board: Board) -> Broadcaster | None:
+    """None where nothing is to be sent. What the pages call old is not told to a bus, which has no word for it."""
+    if wanted.interface is None or wanted.channel is None or wanted.source_address is None:
+        return None
+
+    def fresh() -> Estimate | None:
+        shown = board.shown()
+        return None if shown.is_stale else shown.estimate
+
+    sender = Sender(wanted.source_address, wanted.priority, wanted.first_axle, wanted.draws_trailers)
+    return Broadcaster(wanted.interface, wanted.channel, wanted.options, sender, wanted.every_s, fresh)
 
 
 def ring_log_of(settings: Settings, setup: Setup) -> RingLog | None:

@@ -40,6 +40,9 @@ def test_defaults_that_the_shipped_configuration_tells_are_the_defaults(tmp_path
         "vin",
         "tls_certificate",
         "tls_key",
+        "interface",  # of another bus
+        "channel",
+        "source_address",
         *(one.name for one in fields(Limits)),
     ]
     kept = [
