@@ -57,6 +57,14 @@ class CommissioningRefusedError(SpringscaleError):
         self.reason = reason
 
 
+class AlarmRefusedError(SpringscaleError):
+    """An alarm cannot be acknowledged. ``reason`` is for programs; the message says why."""
+
+    def __init__(self, reason: str, message: str) -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
 class CalibrationImpossibleError(SpringscaleError):
     """The known-load drives do not carry enough to calibrate from."""
 

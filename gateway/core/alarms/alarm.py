@@ -1,0 +1,193 @@
+"""One alarm: what it is about, the steps it went through, who has seen it, and its JSON object."""
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, Final
+
+from gateway.estimate import PLACES
+from gateway.records import iso_utc, ns_of
+
+
+class AlarmKind(StrEnum):
+    """What is the matter."""
+
+    OVERLOAD = "overload"
+    IMBALANCE = "imbalance"
+    SENSOR_FAULT = "sensor_fault"
+    DRIFT = "drift"
+    NO_ESTIMATE = "no_estimate"
+
+
+class AlarmState(StrEnum):
+    """How far an alarm has come. It only goes forward, and may leave out ``EARLY``."""
+
+    EARLY = "early"
+    FINAL = "final"
+    CLEARED = "cleared"
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """What an alarm is about: a kind, and where on the vehicle or in what. One alarm of a cause stands at a time."""
+
+    kind: AlarmKind
+    where: str | None = None
+
+    @property
+    def name(self) -> str:
+        """As settings and topics have it: ``overload.gross``, ``no_estimate``."""
+        return self.kind.value if self.where is None else f"{self.kind}.{self.where}"
+
+    def is_named_in(self, names: tuple[str, ...]) -> bool:
+        """By its own name, or by its kind's for all of that kind."""
+        return self.name in names or self.kind.value in names
+
+
+SIDES: Final = Cause(AlarmKind.IMBALANCE, "left_right")
+AXLES: Final = Cause(AlarmKind.IMBALANCE, "front_rear")
+SILENT: Final = Cause(AlarmKind.SENSOR_FAULT, "silent")
+REFUSED: Final = Cause(AlarmKind.SENSOR_FAULT, "refused")
+NO_ESTIMATE: Final = Cause(AlarmKind.NO_ESTIMATE)
+DRIFTING: Final = tuple(Cause(AlarmKind.DRIFT, what) for what in ("damper_front", "damper_rear", "delay", "zero"))
+OVERLOADS: Final = tuple(Cause(AlarmKind.OVERLOAD, place) for place in PLACES)
+CAUSES: Final = (*OVERLOADS, SIDES, AXLES, SILENT, REFUSED, *DRIFTING, NO_ESTIMATE)
+CAUSE_NAMES: Final = tuple(dict.fromkeys([*map(str, AlarmKind), *(cause.name for cause in CAUSES)]))
+"""All that can be switched off."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """What was found, what it may be, and how probable it is that it is beyond; NaN where nothing of the kind is."""
+
+    found: float = math.nan
+    std: float = math.nan
+    limit: float = math.nan
+    unit: str = ""
+    probability: float = math.nan
+    detail: str | None = None
+
+
+NOTHING_FOUND: Final = Figure()
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """When an alarm came to a state, and on what."""
+
+    state: AlarmState
+    t_ns: int
+    figure: Figure
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledged:
+    """Who has seen it, when, and what was said to it."""
+
+    by: str
+    t_ns: int
+    note: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """In one revision; each step and an acknowledgement make another one."""
+
+    cause: Cause
+    vehicle_id: str | None
+    steps: tuple[Step, ...]
+    acknowledged: Acknowledged | None = None
+    revision: int = 1
+
+    @classmethod
+    def begun(cls, cause: Cause, vehicle_id: str | None, step: Step) -> "Alarm":
+        return cls(cause, vehicle_id, (step,))
+
+    @property
+    def id(self) -> str:
+        """The same in every revision."""
+        t_ns = self.steps[0].t_ns // 1000 * 1000  # as its JSON has it
+        digest = hashlib.sha256(f"alarm|{self.vehicle_id}|{self.cause.name}|{t_ns}".encode()).hexdigest()
+        return f"alarm-{t_ns}-{digest[:12]}"
+
+    @property
+    def state(self) -> AlarmState:
+        return self.steps[-1].state
+
+    @property
+    def is_active(self) -> bool:
+        return self.state is not AlarmState.CLEARED
+
+    @property
+    def told_by(self) -> Step:
+        """The step that says what is the matter: the last before it was cleared."""
+        return [step for step in self.steps if step.state is not AlarmState.CLEARED][-1]
+
+    @property
+    def t_last_ns(self) -> int:
+        """When anything last became of it."""
+        return max(self.steps[-1].t_ns, self.acknowledged.t_ns if self.acknowledged else self.steps[-1].t_ns)
+
+    def stepped(self, step: Step) -> "Alarm":
+        return replace(self, steps=(*self.steps, step), revision=self.revision + 1)
+
+    def seen(self, acknowledged: Acknowledged) -> "Alarm":
+        return replace(self, acknowledged=acknowledged, revision=self.revision + 1)
+
+
+def alarm_to_json(alarm: Alarm, words: str) -> dict[str, Any]:
+    """The JSON object; ``words`` is its sentence. Unknown is None."""
+    shown = alarm.acknowledged
+    return {
+        "id": alarm.id,
+        "revision": alarm.revision,
+        "vehicle_id": alarm.vehicle_id,
+        "kind": alarm.cause.kind.value,
+        "where": alarm.cause.where,
+        "state": alarm.state.value,
+        "is_active": alarm.is_active,
+        "t_start": iso_utc(alarm.steps[0].t_ns),
+        "t_end": None if alarm.is_active else iso_utc(alarm.steps[-1].t_ns),
+        "sentence": words,
+        "steps": [
+            {"state": step.state.value, "t": iso_utc(step.t_ns), **_figure_to_json(step.figure)} for step in alarm.steps
+        ],
+        "acknowledged": shown and {"by": shown.by, "at": iso_utc(shown.t_ns), "note": shown.note},
+    }
+
+
+def alarm_from_json(told: Mapping[str, Any]) -> Alarm:
+    """The inverse. Raises ValueError, KeyError or TypeError for what is none."""
+    shown = told["acknowledged"]
+    if not any(step["state"] != AlarmState.CLEARED for step in told["steps"]):
+        raise ValueError("an alarm that never stood")
+    return Alarm(
+        Cause(AlarmKind(told["kind"]), told["where"]),
+        told["vehicle_id"],
+        tuple(Step(AlarmState(step["state"]), ns_of(step["t"]), _figure_from_json(step)) for step in told["steps"]),
+        shown and Acknowledged(shown["by"], ns_of(shown["at"]), shown["note"]),
+        int(told["revision"]),
+    )
+
+
+def _figure_to_json(figure: Figure) -> dict[str, Any]:
+    return {
+        "probability": _known(figure.probability, 4),
+        "found": _known(figure.found, 1),
+        "std": _known(figure.std, 1),
+        "limit": _known(figure.limit, 1),
+        "unit": figure.unit or None,
+        "detail": figure.detail,
+    }
+
+
+def _figure_from_json(told: Mapping[str, Any]) -> Figure:
+    names = ("found", "std", "limit", "probability")
+    numbers = {name: math.nan if told[name] is None else float(told[name]) for name in names}
+    return Figure(**numbers, unit=told["unit"] or "", detail=told["detail"])
+
+
+def _known(x: float, digits: int) -> float | None:
+    return round(x, digits) + 0.0 if math.isfinite(x) else None

@@ -1,0 +1,91 @@
+"""All alarms of one vehicle: at most one of a cause stands, and what becomes of each is told once."""
+
+from collections.abc import Iterable, Sequence
+
+from gateway.core.alarms.alarm import CAUSES, Acknowledged, Alarm, AlarmState, Cause, Figure, Step
+from gateway.core.alarms.drives import NO_DRIVES
+from gateway.core.alarms.rules import AlarmRules, Says
+from gateway.core.alarms.weighing import verdicts_of
+from gateway.core.vehicle import Vehicle
+from gateway.core.weights import NOT_CALIBRATED, Unsprung
+from gateway.errors import AlarmRefusedError
+from gateway.estimate import Estimate
+
+SWITCHED_OFF = Figure(detail="switched off")
+
+
+class AlarmWatch:
+    """The last alarm of each cause, ended or not. What comes in comes in the order of time."""
+
+    def __init__(
+        self,
+        rules: AlarmRules,
+        vehicle_id: str | None,
+        known: Iterable[Alarm] = (),
+        recent: Iterable[Estimate] = (),
+    ) -> None:
+        """Go on from what was: alarms, oldest first, and the last whole batches, oldest first."""
+        self._rules = rules
+        self._vehicle_id = vehicle_id
+        self._last: dict[Cause, Alarm] = {alarm.cause: alarm for alarm in known if alarm.cause in CAUSES}
+        self._drives = NO_DRIVES
+        for estimate in recent:
+            self._drives = self._drives.after(estimate)
+
+    def weigh(self, estimate: Estimate, vehicle: Vehicle | None, unsprung: Unsprung = NOT_CALIBRATED) -> list[Alarm]:
+        """The alarms that one more batch changed, answered or not. Early looks change none."""
+        if estimate.is_provisional:
+            return []
+        self._drives = self._drives.after(estimate)
+        says = list(self._drives.verdicts(self._rules))
+        if estimate.counted:
+            says += verdicts_of(self._rules, estimate, vehicle, unsprung)
+        return self.note(says, estimate.t_end_ns)
+
+    def note(self, says: Sequence[Says], t_ns: int) -> list[Alarm]:
+        """The alarms that this changed."""
+        changed = (self._after(one, t_ns) for one in says)
+        return [alarm for alarm in changed if alarm is not None]
+
+    def end_switched_off(self, t_ns: int) -> list[Alarm]:
+        """Alarms of causes that are off now are over."""
+        off = [alarm.cause for alarm in self.active() if not self._rules.is_on(alarm.cause)]
+        return [self._stepped(cause, Step(AlarmState.CLEARED, t_ns, SWITCHED_OFF)) for cause in off]
+
+    def acknowledge(self, alarm_id: str, by: str, note: str | None, t_ns: int) -> Alarm:
+        """Somebody has seen it. Raises AlarmRefusedError where it is not the last of its cause, or was seen before."""
+        alarm = next((one for one in self._last.values() if one.id == alarm_id), None)
+        if alarm is None:
+            raise AlarmRefusedError("no_such_alarm", f"{alarm_id} is none of the alarms that can be acknowledged")
+        if alarm.acknowledged is not None:
+            who = alarm.acknowledged.by
+            raise AlarmRefusedError("acknowledged_already", f"{alarm_id} was acknowledged by {who}")
+        seen = self._last[alarm.cause] = alarm.seen(Acknowledged(by, t_ns, note))
+        return seen
+
+    def active(self) -> list[Alarm]:
+        """Those that stand, the worst and the oldest first."""
+        standing = [alarm for alarm in self._last.values() if alarm.is_active]
+        return sorted(standing, key=lambda one: (one.state is AlarmState.EARLY, one.steps[0].t_ns))
+
+    def unseen(self) -> list[Alarm]:
+        """Those that ended before anybody acknowledged them, the last of each cause."""
+        return [alarm for alarm in self._last.values() if not alarm.is_active and alarm.acknowledged is None]
+
+    def _after(self, says: Says, t_ns: int) -> Alarm | None:
+        """The alarm in a new revision; None where nothing has become of it."""
+        if not self._rules.is_on(says.cause):
+            return None
+        last = self._last.get(says.cause)
+        before = None if last is None else last.state
+        after = says.verdict.state_after(before)
+        if after is None or after is before:
+            return None
+        return self._stepped(says.cause, Step(after, t_ns, says.figure))
+
+    def _stepped(self, cause: Cause, step: Step) -> Alarm:
+        last = self._last.get(cause)
+        goes_on = last is not None and last.is_active
+        alarm = last.stepped(step) if last is not None and goes_on else Alarm.begun(cause, self._vehicle_id, step)
+        self._last[cause] = alarm
+        return alarm

@@ -1,0 +1,69 @@
+"""What one batch, and the batches of its load together, say of overload and imbalance."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from gateway.core.alarms.alarm import AXLES, OVERLOADS, SIDES, Figure
+from gateway.core.alarms.rules import AlarmRules, Says, Verdict
+from gateway.core.vehicle import Vehicle, left_share_pct
+from gateway.core.weights import NOT_CALIBRATED, Unsprung, over_limit_probability, weighed
+from gateway.estimate import UNKNOWN, Estimate, Quantity
+
+
+def verdicts_of(
+    rules: AlarmRules, estimate: Estimate, vehicle: Vehicle | None, unsprung: Unsprung = NOT_CALIBRATED
+) -> Iterator[Says]:
+    """Of a whole batch that counted, and of the load epoch it belongs to (core.fusion).
+
+    The load's weights follow from what its batches found together as the batch's own follow from its numbers; errors
+    are taken to be as correlated as the batch's.
+    """
+    load, n_batches = as_of_load(estimate), 1 if estimate.epoch is None else estimate.epoch.n_batches
+    together = weighed(load, vehicle, unsprung).weights if vehicle else estimate.weights
+    for cause, (place, alone) in zip(OVERLOADS, estimate.weights.items(), strict=True):
+        one = getattr(together, place)
+        if one.limit_kg is None:
+            yield Says(cause, Verdict.CLEAR, Figure(detail="no limit is given"))
+            continue
+        probability = over_limit_probability(one.kg, one.std_kg, one.limit_kg)
+        by_batch = over_limit_probability(alone.kg, alone.std_kg, one.limit_kg)
+        figure = Figure(one.kg, one.std_kg, one.limit_kg, "kg", probability)
+        yield Says(cause, rules.of_probability(by_batch, probability, n_batches), figure)
+    shares = (
+        (SIDES, _left_share(estimate, vehicle), _left_share(load, vehicle), rules.side_share_max_pct),
+        (AXLES, estimate.front_share, load.front_share, rules.axle_share_max_pct),
+    )
+    for cause, by_one, by_all, most_pct in shares:
+        probability = beyond_probability(by_all, most_pct)
+        figure = Figure(_larger(by_all.number), by_all.std, most_pct, "%", probability)
+        yield Says(cause, rules.of_probability(beyond_probability(by_one, most_pct), probability, n_batches), figure)
+
+
+def as_of_load(estimate: Estimate) -> Estimate:
+    """The estimate with what all batches of its load found together, where that is known."""
+    epoch = estimate.epoch
+    if epoch is None:
+        return estimate
+    return replace(estimate, payload=epoch.payload, front_share=epoch.front_share, cg_left=epoch.cg_left)
+
+
+def beyond_probability(share: Quantity, most_pct: float) -> float:
+    """P(one of two sides bears more than ``most_pct``), 0 to 1, of a share with a normal error; NaN where unknown.
+
+    With the one side's share X, P(X > m) + P(100 - X > m), the two being exclusive for m of 50 and more.
+    """
+    one = over_limit_probability(share.number, share.std, most_pct)
+    return one + over_limit_probability(100.0 - share.number, share.std, most_pct)
+
+
+def _left_share(estimate: Estimate, vehicle: Vehicle | None) -> Quantity:
+    cg_left = estimate.cg_left
+    if vehicle is None or vehicle.track_width_m is None or math.isnan(cg_left.number):
+        return UNKNOWN
+    track_m = vehicle.track_width_m
+    return Quantity(left_share_pct(cg_left.number, track_m), 100.0 * cg_left.std / track_m)
+
+
+def _larger(share_pct: float) -> float:
+    return max(share_pct, 100.0 - share_pct)

@@ -1,0 +1,36 @@
+"""An alarm as a sentence for people."""
+
+import math
+from typing import Final
+
+from gateway.core.alarms.alarm import Alarm, AlarmKind, AlarmState, Figure
+from gateway.estimate import Z95
+
+_PLACES: Final = {"gross": "The vehicle", "front_axle": "The front axle", "rear_axle": "The rear axle"}
+_BALANCES: Final = {"left_right": "one side", "front_rear": "one axle"}
+_ENDS: Final = {AlarmState.EARLY: "", AlarmState.FINAL: " (confirmed)", AlarmState.CLEARED: " (over)"}
+
+
+def sentence(alarm: Alarm) -> str:
+    """What is the matter, and how sure that is."""
+    return f"{_said(alarm, alarm.told_by.figure)}{_ENDS[alarm.state]}"
+
+
+def _said(alarm: Alarm, figure: Figure) -> str:
+    cause, where = alarm.cause, alarm.cause.where or ""
+    if cause.kind is AlarmKind.OVERLOAD:
+        subject = _PLACES.get(where, f"The wheel at the {where.replace('_', ' ')}")
+        return f"{subject} weighs {_give_or_take(figure, 'kg')}, {figure.limit:.0f} kg are permitted"
+    if cause.kind is AlarmKind.IMBALANCE:
+        return f"{_BALANCES[where].capitalize()} bears {_give_or_take(figure, '%')}, {figure.limit:.0f} % are the most"
+    if cause.kind is AlarmKind.NO_ESTIMATE:
+        return f"{figure.found:.0f} minutes were driven without an estimate: {figure.detail or 'no reason is known'}"
+    if cause.kind is AlarmKind.DRIFT:
+        return f"{where.replace('_', ' ').capitalize()} drifts: {figure.detail}"
+    said = "A sensor is silent" if where == "silent" else "Batches are refused for a sensor's sake"
+    return f"{said}: {figure.detail}" if figure.detail else said
+
+
+def _give_or_take(figure: Figure, unit: str) -> str:
+    take = "" if math.isnan(figure.std) else f" +- {Z95 * figure.std:.0f}"
+    return f"{figure.found:.0f}{take} {unit}"
