@@ -156,6 +156,13 @@ class UplinkSection(Section):
     client_id: str | None = Field(None, min_length=1, description="[default: springscale- and the vehicle's id]")
     keep_alive_s: int = Field(60, ge=5, le=3600, description="the link is probed after this long without traffic")
     back_off_max_s: Seconds = Field(300.0, description="longest pause between two tries to connect")
+    repeat_s: float = Field(
+        0.0,
+        ge=0.0,
+        le=86_400.0,
+        description="after a break, what was delivered in the last so many seconds before it is sent again: more than "
+        "the broker forgets when it is killed",
+    )
 
     @model_validator(mode="after")
     def _keeps_its_secrets(self) -> "UplinkSection":

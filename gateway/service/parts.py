@@ -39,7 +39,8 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with
         "estimator": setup.estimator,
         "calibration_id": setup.calibration.id if setup.calibration else None,
     }
-    return Uplink(wanted, Outbox(store.reader(), store, _queue_name(wanted), with_places=with_places), birth)
+    outbox = Outbox(store.reader(), store, _queue_name(wanted), with_places=with_places, repeat_s=wanted.repeat_s)
+    return Uplink(wanted, outbox, birth)
 
 
 def _queue_name(wanted: UplinkSettings) -> str:

@@ -1,6 +1,8 @@
 """What is still to be delivered. The store is the queue: the outbox only knows how far it has come."""
 
 import json
+import time
+from collections import deque
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
@@ -38,6 +40,27 @@ class Memory(Protocol):
     def write_delivery(self, uplink: str, cursor: str) -> bool: ...
 
 
+class Lately:
+    """Where the outbox stood before each of the letters that were delivered last, as long as they may be forgotten."""
+
+    def __init__(self, span_s: float) -> None:
+        self._span_s = span_s
+        self._before: deque[tuple[float, str | None]] = deque()
+
+    def delivered(self, before: str | None, now_s: float) -> None:
+        """A letter was taken; ``before`` is the place before it."""
+        if self._span_s > 0.0:
+            self._before.append((now_s, before))
+            while now_s - self._before[0][0] > self._span_s:
+                self._before.popleft()
+
+    def before_it(self, place: str | None) -> str | None:
+        """The place before the oldest of them, from where all go out again; ``place`` where there is none."""
+        oldest = self._before[0][1] if self._before else place
+        self._before.clear()
+        return oldest
+
+
 class Outbox:
     """Hands out letters in order, and again from the last delivered one after :meth:`rewind`.
 
@@ -45,12 +68,18 @@ class Outbox:
     new one remembers counts then, and without that everything it holds goes out; ids are idempotent.
     """
 
-    def __init__(self, history: History, memory: Memory, name: str, *, with_places: bool = False) -> None:
-        """``with_places`` lets positions go out where the store keeps them."""
+    def __init__(
+        self, history: History, memory: Memory, name: str, *, with_places: bool = False, repeat_s: float = 0.0
+    ) -> None:
+        """``with_places`` lets positions go out where the store keeps them.
+
+        ``repeat_s``: a broker that is killed forgets what it took since it last saved.
+        """
         self._history = history
         self._memory = memory
         self._name = name
         self._with_places = with_places
+        self._lately = Lately(repeat_s)
         self._delivered: str | None = None  # until the store was asked
         self._handed_out: str | None = None
 
@@ -66,12 +95,13 @@ class Outbox:
 
     def delivered(self, letter: Letter) -> None:
         """The broker has this letter and all before it."""
+        self._lately.delivered(self._delivered, time.monotonic())
         self._delivered = letter.cursor
         self._memory.write_delivery(self._name, letter.cursor)
 
     def rewind(self) -> None:
-        """The link broke: what was handed out and not delivered goes out again."""
-        self._handed_out = self._delivered
+        """The link broke: what was handed out and not delivered goes out again, and what was delivered lately."""
+        self._delivered = self._handed_out = self._lately.before_it(self._delivered)
 
     def look(self) -> Delivery:
         """How much waits and how much retention removed undelivered, as the store has it."""

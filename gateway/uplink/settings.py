@@ -32,6 +32,7 @@ class UplinkSettings:
     password_file: Path | None = None
     keep_alive_s: int = 60
     back_off_max_s: float = 300.0
+    repeat_s: float = 0.0
 
     @property
     def broker(self) -> str:
@@ -87,6 +88,7 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
         **section.model_dump(include={"tls", "ca", "certificate", "key", "username", "password_file"}),
         keep_alive_s=section.keep_alive_s,
         back_off_max_s=section.back_off_max_s,
+        repeat_s=section.repeat_s,
     )
     names = {"topic": f"{topic}/estimates", "client_id": settings.client_id, "username": settings.username}
     for name, text in names.items():
