@@ -1,6 +1,6 @@
 """What the service tells of itself, in types and in words: filled in by its parts, sent as it is by the web."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated, Final
 
@@ -159,6 +159,16 @@ class VerificationStatus:
     is_due: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class AlarmsStatus:
+    """Who must know now; counts begin at the start of the service."""
+
+    standing: Annotated[dict[str, str], Field(description="by name: early or final")] = field(default_factory=dict)
+    n_unacknowledged: Annotated[int, Field(description="that stand, or ended before anybody saw them")] = 0
+    n_told: Annotated[int, Field(description="early and final words since the start")] = 0
+    watched: Annotated[tuple[str, ...], Field(description="names of all that are not switched off")] = ()
+
+
 class Status(_Told):
     """The service as it is now; counts begin at its start."""
 
@@ -179,6 +189,7 @@ class Status(_Told):
     uplink: UplinkStatus | None = Field(None, description="null where no broker is configured")
     record: RecordStatus | None = Field(None, description="the ring log; null where it is off")
     verification: VerificationStatus = VerificationStatus()
+    alarms: AlarmsStatus = AlarmsStatus()
     is_ready: bool = Field(True, description="whether estimates can come: what /health/ready tells")
     not_ready_reason: str | None = None
     warnings: tuple[str, ...] = Field(

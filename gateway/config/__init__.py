@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
+from gateway.config.alarms import AlarmsSection
 from gateway.config.sections import (
     OF_CALIBRATION,
     BroadcastSection,
@@ -227,6 +228,7 @@ class Settings(BaseSettings):
     verification: VerificationSection = VerificationSection()
     commissioning: CommissioningSection = CommissioningSection()
     position: PositionSection = PositionSection()
+    alarms: AlarmsSection = AlarmsSection()
     uplink: UplinkSection = UplinkSection()
     broadcast: BroadcastSection = BroadcastSection()
     trust: TrustSection = TrustSection()

@@ -45,8 +45,10 @@ def ledger_of(reader: StoreReader, rules: Rules) -> Ledger:
     """The ledger as it was when the service stopped. Raises what the store's reader raises."""
     page = reader.estimates(limit=HORIZON, newest_first=True, with_spectra=False)
     estimates = [estimate_from_json(json.loads(text)) for text in reversed(page.items)]
-    told = reader.entries(since_ns=estimates[0].t_start_ns, limit=MOST, newest_first=True) if estimates else None
-    known = [_entry(json.loads(text)) for text in told.items] if told else []
+    known: list[Entry] = []
+    for kind in EntryKind if estimates else ():
+        told = reader.entries(kind=kind, since_ns=estimates[0].t_start_ns, limit=MOST, newest_first=True)
+        known += (_entry(json.loads(text)) for text in told.items)
     return Ledger(rules, estimates, known)
 
 

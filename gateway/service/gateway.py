@@ -13,6 +13,7 @@ from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
+from gateway.service.alarm_desk import AlarmDesk
 from gateway.service.changes import BatchLog, StateLog, told_in_turn
 from gateway.service.day_book import DayBook
 from gateway.service.last_good import keep_copy
@@ -96,17 +97,18 @@ class Gateway:
         self.commissioning = commissioning_of(settings, setup, self.keeper, flow, self.store)
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
+        subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
+        self.alarms = AlarmDesk(settings.alarms.for_core(), subject, self.store, self.board)
         self.pipeline = Pipeline(
             self.source.inbox,
             Decoder(setup.signal_map),
             flow,
             self.store,
             self.board,
-            told_in_turn(log_batch, DayBook(setup, self.store, self.board)),
+            told_in_turn(log_batch, DayBook(setup, self.store, self.board), self.alarms),
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
         self.uplink = uplink_of(forwarding, setup, self.store, with_places=settings.position.forward)
-        subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
         self.tare = TareDesk(
             settings.store.directory,
             subject,
@@ -132,6 +134,7 @@ class Gateway:
             self.ring_log,
             self.proving.verification.status,
             around=self.around,
+            alarms=self.alarms.summary,
             warnings=self._warnings,
         )
         app = create_app(
@@ -147,6 +150,7 @@ class Gateway:
             verification=self.proving.verification,
             trend=self.proving.trend,
             tickets=tickets,
+            alarms=self.alarms,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = WebServer(web)
@@ -158,17 +162,9 @@ class Gateway:
 
     def _warnings(self) -> tuple[str, ...]:
         """What is broken beside the weighing, as people read it."""
-        faults = (
-            self._tokens.fault,
-            self.tare.fault,
-            self._reload.fault,
-            self.pipeline.roll_rate_fault,
-            self.keeper.fault,
-            self.ring_log.fault if self.ring_log else None,
-            self.broadcaster.fault if self.broadcaster else None,
-            *self.proving.faults,
-            self.commissioning.fault,
-        )
+        parts = (self._tokens, self.tare, self._reload, self.keeper, self.ring_log, self.broadcaster)
+        faults = [part.fault for part in parts if part is not None]
+        faults += (self.pipeline.roll_rate_fault, *self.proving.faults, self.commissioning.fault)
         return tuple(fault for fault in faults if fault)
 
     @property
@@ -246,6 +242,7 @@ class Gateway:
                 self._notifier.send(WATCHDOG="1")
             now = self.status()
             log_state(now)
+            self.alarms.watch(now, self.proving.trend.trends)
             self._look_around(now.state)
             if self.commissioning.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
                 self.is_to_start_anew = True

@@ -11,7 +11,16 @@ from gateway.config import Settings
 from gateway.records import Signal
 from gateway.service.pipeline import Pipeline
 from gateway.setup import Setup
-from gateway.status import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, VerificationStatus
+from gateway.status import (
+    AlarmsStatus,
+    BatchCounts,
+    BusStatus,
+    DecodeCount,
+    SignalHealth,
+    State,
+    Status,
+    VerificationStatus,
+)
 from gateway.store import Store
 from gateway.uplink import Uplink
 from gateway.web import Board
@@ -37,6 +46,7 @@ class StatusReport:
         verification: Callable[[], VerificationStatus] = VerificationStatus,
         *,
         around: Around,
+        alarms: Callable[[], AlarmsStatus] = AlarmsStatus,
         warnings: Callable[[], tuple[str, ...]] = tuple,
     ) -> None:
         self._settings = settings
@@ -49,6 +59,7 @@ class StatusReport:
         self._around = around
         self._ring_log = ring_log
         self._verification = verification
+        self._alarms = alarms
         self._warnings = warnings
         self._version = version("springscale")  # read once: it is a file, and a status must not want one
         self._started = time.monotonic()
@@ -79,6 +90,7 @@ class StatusReport:
             uplink=self._uplink.report() if self._uplink else None,
             record=self._ring_log.status() if self._ring_log else None,
             verification=self._verification(),
+            alarms=self._alarms(),
             is_ready=not_ready is None,
             not_ready_reason=not_ready,
             warnings=self._warnings(),

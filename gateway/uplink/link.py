@@ -68,7 +68,8 @@ class MqttLink:
             self._answers.append(Answer(_NOTHING, False, True, f"larger than the broker's {self._most_bytes} bytes"))
             return _NOTHING
         said = {"ContentType": "application/json", "PayloadFormatIndicator": 1, "UserProperty": [("id", letter.id)]}
-        self._under_way = self._publish(letter.branch, letter.text, properties=_properties(PacketTypes.PUBLISH, said))
+        properties = _properties(PacketTypes.PUBLISH, said)
+        self._under_way = self._publish(letter.branch, letter.text, retain=letter.is_retained, properties=properties)
         return self._under_way
 
     def turn(self, timeout_s: float) -> list[Answer]:

@@ -3,27 +3,28 @@
 import json
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 from gateway.history import Delivery, Page
 from gateway.records import json_line
 
-BRANCHES: Final = {"event": "events", "trip": "trips"}
+_BRANCHES: Final = {"event": "events", "trip": "trips", "alarm": "alarms"}
 
 
 @dataclass(frozen=True, slots=True)
 class Letter:
-    """One estimate or rejection, load event or trip: its place in the store, its idempotent id, its JSON.
+    """One estimate or rejection, load event, trip or alarm: its place in the store, its idempotent id, its JSON.
 
     ``branch`` is the topic below the vehicle's. An estimate has no spectra, and a ``sequence`` of its own: which store
-    it comes from, its number there, and the number before it.
+    it comes from, its number there, and the number before it. What is retained tells who comes later how things stand.
     """
 
     cursor: str
     id: str
     text: str
     branch: str = "estimates"
+    is_retained: bool = False
 
 
 class History(Protocol):
@@ -116,9 +117,7 @@ class Outbox:
             for place, previous, text in zip(page.cursors, page.previous, page.items, strict=True)
         ]
         for place, text in zip(beside.cursors, beside.items, strict=True):
-            record = self._shown(json.loads(text))
-            kind = record["id"].partition("-")[0]
-            letters.append(Letter(place, f"{record['id']}-{record['revision']}", json_line(record), BRANCHES[kind]))
+            letters.append(_entry_letter(place, self._shown(json.loads(text))))
         last = min((_number(place) for place in (beside.next_cursor, page.next_cursor) if place), default=None)
         kept = [one for one in letters if last is None or _number(one.cursor) <= last]
         return sorted(kept, key=lambda one: _number(one.cursor))
@@ -149,6 +148,16 @@ def _bare(part: Any) -> Any:
 
 def _number(cursor: str) -> int:
     return int(cursor.partition("-")[2])
+
+
+def _entry_letter(cursor: str, record: dict[str, Any]) -> Letter:
+    """Alarms have a topic for each cause, where the last one is retained."""
+    kind = record["id"].partition("-")[0]
+    letter = Letter(cursor, f"{record['id']}-{record['revision']}", json_line(record), _BRANCHES[kind])
+    if kind != "alarm":
+        return letter
+    below = [part for part in (record["kind"], record["where"]) if part]
+    return replace(letter, branch="/".join((letter.branch, *below)), is_retained=True)
 
 
 def _letter(cursor: str, previous: int | None, record: dict[str, Any]) -> Letter:

@@ -26,9 +26,11 @@ from gateway.web.live import Board, LatestFirst
 from gateway.web.reader import Reader
 from gateway.web.routes import (
     KNOWN_LOADS_PATH,
+    AlarmDesk,
     CommissioningDesk,
     FrameLog,
     KnownLoads,
+    NoAlarmDesk,
     NoCommissioningDesk,
     NoFrameLog,
     NoTareDesk,
@@ -40,6 +42,7 @@ from gateway.web.routes import (
     TicketDesk,
     TrendDesk,
     VerificationDesk,
+    alarms_router,
     api_router,
     commissioning_router,
     events_router,
@@ -82,6 +85,7 @@ def create_app(
     verification: VerificationDesk | None = None,
     trend: TrendDesk | None = None,
     tickets: TicketDesk | None = None,
+    alarms: AlarmDesk | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the
@@ -123,6 +127,7 @@ def create_app(
     app.include_router(commissioning_router(commissioning or NoCommissioningDesk()))
     app.include_router(export_router(reader))
     app.include_router(events_router(reader))
+    app.include_router(alarms_router(reader, alarms or NoAlarmDesk()))
     app.include_router(record_router(record or NoFrameLog()))
     app.include_router(weights_router(board, scales))
     app.include_router(j1939_router(board, scales))

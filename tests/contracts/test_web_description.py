@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from schemathesis import GenerationMode
 from schemathesis.schemas import APIOperation, BaseSchema
 from schemathesis.specs.openapi.checks import positive_data_acceptance
+from support.alarms import LIMIT_KG, SUBJECT, of_load
 from support.calibrated import calibration_file
 from support.commissioning import Bench
 from support.estimates import make_estimate
@@ -20,13 +21,16 @@ from support.patience import PATIENCE_S
 from support.tare import FakePipeline
 from support.web import Gateway
 
+from gateway.core.alarms import AlarmRules
 from gateway.records import Why
+from gateway.service.alarm_desk import AlarmDesk
 from gateway.service.tare_desk import Subject, TareDesk
 from gateway.web import Scope, TokenFile, WebSettings
 
 COMMISSIONING = "/api/v1/calibration/commissioning"
 STEPS = ("lines", "line", "vehicle", "empty", "fit", "undo")
 CHANGES = [
+    "POST /api/v1/alarms/{alarm_id}/acknowledgement",
     "POST /api/v1/calibration/tare",
     "DELETE /api/v1/calibration/tare",
     "POST /api/v1/calibration/tickets",
@@ -44,6 +48,7 @@ PATHS = [
     "/api/v1/reasons",
     "/api/v1/vehicle",
     "/api/v1/spectra/latest",
+    "/api/v1/alarms",
     "/api/v1/events",
     "/api/v1/events.csv",
     "/api/v1/events.jsonl",
@@ -103,6 +108,7 @@ def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
         ) as gateway,
     ):
         gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
+        AlarmDesk(AlarmRules(), SUBJECT, gateway.store, gateway.board)(of_load(0, LIMIT_KG + 60.0))
         assert gateway.store.flush(PATIENCE_S)
         gateway.board.close()  # so that the stream has an end
         yield schemathesis.openapi.from_asgi("/openapi.json", gateway.app)

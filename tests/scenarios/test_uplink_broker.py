@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import trustme
+from support.alarms import LIMIT_KG, AlarmBench, of_load
 from support.broker import CuttableLink, Listener, needs_mosquitto, running_broker
 from support.estimates import make_record
 from support.patience import PATIENCE_S, wait_until
@@ -229,3 +230,28 @@ def test_a_killed_vehicle_is_announced_by_its_will(tmp_path: Path, monkeypatch: 
         listener.close()
         store.close()
     assert json.loads(listener.heard[-1].payload) == {"state": "offline", "reason": "lost"}
+
+
+def test_an_alarm_is_retained_where_its_cause_has_its_topic(tmp_path: Path) -> None:
+    """Who subscribes later hears how each stands; every revision goes out, in order with the rest."""
+    bench = AlarmBench(tmp_path / "state")
+    with running_broker(tmp_path) as broker:
+        uplink = started(bench.store, settings_of(broker.port))
+        first = Listener(broker.port, "springscale/van-17/#")
+        for n, kg in enumerate((LIMIT_KG + 60.0, 100.0)):
+            bench.weigh(of_load(n, kg))
+            assert first.wait_for(1 + 2 * (n + 1))  # the presence comes first
+        first.close()
+        later = Listener(broker.port, "springscale/van-17/alarms/#", client_id="later")
+        assert later.wait_for(1)
+        later.close()
+        uplink.stop()
+    bench.store.close()
+    topics = [message.topic.removeprefix("springscale/van-17/") for message in first.heard]
+    assert topics[1:] == ["estimates", "alarms/overload/gross"] * 2
+    (kept,) = later.heard
+    alarm = json.loads(kept.payload)
+    assert (kept.retain, kept.topic, alarm["state"], alarm["revision"]) == (
+        True, "springscale/van-17/alarms/overload/gross", "cleared", 2,
+    )  # fmt: skip
+    assert dict(kept.properties.UserProperty)["id"] == f"{alarm['id']}-2"

@@ -1,11 +1,21 @@
-"""Made-up loads about a limit: whole batches with what they and their load say, as the flow would give them."""
+"""Made-up loads about a limit, whole batches as the flow would give them; and a desk of alarms that hears of them."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
+from gateway.core.alarms import AlarmRules
+from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import weighed
 from gateway.estimate import Epoch, Estimate, Quantity
-from support.days import batch
+from gateway.estimate_json import estimate_to_json
+from gateway.service.alarm_desk import AlarmDesk
+from gateway.service.tare_desk import Subject
+from gateway.store import Store
+from gateway.web import Board
+from support.days import at, batch
 
 VAN = Vehicle(
     "van",
@@ -39,3 +49,38 @@ def of_load(
         epoch=Epoch(together, Quantity.normal(share_pct, 0.5), n_batches),
     )
     return weighed(found, VAN)
+
+
+SUBJECT = Subject(CalibratedVehicle("sha256:1", VAN, (0.0, 900.0), (40.0, 60.0)), "cross_spectrum", "van-17")
+
+
+class AlarmBench:
+    """A desk over a real store, without a pipeline; ``clock_s`` is the test's to set, the wall clock follows it."""
+
+    def __init__(self, directory: Path, rules: AlarmRules | None = None) -> None:
+        self.directory, self.rules = directory, rules or AlarmRules()
+        self.clock_s = 0.0
+        self.start()
+
+    def start(self) -> None:
+        """As a new start of the service would."""
+        self.store, self.board = Store.open(self.directory), Board()
+        self.desk = AlarmDesk(
+            self.rules, SUBJECT, self.store, self.board, lambda: at(self.clock_s / 60.0), lambda: self.clock_s
+        )
+
+    def restart(self) -> None:
+        self.store.close()
+        self.start()
+
+    def weigh(self, found: Estimate) -> None:
+        """As the pipeline does."""
+        self.store.write_estimate(estimate_to_json(found))
+        self.desk(found)
+
+    def standing(self) -> list[dict[str, Any]]:
+        told: list[dict[str, Any]] = json.loads(self.desk.standing())
+        return told
+
+    def history(self) -> list[dict[str, Any]]:
+        return [json.loads(text) for text in self.store.reader().entries(kind="alarm", limit=1000).items]

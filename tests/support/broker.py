@@ -58,9 +58,9 @@ class Broker:
 class Listener:
     """What a fleet's back-end hears: a session of its own that the broker keeps while it is away."""
 
-    def __init__(self, port: int, topic: str) -> None:
+    def __init__(self, port: int, topic: str, client_id: str = "back-end") -> None:
         self.heard: list[mqtt.MQTTMessage] = []
-        self._client = mqtt.Client(CallbackAPIVersion.VERSION2, "back-end", protocol=mqtt.MQTTv5)
+        self._client = mqtt.Client(CallbackAPIVersion.VERSION2, client_id, protocol=mqtt.MQTTv5)
         self._client.reconnect_delay_set(0.05, 0.2)
         self._client.on_message = lambda _client, _userdata, message: self.heard.append(message)
         subscribed = threading.Event()

@@ -1,6 +1,7 @@
 """All alarms of one vehicle: at most one of a cause stands, and what becomes of each is told once."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from gateway.core.alarms.alarm import CAUSES, Acknowledged, Alarm, AlarmState, Cause, Figure, Step
 from gateway.core.alarms.drives import NO_DRIVES
@@ -84,8 +85,11 @@ class AlarmWatch:
         return self._stepped(says.cause, Step(after, t_ns, says.figure))
 
     def _stepped(self, cause: Cause, step: Step) -> Alarm:
+        """No alarm goes back in time: batches have the bus's clock, all else the computer's."""
         last = self._last.get(cause)
-        goes_on = last is not None and last.is_active
-        alarm = last.stepped(step) if last is not None and goes_on else Alarm.begun(cause, self._vehicle_id, step)
+        if last is not None and last.is_active:
+            alarm = last.stepped(replace(step, t_ns=max(step.t_ns, last.steps[-1].t_ns)))
+        else:
+            alarm = Alarm.begun(cause, self._vehicle_id, step)
         self._last[cause] = alarm
         return alarm

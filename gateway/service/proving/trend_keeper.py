@@ -55,6 +55,11 @@ class TrendKeeper:
         said = [sentence for trend in self._trends if (sentence := trend.sentence()) is not None]
         return "; ".join(said) or self._file.fault
 
+    @property
+    def trends(self) -> Sequence[Trend]:
+        """As they were judged last: the same object until they are judged anew."""
+        return self._trends
+
     def told(self) -> str:
         """JSON: a TrendState."""
         return json_line(

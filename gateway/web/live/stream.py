@@ -21,10 +21,10 @@ _REMEMBERED: Final = 1024  # replayed rows that may still arrive live: a row is 
 
 EVENT_SCHEMA: Final[dict[str, Any]] = {
     "type": "object",
-    "description": "one server-sent event; data is JSON: an Estimate, a LoadEvent, a Trip, or {detail} at its end",
+    "description": "one server-sent event; data is JSON: an Estimate, a LoadEvent, a Trip, an Alarm, or {detail}",
     "properties": {
         "id": {"type": "string", "description": "cursor: send it as Last-Event-ID to go on behind it"},
-        "event": {"enum": ["estimate", "rejection", "provisional", "event", "trip", "lagged", "closing"]},
+        "event": {"enum": ["estimate", "rejection", "provisional", "event", "trip", "alarm", "lagged", "closing"]},
         "data": {"type": "string"},
     },
     "required": ["event", "data"],
@@ -113,7 +113,7 @@ class EventStream(Response):
 
 
 def entry_kind(text: str) -> str:
-    """event or trip, as its id begins."""
+    """event, trip or alarm, as its id begins."""
     kind: str = json.loads(text)["id"].partition("-")[0]
     return kind
 

@@ -4,6 +4,7 @@ The live board, the store's reader and the service's status come in; a router a 
 puts together. Here an estimate becomes weights, metrics, and the words of rFMS, VSS and J1939.
 """
 
+from gateway.web.routes.alarms import AlarmDesk, NoAlarmDesk, alarms_router
 from gateway.web.routes.calibration import (
     NoTareDesk,
     NoTicketDesk,
@@ -36,11 +37,13 @@ from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest, weig
 
 __all__ = [
     "KNOWN_LOADS_PATH",
+    "AlarmDesk",
     "CommissioningDesk",
     "FrameLog",
     "KnownLoad",
     "KnownLoads",
     "LatestWeights",
+    "NoAlarmDesk",
     "NoCommissioningDesk",
     "NoFrameLog",
     "NoTareDesk",
@@ -52,6 +55,7 @@ __all__ = [
     "TicketDesk",
     "TrendDesk",
     "VerificationDesk",
+    "alarms_router",
     "api_router",
     "commissioning_router",
     "events_router",

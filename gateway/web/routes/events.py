@@ -162,6 +162,11 @@ def events_router(reader: Reader) -> APIRouter:
 
 
 async def _page(reader: Reader, kind: EntryKind, query: EntriesQuery) -> Response:
+    return Response("{" + await entries_of(reader, kind, query), media_type="application/json")
+
+
+async def entries_of(reader: Reader, kind: str, query: EntriesQuery) -> str:
+    """One page of entries as the rest of a JSON object. Raises RequestValidationError for a cursor that is none."""
     try:
         page = await asyncio.to_thread(
             reader.entries,
@@ -175,7 +180,7 @@ async def _page(reader: Reader, kind: EntryKind, query: EntriesQuery) -> Respons
     except ValueError as error:
         raise RequestValidationError([{"loc": ("query", "cursor"), "msg": str(error)}]) from None
     tail = json_line({"next_cursor": page.next_cursor, "last_cursor": page.last_cursor})[1:]
-    return Response(f'{{"items":[{",".join(page.items)}],{tail}', media_type="application/json")
+    return f'"items":[{",".join(page.items)}],{tail}'
 
 
 def _file_of(reader: Reader, kind: EntryKind, ending: str) -> Callable[..., Any]:

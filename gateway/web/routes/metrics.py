@@ -11,6 +11,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from gateway.estimate import PLACES
 from gateway.status import RecordStatus, State, Status, UplinkStatus, VerificationStatus
 from gateway.web.live.board import Board
+from gateway.web.routes.alarms.figures import alarm_metrics
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 
 
@@ -35,6 +36,7 @@ class StatusCollector:
         yield from _batches(now)
         yield from _store(now)
         yield from _verification(now.verification)
+        yield from alarm_metrics(now.alarms)
         if now.record is not None:
             yield from _record(now.record)
         if now.uplink is not None:

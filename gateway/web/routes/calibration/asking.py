@@ -7,20 +7,25 @@ from typing import Any, Final
 from fastapi import Request
 from starlette.responses import Response
 
-from gateway.errors import CommissioningRefusedError, TareRefusedError, WeightRefusedError
+from gateway.errors import AlarmRefusedError, CommissioningRefusedError, TareRefusedError, WeightRefusedError
 from gateway.web.door.problems import problem_response
 from gateway.web.schemas import problem_responses
 
 LOCAL: Final = "local"  # who asks where no tokens are in use
 REFUSALS: Final = problem_responses(409, 503)
-_CODES: Final = {"not_stored": 503, "not_allowed": 403, "no_such_line": 404}  # of reasons; else 409
+_CODES: Final = {
+    "not_stored": 503,
+    "not_allowed": 403,
+    "no_such_line": 404,
+    "no_such_alarm": 404,
+}  # of reasons; else 409
 
 
 async def answered(request: Request, ask: Callable[[], str], status: int = 200) -> Response:
     """What ``ask`` answers, or the problem with which it refuses."""
     try:
         return json_response(await asyncio.to_thread(ask), status)
-    except (CommissioningRefusedError, TareRefusedError, WeightRefusedError) as refusal:
+    except (AlarmRefusedError, CommissioningRefusedError, TareRefusedError, WeightRefusedError) as refusal:
         code = _CODES.get(refusal.reason, 409)
         return problem_response(code, str(refusal), request.url.path, reason=refusal.reason)
 

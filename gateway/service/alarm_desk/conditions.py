@@ -1,0 +1,52 @@
+"""What no batch can say: a sensor that is not heard, a vehicle that drifts."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+from gateway.calibration.trend import Trend
+from gateway.core.alarms import AlarmRules, Figure, Says, Verdict
+from gateway.core.alarms.alarm import DRIFTING, SILENT
+from gateway.status import SENTENCES, State, Status
+
+_AT_FAULT: Final = frozenset({State.SENSOR_FAULT, State.READER_FAULT})
+_HEARD: Final = frozenset({State.WAITING_FOR_SPEED, State.COLLECTING, State.ESTIMATING, State.STALE})
+
+
+class Silence:
+    """For how long a needed sensor has not been heard on a bus that is alive, or the bus cannot be read.
+
+    While the bus sleeps nobody knows: an alarm stays, and the time begins anew.
+    """
+
+    def __init__(self, rules: AlarmRules, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._rules = rules
+        self._clock_s = clock_s
+        self._since_s: float | None = None
+
+    def says(self, status: Status) -> Says:
+        """As the service is now."""
+        if status.state not in _AT_FAULT:
+            self._since_s = None
+            return Says(SILENT, Verdict.CLEAR if status.state in _HEARD else Verdict.HOLD)
+        if self._since_s is None:
+            self._since_s = self._clock_s()
+        silent_s = self._clock_s() - self._since_s
+        if silent_s < self._rules.sensor_silent_s:
+            return Says(SILENT, Verdict.HOLD)
+        is_sure = silent_s >= self._rules.sensor_silent_final_s
+        return Says(
+            SILENT, Verdict.FINAL if is_sure else Verdict.EARLY, Figure(detail=SENTENCES[status.state].rstrip("."))
+        )
+
+
+def drift_says(trends: Sequence[Trend]) -> Iterator[Says]:
+    """Trends are judged over weeks, with 99 % confidence: where one drifts that is final at once."""
+    by_name = {trend.name: trend for trend in trends}
+    for cause in DRIFTING:
+        trend = by_name.get(cause.where or "")
+        told = None if trend is None else trend.sentence()
+        if trend is None or told is None or trend.change is None:
+            yield Says(cause, Verdict.CLEAR)
+        else:
+            yield Says(cause, Verdict.FINAL, Figure(trend.change, unit=trend.unit, detail=told))

@@ -1,0 +1,124 @@
+"""Alarms over HTTP: what stands, what stood, who has seen it; in the stream and the metrics."""
+
+import asyncio
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support.alarms import LIMIT_KG, AlarmBench, of_load
+from support.web import Client
+
+from gateway.status import State, Status
+from gateway.web import Scope, TokenFile, create_app
+from gateway.web.live.stream import EventStream
+
+URL = "/api/v1/alarms"
+OVER = LIMIT_KG + 60.0
+
+
+class Alarmed:
+    """The application with a desk of alarms behind it."""
+
+    def __init__(self, directory: Path, tokens: TokenFile | None = None) -> None:
+        self.bench = AlarmBench(directory)
+        self.app = create_app(
+            self.bench.board, self.bench.store.reader(), self._status, tokens=tokens, alarms=self.bench.desk
+        )
+
+    def _status(self) -> Status:
+        return Status(version="1", state=State.ESTIMATING, uptime_s=1.0, alarms=self.bench.desk.summary())
+
+    def __enter__(self) -> "Alarmed":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.bench.board.close()
+        self.bench.store.close()
+
+
+@pytest.fixture
+def alarmed(tmp_path: Path) -> Iterator[Alarmed]:
+    with Alarmed(tmp_path) as opened:
+        opened.bench.weigh(of_load(0, OVER))
+        yield opened
+
+
+def test_what_stands_and_what_stood(alarmed: Alarmed) -> None:
+    client = Client(alarmed.app)
+    told = client.get(URL).json()
+    assert [one["sentence"] for one in told["active"]] == ["The vehicle weighs 2560 +- 27 kg, 2500 kg are permitted"]
+    assert told["items"] == told["active"]
+    alarmed.bench.weigh(of_load(1, 100.0))
+    later = client.get(f"{URL}?cursor={told['last_cursor']}").json()
+    assert later["active"] == []
+    assert [(one["id"], one["state"], one["revision"]) for one in later["items"]] == [
+        (told["items"][0]["id"], "cleared", 2)
+    ]
+
+
+def test_the_cursor_leads_through_the_history(alarmed: Alarmed) -> None:
+    for n in range(1, 12):
+        alarmed.bench.weigh(of_load(n, OVER if n % 2 == 0 else 100.0))
+    client, found, cursor = Client(alarmed.app), [], ""
+    while cursor is not None:
+        page = client.get(f"{URL}?limit=2{cursor and f'&cursor={cursor}'}").json()
+        found += [one["id"] for one in page["items"]]
+        cursor = page["next_cursor"]
+    assert len(found) == len(set(found)) == 6
+
+
+def test_somebody_acknowledges(alarmed: Alarmed) -> None:
+    client = Client(alarmed.app)
+    (alarm,) = client.get(URL).json()["active"]
+    answer = client.request("POST", f"{URL}/{alarm['id']}/acknowledgement", json={"note": "unloading"})
+    assert answer.status_code == 200
+    assert (answer.json()["acknowledged"]["by"], answer.json()["acknowledged"]["note"]) == ("local", "unloading")
+    assert client.get(URL).json()["active"] == [answer.json()]
+    again = client.request("POST", f"{URL}/{alarm['id']}/acknowledgement", json={})
+    assert (again.status_code, again.json()["reason"]) == (409, "acknowledged_already")
+    unknown = client.request("POST", f"{URL}/alarm-1-2/acknowledgement", json={})
+    assert (unknown.status_code, unknown.json()["reason"]) == (404, "no_such_alarm")
+
+
+def test_only_who_may_operate_acknowledges(tmp_path: Path) -> None:
+    tokens = TokenFile(tmp_path / "tokens.json")
+    reading, operating = tokens.create("reader", Scope.READ), tokens.create("yard", Scope.OPERATE)
+    with Alarmed(tmp_path / "store", tokens) as alarmed:
+        alarmed.bench.weigh(of_load(0, OVER))
+        client = Client(alarmed.app)
+        (alarm,) = client.get(URL, headers=_bearer(reading)).json()["active"]
+        path = f"{URL}/{alarm['id']}/acknowledgement"
+        assert client.request("POST", path, json={}, headers=_bearer(reading)).status_code == 403
+        answer = client.request("POST", path, json={}, headers=_bearer(operating))
+        assert answer.json()["acknowledged"]["by"] == "yard"
+
+
+@pytest.mark.parametrize("question", ["cursor=nonsense", "limit=0", "since=when", "colour=red"])
+def test_wrong_questions_are_refused(alarmed: Alarmed, question: str) -> None:
+    assert Client(alarmed.app).get(f"{URL}?{question}").status_code == 422
+
+
+def test_metrics_name_every_alarm_that_is_watched(alarmed: Alarmed) -> None:
+    text = Client(alarmed.app).get("/metrics").text
+    assert 'springscale_alarm{alarm="overload.gross"} 1.0' in text
+    assert 'springscale_alarm{alarm="drift.zero"} 0.0' in text
+    assert "springscale_alarms_unacknowledged 1.0" in text
+    assert "springscale_alarms_told_total 1.0" in text
+    assert Client(alarmed.app).get("/api/v1/status").json()["alarms"]["standing"] == {"overload.gross": "early"}
+
+
+def test_a_stream_that_is_resumed_tells_what_was_missed(alarmed: Alarmed) -> None:
+    async def first() -> bytes:
+        stream = EventStream(alarmed.bench.board.fanout, alarmed.bench.store.reader(), "0000-0", 30.0)
+        found = [event.wire async for event in stream._missed("0000-0")]
+        return b"".join(found)
+
+    told = asyncio.run(first()).decode()
+    assert "event: alarm" in told
+    (line,) = [line for line in told.splitlines() if line.startswith("data:") and '"alarm-' in line]
+    assert json.loads(line.removeprefix("data:"))["kind"] == "overload"
+
+
+def _bearer(token: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {token}"}
