@@ -22,15 +22,17 @@ MEANINGS: Final = {
     Signal.WHEEL_SPEED: "stands in for `speed` where that is missing",
     Signal.IGNITION: "of the journey; 1 while it is on",
     Signal.AMBIENT_TEMPERATURE: "decoded and counted, nothing uses it yet",
-    Signal.AXLE_WEIGHT: "a weight that the vehicle itself reports; decoded and counted, nothing uses it yet",
+    Signal.AXLE_WEIGHT: "of the vehicle's own load sensors; shown beside, see below",
     Signal.LATITUDE: "of the journey; WGS 84, north positive",
     Signal.LONGITUDE: "of the journey; WGS 84, east positive",
     Signal.ODOMETER: "of the journey; only differences count, so a trip's counter will do",
     Signal.DOOR: "of the journey; above 0 while any door of the load room is open",
+    Signal.AIR_SPRING_PRESSURE: "of the vehicle's own load sensors; shown beside, see below",
+    Signal.RIDE_HEIGHT: "likewise; its zero is the sensor's own",
 }
 SI_UNITS: Final = {
     "acceleration": "m/s²", "angular_rate": "rad/s", "speed": "m/s", "angle": "°",
-    "distance": "m", "mass": "kg", "temperature": "°C", "state": "none"
+    "distance": "m", "pressure": "Pa", "mass": "kg", "temperature": "°C", "state": "none"
 }  # fmt: skip
 
 INTRODUCTION = """\
@@ -121,6 +123,35 @@ sideways. Where it fails (silent, stuck, saturated, too slow) a batch counts as 
 came, and when somebody may have been at the load. All are optional. They weigh nothing: with or without them every
 batch is the same, bit for bit, and a frame that carries nothing else keeps no drive alive. Positions stay degrees, as
 WGS 84 and VSS have them. They are not kept unless the settings ask for it ([settings](settings.md), `[position]`).
+
+**Of the vehicle's own load sensors.** `axle_weight`, `air_spring_pressure` and `ride_height` are what a vehicle with
+air springs or a load sensor says of itself, standing too. All are optional. The [cab page](cab.md) and
+`GET /api/v1/status` show the last reading beside what Springscale weighs, under its own name; no batch reads it, and
+no drive is kept alive by it. The J1939 maps read the rear left bellow's pressure (`ASC4`, PGN 65112, SPN 1727). An
+axle's weight (`VW`, PGN 65258, SPN 582) is in their database and in no map: one group tells all axles in turn, so name
+the one you mean by the number that your vehicle sends for it:
+
+```toml
+dbc = ["j1939.dbc"]
+j1939 = true
+
+[signals.vertical_acceleration]
+message = "ACCS"
+signal = "VerticalAcceleration"
+
+[signals.pitch_rate]
+message = "ARI"
+signal = "AngularRate1"
+
+[signals.speed]
+message = "CCVS1"
+signal = "WheelBasedVehicleSpeed"
+
+[signals.axle_weight]
+message = "VW"
+signal = "AxleWeight"
+valid_when = { AxleLocation = 1 }
+```
 
 **latency_s.** Samples are moved back by it, so that a late speed stands beside the motion it belongs to.
 

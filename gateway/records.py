@@ -45,10 +45,18 @@ class Signal(StrEnum):
     LONGITUDE = "longitude"
     ODOMETER = "odometer"
     DOOR = "door"
+    AIR_SPRING_PRESSURE = "air_spring_pressure"
+    RIDE_HEIGHT = "ride_height"
 
 
 JOURNEY: Final = frozenset({Signal.IGNITION, Signal.LATITUDE, Signal.LONGITUDE, Signal.ODOMETER, Signal.DOOR})
 """Signals of where the vehicle is and what is done with it: they weigh nothing, and no batch hangs on them."""
+
+STATIC: Final = frozenset({Signal.AXLE_WEIGHT, Signal.AIR_SPRING_PRESSURE, Signal.RIDE_HEIGHT})
+"""What sensors of the vehicle's own say of its load, standing too: shown beside what we weigh, and never part of it."""
+
+ASIDE: Final = JOURNEY | STATIC
+"""Signals on which no batch hangs."""
 
 
 class Why(StrEnum):

@@ -84,6 +84,24 @@ class SignalHealth(_Told):
         return self.last_age_s is None or self.last_age_s > SILENT_AFTER_S
 
 
+class OwnReading(_Told):
+    """What a load sensor of the vehicle's own last said; no part of what is weighed here."""
+
+    signal: str = Field(examples=["air_spring_pressure"])
+    number: float = Field(examples=[412.0])
+    unit: str = Field(examples=["kPa"])
+    age_s: float
+
+
+class Standing(_Told):
+    """Whether the vehicle stands, and whether the load can have changed since it was last weighed."""
+
+    stood_s: float | None = Field(None, description="for how long it has stood; null: it drives")
+    is_load_weighed: bool = Field(
+        True, description="false: it has driven on since a stop long enough to load, and that load is not weighed yet"
+    )
+
+
 class BatchCounts(_Told):
     """What became of the batches since the start."""
 
@@ -184,6 +202,8 @@ class Status(_Told):
     bus: BusStatus = BusStatus()
     decode: tuple[DecodeCount, ...] = ()
     signals: tuple[SignalHealth, ...] = ()
+    own_readings: tuple[OwnReading, ...] = Field((), description="of the vehicle's own load sensors, where mapped")
+    standing: Standing = Standing()
     batches: BatchCounts = BatchCounts()
     store: StoreStatus = StoreStatus()
     uplink: UplinkStatus | None = Field(None, description="null where no broker is configured")

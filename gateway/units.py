@@ -35,7 +35,8 @@ TO_SI: Final[dict[str, dict[str, float]]] = {
         "knots": 1852.0 / 3600.0,
     },
     "angle": {"deg": 1.0, "°": 1.0, "degree": 1.0, "degrees": 1.0, "rad": 180.0 / math.pi},
-    "distance": {"m": 1.0, "km": 1000.0, "mi": 1609.344},
+    "distance": {"m": 1.0, "km": 1000.0, "mi": 1609.344, "mm": 1e-3, "cm": 0.01},
+    "pressure": {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "hpa": 100.0, "mbar": 100.0, "bar": 1e5, "psi": 6894.757293168},
     "mass": {"kg": 1.0, "t": 1000.0},
     "temperature": {"degc": 1.0, "°c": 1.0, "deg c": 1.0, "c": 1.0},
     "state": {"": 1.0, "1": 1.0, "bit": 1.0},
@@ -46,8 +47,8 @@ def si_factor(quantity: str, unit: str | None) -> float:
     """Factor that turns a number in ``unit`` into the SI unit of ``quantity``.
 
     ``quantity`` is one of acceleration (m/s2), angular_rate (rad/s), speed (m/s), angle (a position's, in degrees as
-    WGS 84 and VSS have it), distance (m), mass (kg), temperature (degC) or state (1). Raises SignalMapError for a unit
-    that is missing or unknown.
+    WGS 84 and VSS have it), distance (m), pressure (Pa), mass (kg), temperature (degC) or state (1).
+    Raises SignalMapError for a unit that is missing or unknown.
     """
     known = TO_SI[quantity]
     key = (unit or "").strip().lower()

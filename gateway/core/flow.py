@@ -44,6 +44,7 @@ class Flow:
         identity: Identity,
         tare: Tare | None = None,
     ) -> None:
+        self.settings = settings
         self.scheduler = Scheduler(settings, traits)
         self._calibrated = calibrated
         self._estimator = estimator

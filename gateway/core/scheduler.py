@@ -12,7 +12,7 @@ from gateway.core.batch import Traits, Window, build_batch
 from gateway.core.journey import watched_all, way_of
 from gateway.core.settings import BatchSettings
 from gateway.estimate import UNWATCHED, Watched, Way
-from gateway.records import I64, JOURNEY, Batch, Bool, Motion, Signal, Why, joined
+from gateway.records import ASIDE, I64, Batch, Bool, Motion, Signal, Why, joined
 from gateway.units import NS_PER_S
 
 _NEVER_NS = int(np.iinfo(np.int64).max)  # later than any stamp
@@ -248,7 +248,7 @@ def _decides(rows: Motion) -> Bool:
     decides: Bool = np.ones(len(rows), bool) if rows.aside is None else ~rows.aside
     if Signal.ROLL_RATE not in rows.signals:
         return decides
-    known = np.isfinite(rows.columns[:, [signal not in JOURNEY for signal in rows.signals]])
+    known = np.isfinite(rows.columns[:, [signal not in ASIDE for signal in rows.signals]])
     has_roll = np.isfinite(rows.columns[:, rows.signals.index(Signal.ROLL_RATE)])
     decides &= ~has_roll | (np.count_nonzero(known, axis=1) > 1)
     return decides

@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from gateway.bus.live import Inbox
 from gateway.bus.signals import Decoder
 from gateway.core.flow import Flow
@@ -19,9 +17,9 @@ from gateway.core.tare import Weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
-from gateway.records import Frames, Motion, Signal
+from gateway.records import Frames
+from gateway.service.watching import SignalWatch, StandingWatch
 from gateway.store import Store
-from gateway.units import NS_PER_S
 from gateway.web import Board, boot_clock_s
 
 DRAIN_S = 0.1  # how long the inbox may gather before it is decoded: a hundred frames in one array operation
@@ -31,33 +29,6 @@ ROLL_RATE_LOST: Final = (
     "check the sensor and the signal map; payload and front share go on"
 )
 STOP_WITHIN_S: Final = 6.0  # a full inbox holds several windows
-
-
-class SignalWatch:
-    """When each signal last spoke and how often, for the status page. Written by one thread, read by any."""
-
-    def __init__(self, signals: tuple[Signal, ...]) -> None:
-        self.last_heard: dict[Signal, float] = {}
-        self.rate_hz: dict[Signal, float] = {}
-        self._signals = signals
-        self._window: dict[Signal, tuple[int, int]] = {}  # first stamp and count since
-
-    def saw(self, motion: Motion) -> None:
-        """Note which signals these rows carry."""
-        now = time.monotonic()
-        for column, signal in enumerate(self._signals):
-            known = np.isfinite(motion.columns[:, column])
-            if not known.any():
-                continue
-            self.last_heard[signal] = now
-            newest_ns = int(motion.t_ns[known][-1])
-            first_ns, n = self._window.get(signal, (newest_ns, 0))
-            n += int(np.count_nonzero(known))
-            elapsed_s = (newest_ns - first_ns) / NS_PER_S
-            if elapsed_s >= 2.0 or elapsed_s < 0.0:
-                self.rate_hz[signal] = max(0.0, n / elapsed_s) if elapsed_s > 0.0 else 0.0
-                first_ns, n = newest_ns, 0
-            self._window[signal] = (first_ns, n)
 
 
 class Pipeline:
@@ -77,6 +48,7 @@ class Pipeline:
         self.decoder = decoder
         self.flow = flow
         self.watch = SignalWatch(decoder.signals)
+        self.standing = StandingWatch(flow.settings.standstill_speed_mps)
         self.n_estimates = self.n_rejected = self.n_provisional = 0
         self.rejected_by_reason: Counter[str] = Counter()
         self.roll_rate_fault: str | None = None  # of the last batch, as people read it
@@ -139,6 +111,7 @@ class Pipeline:
         motion = self.decoder.decode(frames)
         if len(motion):
             self.watch.saw(motion)
+            self.standing.saw(motion)
             self._hand_over(self.flow.feed(motion))
         self.n_frames += len(frames)
         return True

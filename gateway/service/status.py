@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from importlib.metadata import version
+from typing import Final
 
 from gateway.bus.live import Around, LiveSource, SourceState
 from gateway.bus.ring import RingLog
@@ -16,7 +17,9 @@ from gateway.status import (
     BatchCounts,
     BusStatus,
     DecodeCount,
+    OwnReading,
     SignalHealth,
+    Standing,
     State,
     Status,
     VerificationStatus,
@@ -27,6 +30,11 @@ from gateway.web import Board
 
 SENSOR_LOST_S = 10.0  # a sensor silent for this long on a bus that is alive is at fault
 NEEDED_SENSORS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
+READ_IN: Final = {
+    Signal.AXLE_WEIGHT: ("kg", 1.0),
+    Signal.AIR_SPRING_PRESSURE: ("kPa", 1e3),
+    Signal.RIDE_HEIGHT: ("mm", 1e-3),
+}
 SPEED_LOST_S = 10.0  # without a valid speed for this long the service waits for one
 
 
@@ -80,6 +88,8 @@ class StatusReport:
             bus=self._bus(),
             decode=self._decode(),
             signals=self._signals(),
+            own_readings=self._own_readings(),
+            standing=self._standing(),
             batches=BatchCounts(
                 n_estimates=self._pipeline.n_estimates,
                 n_rejected=self._pipeline.n_rejected,
@@ -172,6 +182,23 @@ class StatusReport:
                 )
             )
         return tuple(health)
+
+    def _own_readings(self) -> tuple[OwnReading, ...]:
+        """In the units in which people read them."""
+        readings = sorted(self._pipeline.watch.readings.items())
+        return tuple(
+            OwnReading(signal=str(signal), number=round(reading / of_unit, 3), unit=unit, age_s=age_s)
+            for signal, reading in readings
+            for unit, of_unit in (READ_IN[signal],)
+            if (age_s := self._age_s(signal)) is not None
+        )
+
+    def _standing(self) -> Standing:
+        shown = self._board.shown().estimate
+        standing = self._pipeline.standing
+        return Standing(
+            stood_s=standing.stood_s(), is_load_weighed=shown is not None and standing.is_of_this_load(shown)
+        )
 
     def _similar(self, signal: Signal) -> tuple[str, ...]:
         """What was heard around that is like a silent signal's message."""

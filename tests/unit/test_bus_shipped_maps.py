@@ -11,7 +11,7 @@ from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import EXTENDED_ID, Frames, Signal
 
 RAD = math.pi / 180
-A, P, R, V, W, X, LAT, LON, ODO, ON, DOOR = (
+A, P, R, V, W, X, LAT, LON, ODO, ON, DOOR, AIR = (
     Signal.VERTICAL_ACCELERATION,
     Signal.PITCH_RATE,
     Signal.ROLL_RATE,
@@ -23,6 +23,7 @@ A, P, R, V, W, X, LAT, LON, ODO, ON, DOOR = (
     Signal.ODOMETER,
     Signal.IGNITION,
     Signal.DOOR,
+    Signal.AIR_SPRING_PRESSURE,
 )
 
 
@@ -47,6 +48,8 @@ J1939_FRAMES = [
         (0x18FE4EFE | EXTENDED_ID, bits((0, raw), (4, 0xF)), told)
         for raw, told in ((0, {DOOR: 1.0}), (1, {DOOR: 0.5}), (2, {DOOR: 0.0}), (3, {}), (14, {}), (15, {}))
     ),
+    # the third of four pressures, 0.1 kPa a bit: 412 kPa
+    (0x18FE5830 | EXTENDED_ID, struct.pack("<HHHH", 0xFFFF, 2000, 4120, 4300), {AIR: 412_000.0}),
 ]
 # -250 deg/s + raw / 128: raw 32256 is 2 deg/s, raw 31360 is -5 deg/s
 J1939_RATES = (0x18F02A45 | EXTENDED_ID, struct.pack("<HHHH", 32256, 31360, 0xFFFF, 0xFFFF))

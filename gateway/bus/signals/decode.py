@@ -11,7 +11,7 @@ import numpy as np
 
 from gateway.bus.signals.mapping import IdFilter, MappedMessage, SignalMap
 from gateway.bus.signals.samples import Rejected, SampleReader
-from gateway.records import F64, I64, JOURNEY, Frames, Motion, Signal
+from gateway.records import ASIDE, F64, I64, Frames, Motion, Signal
 
 __all__ = ["Decoder", "Rejected", "SignalCounts"]
 
@@ -64,7 +64,7 @@ class _MessageReader:
 
     def __init__(self, message: MappedMessage, signals: tuple[Signal, ...]) -> None:
         self.id_filter: IdFilter = message.id_filter
-        self.is_aside = all(m.signal in JOURNEY for m in message.signals)
+        self.is_aside = all(m.signal in ASIDE for m in message.signals)
         self._length = message.length
         self._readers = [(m.signal, signals.index(m.signal), SampleReader(m)) for m in message.signals]
         self._counters = {m.signal: m.counter for m in message.signals if m.counter is not None}

@@ -25,6 +25,8 @@ QUANTITIES: Final[Mapping[Signal, str]] = {
     Signal.LONGITUDE: "angle",
     Signal.ODOMETER: "distance",
     Signal.DOOR: "state",
+    Signal.AIR_SPRING_PRESSURE: "pressure",
+    Signal.RIDE_HEIGHT: "distance",
 }
 LONGEST_BYTES = 64  # of a CAN FD frame
 FEWEST_COUNTER_BITS: Final = 2

@@ -14,7 +14,7 @@ from gateway.calibration.inspection.kinds import Kind
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE, Traits
 from gateway.core.settings import BatchSettings
 from gateway.core.timeline import sample_rate_hz
-from gateway.records import JOURNEY, Motion, SensorTraits, Signal
+from gateway.records import ASIDE, Motion, SensorTraits, Signal
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 
 INERTIAL: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
@@ -70,7 +70,7 @@ def row_facts(motion: Motion, traits: Traits) -> RowFacts:
     streams = {
         signal: _stream(motion, signal, traits.get(signal, SensorTraits()))
         for signal in motion.signals
-        if signal not in JOURNEY
+        if signal not in ASIDE
     }
     return RowFacts(duration_s, streams)
 

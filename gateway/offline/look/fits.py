@@ -10,7 +10,7 @@ from gateway.bus.frames import merge_frames
 from gateway.bus.heard import Heard
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map, shipped_map, shipped_maps
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2
-from gateway.records import JOURNEY, Signal
+from gateway.records import ASIDE, Signal
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 NEEDED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
@@ -49,7 +49,7 @@ def _fits(name: str, heard: Sequence[Heard]) -> Iterator[Fit]:
             continue
         motion = Decoder(signal_map).decode(merge_frames([one.frames for one in ours]))
         found = tuple(signal for signal in motion.signals if len(motion.of(signal)[1]))
-        missing = tuple(signal for signal in motion.signals if signal not in found and signal not in JOURNEY)
+        missing = tuple(signal for signal in motion.signals if signal not in found and signal not in ASIDE)
         vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
         if found:
             yield Fit(name, device, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan)
