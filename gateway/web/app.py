@@ -44,6 +44,7 @@ from gateway.web.routes import (
     VerificationDesk,
     alarms_router,
     api_router,
+    cab_router,
     commissioning_router,
     events_router,
     export_router,
@@ -130,6 +131,7 @@ def create_app(
     app.include_router(alarms_router(reader, alarms or NoAlarmDesk()))
     app.include_router(record_router(record or NoFrameLog()))
     app.include_router(weights_router(board, scales))
+    app.include_router(cab_router(board, reader, status, scales))
     app.include_router(j1939_router(board, scales))
     app.include_router(vss_router(board, scales))
     app.include_router(rfms_router(board, reader, status, scales))

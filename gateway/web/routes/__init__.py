@@ -5,6 +5,7 @@ puts together. Here an estimate becomes weights, metrics, and the words of rFMS,
 """
 
 from gateway.web.routes.alarms import AlarmDesk, NoAlarmDesk, alarms_router
+from gateway.web.routes.cab import cab_router
 from gateway.web.routes.calibration import (
     NoTareDesk,
     NoTicketDesk,
@@ -57,6 +58,7 @@ __all__ = [
     "VerificationDesk",
     "alarms_router",
     "api_router",
+    "cab_router",
     "commissioning_router",
     "events_router",
     "export_router",

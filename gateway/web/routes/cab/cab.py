@@ -1,0 +1,115 @@
+"""/api/v1/cab: everything that the cab page shows, in one small answer."""
+
+import asyncio
+import json
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+from fastapi import APIRouter
+
+from gateway.core.alarms.weighing import as_of_load
+from gateway.core.events import EntryKind
+from gateway.core.weights import Room, nearness, rooms_of
+from gateway.estimate import Estimate, Quantity, Weights
+from gateway.records import iso_utc
+from gateway.status import Status
+from gateway.web.live.board import Board
+from gateway.web.reader import Reader
+from gateway.web.routes.cab.shapes import Cab, CabEvent, LoadKnown, RoomLeft
+from gateway.web.routes.weights import Scales
+from gateway.web.schemas import problem_responses
+
+_EVENTS: Final = 20  # a corrected one comes again behind newer ones
+
+
+def cab_router(board: Board, reader: Reader, status: Callable[[], Status], scales: Scales) -> APIRouter:
+    """The route that tells a driver."""
+    router = APIRouter(prefix="/api/v1", tags=["vehicle"])
+
+    @router.get("/cab", responses=problem_responses(503))
+    async def cab() -> Cab:
+        """How much more may go in, whether it is too much, how old that is, and what was loaded last."""
+        now, shown = status(), board.shown()
+        load = None if shown.estimate is None else as_of_load(shown.estimate)
+        weights = scales.weigh(load)
+        near = nearness(weights)
+        return Cab(
+            vehicle_id=now.vehicle_id,
+            state=now.state,
+            load=_known(load, now),
+            stood_s=_or_none(now.standing.stood_s, 1),
+            t_end=None if load is None else iso_utc(load.t_end_ns),
+            age_s=shown.age_s,
+            is_stale=shown.is_stale,
+            is_early=load is not None and load.is_provisional,
+            light=near.light,
+            light_about=list(near.places()),
+            over_limit_probability=_or_none(max(near.probabilities.values(), default=None), 4),
+            room=[_room(room) for room in rooms_of(weights)],
+            has_limits=_has_limits(weights),
+            lacks=weights.gross.lacks,
+            payload_kg=None if load is None else _or_none(load.payload.number, 1),
+            payload_interval95_kg=None if load is None else _interval(load.payload),
+            rejected=_rejected(board.heard(), shown.estimate),
+            last_event=_newest(await asyncio.to_thread(_events, reader)),
+            own_readings=now.own_readings,
+        )
+
+    return router
+
+
+def _known(load: Estimate | None, now: Status) -> LoadKnown:
+    if load is None:
+        return LoadKnown.NEVER_WEIGHED
+    if now.standing.stood_s is not None:
+        return LoadKnown.STANDING
+    return LoadKnown.WEIGHED if now.standing.is_load_weighed else LoadKnown.NOT_WEIGHED_YET
+
+
+def _room(room: Room) -> RoomLeft:
+    return RoomLeft(
+        place=room.place,
+        kg=round(room.left.number, 1),
+        std_kg=_or_none(room.left.std, 1),
+        interval95_kg=_interval(room.left),
+        limit_kg=room.limit_kg,
+    )
+
+
+def _has_limits(weights: Weights) -> bool:
+    return any(one.limit_kg is not None for one in (weights.gross, weights.front_axle, weights.rear_axle))
+
+
+def _rejected(heard: Estimate | None, shown: Estimate | None) -> list[str]:
+    """Of the last whole batch, where it came after what is shown."""
+    is_newer = heard is not None and (shown is None or heard.t_end_ns > shown.t_end_ns)
+    return [str(why) for why in heard.rejected] if heard is not None and is_newer else []
+
+
+def _events(reader: Reader) -> tuple[str, ...]:
+    return tuple(reader.entries(kind=EntryKind.EVENT, limit=_EVENTS, newest_first=True).items)
+
+
+def _newest(texts: tuple[str, ...]) -> CabEvent | None:
+    """The last by the clock of those that still stand."""
+    told: list[dict[str, Any]] = [json.loads(text) for text in texts]
+    standing = [one for one in told if not one["is_withdrawn"]]
+    if not standing:
+        return None
+    last = max(standing, key=lambda one: str(one["t_end"]))
+    return CabEvent(**last | {"payload_kg": last["after"]["payload_kg"]})
+
+
+def _interval(quantity: Quantity) -> list[float] | None:
+    low, high = quantity.interval95 if math.isfinite(quantity.interval95[0]) else _of_std(quantity)
+    return [round(low, 1), round(high, 1)] if math.isfinite(low) and math.isfinite(high) else None
+
+
+def _of_std(quantity: Quantity) -> tuple[float, float]:
+    """A load's together have no interval of their own (Epoch)."""
+    return Quantity.normal(quantity.number, quantity.std).interval95
+
+
+def _or_none(x: float | None, digits: int) -> float | None:
+    return None if x is None or not math.isfinite(x) else round(x, digits)

@@ -1,0 +1,125 @@
+"""/api/v1/cab: room, light, age and what is not known, as the cab page shows them."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
+from support.web import Client, Gateway
+
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.estimate import Epoch, Quantity
+from gateway.records import Why
+from gateway.status import OwnReading, Standing, State
+
+
+@pytest.fixture
+def gateway(tmp_path: Path) -> Iterator[Gateway]:
+    with cab_gateway(tmp_path) as opened:
+        yield opened
+
+
+def told(gateway: Gateway) -> dict[str, Any]:
+    answer: dict[str, Any] = Client(gateway.app).get("/api/v1/cab").json()
+    return answer
+
+
+def test_it_tells_how_much_more_may_go_in_the_tightest_first(gateway: Gateway) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    cab = told(gateway)
+    assert [room["place"] for room in cab["room"]] == ["rear_axle", "front_axle", "gross"]
+    assert cab["room"][2] == {
+        "place": "gross",
+        "kg": 300.0,
+        "std_kg": 6.0,
+        "interval95_kg": [288.2, 311.8],
+        "limit_kg": 2000.0,
+    }
+    assert cab["room"][0]["kg"] == 169.2
+    assert (cab["light"], cab["light_about"], cab["has_limits"]) == ("go", [], True)
+    assert cab["over_limit_probability"] < 1e-3
+    assert (cab["payload_kg"], cab["payload_interval95_kg"]) == (300.0, [288.0, 312.0])
+    assert (cab["load"], cab["age_s"], cab["is_stale"], cab["is_early"]) == ("weighed", 0.0, False, False)
+    assert cab["vehicle_id"] == "van-17"
+
+
+def test_it_weighs_by_all_batches_of_the_load_together(gateway: Gateway) -> None:
+    one = replace(loaded(0, 300.0, 48.0), epoch=Epoch(Quantity(290.0, 3.0), Quantity(48.0, 0.1), 4))
+    gateway.publish(one)
+    cab = told(gateway)
+    assert cab["room"][2]["kg"] == 310.0
+    assert cab["room"][2]["std_kg"] == 3.0
+    assert cab["payload_interval95_kg"] == [284.1, 295.9]
+
+
+def test_the_light_turns_and_names_its_places(gateway: Gateway) -> None:
+    lights = []
+    for n, payload_kg in enumerate([300.0, 592.0, 620.0]):
+        gateway.publish(loaded(n, payload_kg, 50.0))
+        cab = told(gateway)
+        lights.append((cab["light"], cab["light_about"]))
+    assert lights == [("go", []), ("near", ["front_axle", "gross"]), ("over", ["gross", "front_axle"])]
+    assert told(gateway)["over_limit_probability"] > 0.99
+    assert [room["kg"] for room in told(gateway)["room"]] == [-20.0, -10.0, 40.0]
+
+
+def test_while_it_stands_and_until_the_new_load_is_weighed_it_says_so(gateway: Gateway) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    gateway.status = BEFORE.model_copy(update={"standing": Standing(stood_s=95.04), "state": State.WAITING_FOR_SPEED})
+    cab = told(gateway)
+    assert (cab["load"], cab["stood_s"], cab["state"]) == ("standing", 95.0, "waiting_for_speed")
+    gateway.status = BEFORE.model_copy(update={"standing": Standing(is_load_weighed=False)})
+    assert told(gateway)["load"] == "not_weighed_yet"
+    assert told(gateway)["room"] != []  # as it was weighed before
+
+
+def test_before_the_first_estimate_everything_is_unknown(gateway: Gateway) -> None:
+    cab = told(gateway)
+    assert (cab["load"], cab["light"], cab["room"], cab["payload_kg"]) == ("never_weighed", "unknown", [], None)
+    assert (cab["lacks"], cab["last_event"], cab["t_end"], cab["rejected"]) == ("estimate", None, None, [])
+
+
+def test_an_early_look_says_that_it_is_one(gateway: Gateway) -> None:
+    gateway.board.publish(replace(loaded(0, 300.0, 48.0), is_provisional=True))
+    assert told(gateway)["is_early"] is True
+
+
+def test_what_could_not_be_weighed_since_is_told_with_its_reasons(gateway: Gateway) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(Why.TOO_SLOW, Why.GAP))
+    assert told(gateway)["rejected"] == ["too_slow", "gap"]
+    gateway.publish(loaded(2, 300.0, 48.0))
+    assert told(gateway)["rejected"] == []
+
+
+def test_an_old_number_is_stale(gateway: Gateway) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    gateway.clock_s += 3600.0
+    assert (told(gateway)["age_s"], told(gateway)["is_stale"]) == (3600.0, True)
+
+
+def test_without_limits_or_calibration_it_says_what_is_missing(tmp_path: Path) -> None:
+    unlimited = replace(VAN.vehicle, gross_limit_kg=None, front_axle_limit_kg=None, rear_axle_limit_kg=None)
+    for n, calibrated in enumerate([replace(VAN, vehicle=unlimited), None]):
+        with Gateway(tmp_path / str(n), calibrated=calibrated) as opened:
+            opened.publish(loaded(0, 300.0, 48.0))
+            cab = told(opened)
+        assert (cab["room"], cab["light"], cab["has_limits"]) == ([], "unknown", False)
+        assert cab["lacks"] == (None if isinstance(calibrated, CalibratedVehicle) else "calibration")
+
+
+def test_the_last_load_event_by_the_clock_is_told_and_none_that_was_withdrawn(gateway: Gateway) -> None:
+    load_event(gateway, 100, 240.0)
+    load_event(gateway, 200, -180.0)
+    load_event(gateway, 50, 20.0)  # of earlier, corrected later
+    load_event(gateway, 300, 12.0, is_withdrawn=True)
+    last = told(gateway)["last_event"]
+    assert (last["change_kg"], last["payload_kg"], last["probability"]) == (-180.0, 500.0, 0.999)
+    assert last["t_end"] == "1970-01-01T00:03:20.000000Z"
+
+
+def test_what_the_vehicles_own_sensors_say_is_passed_on_under_its_name(gateway: Gateway) -> None:
+    reading = OwnReading(signal="air_spring_pressure", number=412.0, unit="kPa", age_s=0.4)
+    gateway.status = BEFORE.model_copy(update={"own_readings": (reading,)})
+    assert told(gateway)["own_readings"] == [reading.model_dump()]

@@ -1,0 +1,55 @@
+"""A gateway in a cab: a van with limits, loads it may carry, and what became of them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.events import EntryKind
+from gateway.core.vehicle import Vehicle
+from gateway.estimate import Estimate, Quantity
+from gateway.records import iso_utc, json_line
+from gateway.status import Standing, State, Status
+from support.estimates import make_estimate
+from support.web import Gateway
+
+S = 1_000_000_000
+BEFORE = Status(
+    version="1.2.3", state=State.ESTIMATING, uptime_s=5.0, vehicle_id="van-17", calibration_id="sha256:ab",
+    standing=Standing(),
+)  # fmt: skip
+VAN = CalibratedVehicle(
+    id="sha256:ab",
+    vehicle=Vehicle(
+        "van", 1240.0, 2.8, unsprung_front_kg=80.0, unsprung_rear_kg=80.0,
+        gross_limit_kg=2000.0, front_axle_limit_kg=1000.0, rear_axle_limit_kg=1050.0,
+    ),
+    payload_seen_kg=(0.0, 600.0),
+    front_share_seen_pct=(42.0, 55.0),
+)  # fmt: skip
+
+
+def cab_gateway(directory: Path) -> Gateway:
+    """Nothing published yet; it drives."""
+    gateway = Gateway(directory, calibrated=VAN)
+    gateway.status = BEFORE
+    return gateway
+
+
+def loaded(n: int, payload_kg: float, front_share_pct: float) -> Estimate:
+    """The n-th batch with this aboard."""
+    return replace(
+        make_estimate(n),
+        payload=Quantity(payload_kg, 6.0, (payload_kg - 12.0, payload_kg + 12.0)),
+        front_share=Quantity.normal(front_share_pct, 0.2),
+    )
+
+
+def load_event(gateway: Gateway, t_s: int, change_kg: float, *, is_withdrawn: bool = False) -> None:
+    """Stored as the service stores one; 500 kg are aboard after it."""
+    record = {
+        "id": f"event-{t_s}", "revision": 1, "vehicle_id": "van-17", "t_start": iso_utc((t_s - 60) * S),
+        "t_end": iso_utc(t_s * S), "change_kg": change_kg, "change_std_kg": 7.0,
+        "change_interval95_kg": [change_kg - 14.0, change_kg + 14.0], "probability": 0.999,
+        "is_withdrawn": is_withdrawn, "place": None, "stops": [], "before": {}, "after": {"payload_kg": 500.0},
+    }  # fmt: skip
+    gateway.store.write_entry(EntryKind.EVENT, record["id"], t_s * S, json_line(record))
