@@ -24,9 +24,11 @@ class Delivery:
     """How far an uplink has delivered. ``n_pruned`` estimates were removed by retention before it could.
 
     ``waiting_age_s`` is the age of the oldest that waits, since its receipt; None where none waits.
+    ``n_pruned_entries`` is of load events, trips and alarms.
     """
 
     cursor: str | None
     n_pruned: int
     n_waiting: int
     waiting_age_s: float | None = None
+    n_pruned_entries: int = 0

@@ -52,7 +52,7 @@ def store_of(wanted: StoreSection, forwarding: UplinkSettings | None) -> Store:
     keep = Retention(
         max_age_s=wanted.max_age_days * SECONDS_PER_DAY,
         max_bytes=round(wanted.max_size_mb * BYTES_PER_MB),
-        undelivered_to=None if forwarding is None else _queue_name(forwarding),
+        undelivered_to=() if forwarding is None else (_queue_name(forwarding),),
     )
     return Store.open(wanted.directory, keep)
 

@@ -14,6 +14,7 @@ from gateway.history import Delivery, Page
 from gateway.records import json_line
 from gateway.store import records
 from gateway.store.database import is_damaged
+from gateway.store.delivery import delivery
 from gateway.store.entries import EntryWindow, entries
 from gateway.store.rows import Chain, EntryRow, EstimateRow
 from gateway.store.schema import connect_reader
@@ -179,19 +180,15 @@ class StoreReader:
         rows = self._ask("SELECT text FROM calibrations WHERE id = ?", (calibration_id,))
         return rows[0][0] if rows else None
 
-    def delivery(self, uplink: str) -> Delivery:
-        """How far ``uplink`` has delivered, as it is on disk; the cursor is None before its first delivery."""
+    def delivery(self, uplink: str, *, kinds: Sequence[str] = (), with_estimates: bool = True) -> Delivery:
+        """How far ``uplink`` has delivered, as it is on disk; the cursor is None before its first delivery.
+
+        What waits is counted of estimates, and of entries of these ``kinds``.
+        """
         with self._connection() as connection:
             if connection is None:
                 return Delivery(None, 0, 0)
-            epoch = connection.execute("SELECT id FROM epochs").fetchone()
-            found = connection.execute("SELECT seq, n_pruned FROM uplinks WHERE name = ?", (uplink,)).fetchone()
-            seq, n_pruned = found or (-1, 0)
-            n_waiting, oldest_ns = connection.execute(
-                "SELECT count(*), CAST(min(received_ns) AS INTEGER) FROM estimates WHERE seq > ?", (seq,)
-            ).fetchone()
-        age_s = None if oldest_ns is None else max(0.0, (self._clock_ns() - oldest_ns) / NS_PER_S)
-        return Delivery(f"{epoch[0]}-{seq}" if found and epoch else None, n_pruned, n_waiting, age_s)
+            return delivery(connection, uplink, kinds, with_estimates=with_estimates, now_ns=self._clock_ns())
 
     def _newest_stored(self, connection: sqlite3.Connection | None, is_rejected: bool) -> tuple[int, str] | None:
         if connection is None:

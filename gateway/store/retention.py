@@ -18,13 +18,13 @@ class Retention:
 
     max_age_s counts from receipt; max_bytes bounds the database without its write-ahead log (which
     stays under about 8 MB); max_held bounds the rows kept in memory while the disk refuses. Age alone
-    removes nothing that the uplink ``undelivered_to`` has still to deliver.
+    removes nothing that one of the uplinks ``undelivered_to`` has still to deliver.
     """
 
     max_age_s: float = 400 * 86_400.0
     max_bytes: int = 1_000_000_000
     max_held: int = 2048
-    undelivered_to: str | None = None
+    undelivered_to: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.max_age_s > 0 or self.max_bytes < 1_000_000 or self.max_held < 1:
@@ -68,9 +68,7 @@ def remove_share(connection: sqlite3.Connection) -> int:
     return n_removed
 
 
-def _last_delivered(connection: sqlite3.Connection, uplink: str | None) -> int:
+def _last_delivered(connection: sqlite3.Connection, uplinks: tuple[str, ...]) -> int:
     """Number of the last row that nobody waits for."""
-    if uplink is None:
-        return _LAST
-    known = connection.execute("SELECT seq FROM uplinks WHERE name = ?", (uplink,)).fetchone()
-    return -1 if known is None else int(known[0])
+    known = (connection.execute("SELECT seq FROM uplinks WHERE name = ?", (name,)).fetchone() for name in uplinks)
+    return min((-1 if row is None else int(row[0]) for row in known), default=_LAST)

@@ -91,10 +91,20 @@ MIGRATIONS: Final[tuple[str, ...]] = (
         DELETE FROM entries WHERE id = NEW.id AND seq < NEW.seq;
     END;
     """,
+    # how many of those retention took before an uplink could deliver them; a newer revision takes nothing
+    """
+    ALTER TABLE uplinks ADD COLUMN n_pruned_entries INTEGER NOT NULL DEFAULT 0;
+    CREATE TRIGGER entry_pruned_before_delivery AFTER DELETE ON entries
+    WHEN NOT EXISTS (SELECT 1 FROM entries WHERE id = OLD.id)
+    BEGIN
+        UPDATE uplinks SET n_pruned_entries = n_pruned_entries + 1 WHERE seq < OLD.seq;
+    END;
+    """,
 )
 FIRST_WITH_SUMS: Final = 3
 FIRST_WITH_PREVIOUS: Final = 4
 FIRST_WITH_ENTRIES: Final = 5
+FIRST_WITH_PRUNED_ENTRIES: Final = 6
 
 
 def connect_writer(path: Path, migrations: Sequence[str] = MIGRATIONS) -> sqlite3.Connection:

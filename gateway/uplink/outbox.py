@@ -3,12 +3,14 @@
 import json
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 from gateway.history import Delivery, Page
 from gateway.records import json_line
 
+ESTIMATE: Final = "estimate"
 _BRANCHES: Final = {"event": "events", "trip": "trips", "alarm": "alarms"}
 
 
@@ -25,14 +27,17 @@ class Letter:
     text: str
     branch: str = "estimates"
     is_retained: bool = False
+    kind: str = ESTIMATE
 
 
 class History(Protocol):
     """The store's reading side, as far as the outbox needs it."""
 
-    def estimates(self, *, cursor: str | None, limit: int, with_spectra: bool) -> Page: ...
-    def entries(self, *, cursor: str | None, limit: int, upto: str | None) -> Page: ...
-    def delivery(self, uplink: str) -> Delivery: ...
+    def estimates(
+        self, *, cursor: str | None = None, limit: int, with_spectra: bool, newest_first: bool = False
+    ) -> Page: ...
+    def entries(self, *, cursor: str | None, limit: int, upto: str | None = None) -> Page: ...
+    def delivery(self, uplink: str, *, kinds: Sequence[str] = (), with_estimates: bool = True) -> Delivery: ...
 
 
 class Memory(Protocol):
@@ -70,9 +75,16 @@ class Outbox:
     """
 
     def __init__(
-        self, history: History, memory: Memory, name: str, *, with_places: bool = False, repeat_s: float = 0.0
+        self,
+        history: History,
+        memory: Memory,
+        name: str,
+        *,
+        with_places: bool = False,
+        repeat_s: float = 0.0,
+        only: Sequence[str] = (),
     ) -> None:
-        """``with_places`` lets positions go out where the store keeps them.
+        """``with_places`` lets positions go out where the store keeps them; ``only`` names kinds, none: all go out.
 
         ``repeat_s``: a broker that is killed forgets what it took since it last saved.
         """
@@ -80,19 +92,24 @@ class Outbox:
         self._memory = memory
         self._name = name
         self._with_places = with_places
+        self._only = tuple(only)
         self._lately = Lately(repeat_s)
         self._delivered: str | None = None  # until the store was asked
         self._handed_out: str | None = None
 
     def next_letters(self, limit: int) -> list[Letter]:
         """Up to ``limit`` letters behind the last one handed out. Raises what the store's reader raises."""
-        letters = self._behind(self._handed_out, limit)
-        if letters and _epoch(self._handed_out) != _epoch(letters[0].cursor):
-            self._take_place(_epoch(letters[0].cursor))
-            letters = self._behind(self._handed_out, limit)
-        if letters:
-            self._handed_out = letters[-1].cursor
-        return letters
+        while True:
+            letters, end = self._wanted_behind(self._handed_out, limit)
+            if end is not None and _epoch(self._handed_out) != _epoch(end):
+                self._take_place(_epoch(end))
+                letters, end = self._wanted_behind(self._handed_out, limit)
+            if letters:
+                self._handed_out = letters[-1].cursor
+            elif end is not None and end != self._handed_out:
+                self._pass_over(end)
+                continue
+            return letters
 
     def delivered(self, letter: Letter) -> None:
         """The broker has this letter and all before it."""
@@ -106,7 +123,32 @@ class Outbox:
 
     def look(self) -> Delivery:
         """How much waits and how much retention removed undelivered, as the store has it."""
-        return self._history.delivery(self._name)
+        if not self._only:
+            return self._history.delivery(self._name)
+        kinds = [kind for kind in self._only if kind in _BRANCHES]
+        return self._history.delivery(self._name, kinds=kinds, with_estimates=ESTIMATE in self._only)
+
+    def _pass_over(self, end: str) -> None:
+        """Nothing up to there is wanted; what was handed out before is delivered when more is asked for."""
+        self._handed_out = self._delivered = end
+        self._memory.write_delivery(self._name, end)
+
+    def _wanted_behind(self, cursor: str | None, limit: int) -> tuple[list[Letter], str | None]:
+        """Letters, and how far the store was looked through for them; None where there is nothing at all."""
+        if self._only and ESTIMATE not in self._only:
+            return self._entries_behind(cursor, limit)
+        letters = self._behind(cursor, limit)
+        wanted = [one for one in letters if not self._only or one.kind in self._only]
+        return wanted, letters[-1].cursor if letters else None
+
+    def _entries_behind(self, cursor: str | None, limit: int) -> tuple[list[Letter], str | None]:
+        """The newest estimate is asked for first: what has a lower number than it is there by then."""
+        newest = self._history.estimates(limit=1, with_spectra=False, newest_first=True).cursors
+        beside = self._history.entries(cursor=cursor, limit=limit)
+        if not beside.items:
+            return [], newest[0] if newest and not _is_behind(newest[0], cursor) else None
+        letters = [self._entry(place, text) for place, text in zip(beside.cursors, beside.items, strict=True)]
+        return [one for one in letters if one.kind in self._only], beside.cursors[-1]
 
     def _behind(self, cursor: str | None, limit: int) -> list[Letter]:
         """Estimates, and what was told beside them, by their numbers; where there is more of one, the other waits."""
@@ -116,11 +158,13 @@ class Outbox:
             _letter(place, previous, self._shown(json.loads(text)))
             for place, previous, text in zip(page.cursors, page.previous, page.items, strict=True)
         ]
-        for place, text in zip(beside.cursors, beside.items, strict=True):
-            letters.append(_entry_letter(place, self._shown(json.loads(text))))
+        letters += (self._entry(place, text) for place, text in zip(beside.cursors, beside.items, strict=True))
         last = min((_number(place) for place in (beside.next_cursor, page.next_cursor) if place), default=None)
         kept = [one for one in letters if last is None or _number(one.cursor) <= last]
         return sorted(kept, key=lambda one: _number(one.cursor))
+
+    def _entry(self, cursor: str, text: str) -> Letter:
+        return _entry_letter(cursor, self._shown(json.loads(text)))
 
     def _shown(self, record: dict[str, Any]) -> dict[str, Any]:
         """What may leave the box."""
@@ -153,7 +197,7 @@ def _number(cursor: str) -> int:
 def _entry_letter(cursor: str, record: dict[str, Any]) -> Letter:
     """Alarms have a topic for each cause, where the last one is retained."""
     kind = record["id"].partition("-")[0]
-    letter = Letter(cursor, f"{record['id']}-{record['revision']}", json_line(record), _BRANCHES[kind])
+    letter = Letter(cursor, f"{record['id']}-{record['revision']}", json_line(record), _BRANCHES[kind], kind=kind)
     if kind != "alarm":
         return letter
     below = [part for part in (record["kind"], record["where"]) if part]
@@ -164,6 +208,11 @@ def _letter(cursor: str, previous: int | None, record: dict[str, Any]) -> Letter
     stream, _, number = cursor.partition("-")
     sequence = {"stream": stream, "number": int(number), "previous": previous}
     return Letter(cursor, record["id"], json_line(record | {"sequence": sequence}))
+
+
+def _is_behind(cursor: str, other: str | None) -> bool:
+    """Whether it comes no later than another of the same database."""
+    return other is not None and _epoch(cursor) == _epoch(other) and _number(cursor) <= _number(other)
 
 
 def _epoch(cursor: str | None) -> str:

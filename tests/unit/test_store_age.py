@@ -125,7 +125,7 @@ def test_a_box_without_a_clock_battery_still_forgets_what_is_old(box: Box) -> No
 
 
 def test_what_is_not_delivered_is_not_removed_for_its_age(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    box = Box(tmp_path, Retention(max_age_s=60.0, undelivered_to="fleet"), monkeypatch)
+    box = Box(tmp_path, Retention(max_age_s=60.0, undelivered_to=("fleet",)), monkeypatch)
     assert box.drive(10, days_between=1) == 10
     with closing(Store.open(tmp_path, clock_ns=lambda: box.now_ns)) as store:
         sixth = store.reader().estimates().cursors[5]

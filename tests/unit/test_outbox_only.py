@@ -1,0 +1,105 @@
+"""An outbox for one who wants some kinds only: all of these, in order, and nothing of the rest holds retention."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support.estimates import make_record
+from support.patience import PATIENCE_S
+
+from gateway.records import json_line
+from gateway.store import Retention, Store
+from gateway.uplink import Outbox
+
+NAME = "https://fleet.example/hook"
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    opened = Store.open(tmp_path)
+    yield opened
+    opened.close()
+
+
+def tell(store: Store, *what: str) -> None:
+    """Rows in order: "estimate", or "event-1" and so on for an entry."""
+    for n, each in enumerate(what):
+        if each == "estimate":
+            store.write_estimate(make_record(store.health().n_written * 100 + n))
+        else:
+            record = {"id": each, "revision": 1, "kind": "drift", "where": None}
+            store.write_entry(each.partition("-")[0], each, n, json_line(record))
+    assert store.flush(PATIENCE_S)
+
+
+def outbox(store: Store, *only: str) -> Outbox:
+    return Outbox(store.reader(), store, NAME, only=only)
+
+
+def drained(box: Outbox, limit: int = 2) -> list[str]:
+    found: list[str] = []
+    while letters := box.next_letters(limit):
+        found += [letter.id for letter in letters]
+        for letter in letters:
+            box.delivered(letter)
+    return found
+
+
+MIXED = ("event-1", "estimate", "trip-1", "estimate", "estimate", "alarm-1", "estimate", "event-2", "trip-2", "alarm-2")
+
+
+@pytest.mark.parametrize("limit", [1, 2, 3, 100])
+@pytest.mark.parametrize("only", [("alarm",), ("alarm", "event"), ("event", "trip", "alarm"), ("trip",)])
+def test_what_is_wanted_comes_in_order_and_once(store: Store, only: tuple[str, ...], limit: int) -> None:
+    tell(store, *MIXED)
+    wanted = [f"{each}-1" for each in MIXED if each.partition("-")[0] in only]
+    assert drained(outbox(store, *only), limit) == wanted
+    assert store.flush(PATIENCE_S)
+    assert drained(outbox(store, *only), limit) == []  # as after a restart
+
+
+def test_estimates_too(store: Store) -> None:
+    tell(store, *MIXED)
+    found = drained(outbox(store, "estimate", "alarm"), 3)
+    assert [each for each in found if each.startswith("alarm")] == ["alarm-1-1", "alarm-2-1"]
+    assert len(found) == 6
+
+
+def test_what_nobody_wants_is_passed_over_on_disk_so_that_age_may_remove_it(store: Store) -> None:
+    tell(store, *["estimate"] * 7, "trip-1")
+    box = outbox(store, "alarm")
+    assert box.next_letters(2) == []
+    assert store.flush(PATIENCE_S)
+    kept = store.reader().delivery(NAME)
+    assert kept.n_waiting == 0
+    assert kept.cursor == store.reader().entries(limit=1).cursors[0]
+    tell(store, "estimate", "alarm-1", "estimate")
+    assert box.look().n_waiting == 1
+    assert drained(box) == ["alarm-1-1"]
+    assert store.flush(PATIENCE_S)
+    assert box.look().n_waiting == 0
+
+
+def test_what_was_handed_out_and_not_delivered_comes_again(store: Store) -> None:
+    tell(store, *MIXED)
+    box = outbox(store, "alarm")
+    assert [letter.id for letter in box.next_letters(10)] == ["alarm-1-1", "alarm-2-1"]
+    box.rewind()
+    assert drained(box) == ["alarm-1-1", "alarm-2-1"]
+
+
+def test_entries_that_retention_takes_undelivered_are_counted_and_newer_revisions_are_not(tmp_path: Path) -> None:
+    now_ns = [1_800_000_000_000_000_000]
+
+    store = Store.open(tmp_path, Retention(max_age_s=100.0), lambda: now_ns[0])
+    box = outbox(store, "alarm")
+    assert box.next_letters(1) == []
+    tell(store, "alarm-0", "estimate")
+    first = box.next_letters(1)
+    box.delivered(first[0])
+    tell(store, "alarm-1", "alarm-1", "alarm-2")  # the second takes the place of the first
+    now_ns[0] += 1_000_000_000_000
+    tell(store, "estimate")
+    tell(store, "estimate")
+    assert store.reader().delivery(NAME).n_pruned_entries == 2
+    store.close()
