@@ -13,7 +13,7 @@ from gateway.core.stated_share import told
 from gateway.core.tare import Tare, Weighed, remembered, tared
 from gateway.core.weights import NOT_CALIBRATED, weighed
 from gateway.estimate import Epoch, Estimate
-from gateway.records import Batch, Motion
+from gateway.records import Batch, Motion, Why
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,9 +68,9 @@ class Flow:
         """Estimates and rejections of the batches that end with these rows, provisional ones among them."""
         return map(self.weigh, self.scheduler.feed(motion))
 
-    def flush(self) -> Iterator[Estimate]:
-        """The stream has ended: what the open window still tells."""
-        return map(self.weigh, self.scheduler.flush())
+    def flush(self, ended_by: Why | None = None) -> Iterator[Estimate]:
+        """The stream has ended, or something has broken it: what the open window still tells."""
+        return map(self.weigh, self.scheduler.flush(ended_by))
 
     def weigh(self, batch: Batch) -> Estimate:
         """What a batch of ``scheduler`` taught; they come in order, each once. :meth:`feed` and :meth:`flush` do it."""

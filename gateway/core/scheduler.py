@@ -54,6 +54,11 @@ class Scheduler:
         self.way_of_last = Way()  # of the batch yielded last
 
     @property
+    def silence_s(self) -> float:
+        """So long without a row ends a drive."""
+        return self._settings.silence_s
+
+    @property
     def drive_start_ns(self) -> int | None:
         """Of the drive that is under way; None between drives. Safe from any thread."""
         return None if self._newest_ns is None else self._drive_start_ns
@@ -79,10 +84,10 @@ class Scheduler:
             else:
                 begin += yield from self._advance(motion.part(begin, len(motion)))
 
-    def flush(self) -> Iterator[Batch]:
-        """The stream has ended: close the window that is open."""
+    def flush(self, ended_by: Why | None = None) -> Iterator[Batch]:
+        """The stream has ended, or something has broken it: close the window that is open."""
         if self._newest_ns is not None:
-            yield from self._end_drive(self._newest_ns)
+            yield from self._end_drive(self._newest_ns, ended_by)
 
     def _advance(self, motion: Motion) -> Generator[Batch, None, int]:
         """Take rows up to the end of the drive or of the rows; return how many were taken."""

@@ -17,7 +17,7 @@ from gateway.core.tare import Weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
-from gateway.records import Frames
+from gateway.records import Frames, Why
 from gateway.service.watching import SignalWatch, StandingWatch
 from gateway.store import Store
 from gateway.web import Board, boot_clock_s
@@ -28,6 +28,7 @@ ROLL_RATE_LOST: Final = (
     "the roll rate is known in only {:.0%} of the last batch (silent, stuck, at the end of its range or too slow): "
     "check the sensor and the signal map; payload and front share go on"
 )
+LATE_S: Final = 1.0  # a frame may be so much later here than its stamp
 STOP_WITHIN_S: Final = 6.0  # a full inbox holds several windows
 
 
@@ -55,6 +56,7 @@ class Pipeline:
         self.failure: BaseException | None = None
         self.n_frames = 0  # frames whose estimates, if any, are handed over
         self.progress = 0  # grows with every turn of the loop: what the watchdog follows
+        self._silent_s = 0.0
         self._weighed_at: tuple[Weighed | None, float] = (None, 0.0)
         self._inbox = inbox
         self._store = store
@@ -103,10 +105,13 @@ class Pipeline:
 
     def _turn(self, timeout_s: float) -> bool:
         """One drain of the inbox; True where there were frames."""
+        begun_s = time.monotonic()
         frames = self._inbox.drain(timeout_s)
         self.progress += 1
         if frames is None:
+            self._hear_nothing(min(time.monotonic() - begun_s, timeout_s))
             return False
+        self._silent_s = 0.0
         self._on_frames(frames)
         motion = self.decoder.decode(frames)
         if len(motion):
@@ -115,6 +120,14 @@ class Pipeline:
             self._hand_over(self.flow.feed(motion))
         self.n_frames += len(frames)
         return True
+
+    def _hear_nothing(self, for_s: float) -> None:
+        """The bus sleeps: the drive ends now, as the first row after it would end it. Only time spent listening counts,
+        so that a machine that stood still hears first what has gathered meanwhile.
+        """
+        self._silent_s += for_s
+        if self.flow.scheduler.drive_start_ns is not None and self._silent_s > self.flow.scheduler.silence_s + LATE_S:
+            self._hand_over(self.flow.flush(Why.GAP))
 
     def _hand_over(self, estimates: Iterable[Estimate]) -> None:
         for found in estimates:

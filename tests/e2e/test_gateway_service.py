@@ -125,6 +125,29 @@ def test_a_replayed_log_gives_byte_identical_batches_to_estimate(config: Path, s
     assert run_with_log(config, log, speed) == expected
 
 
+def test_the_last_window_of_a_drive_is_told_once_the_bus_sleeps(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And not only when the next drive begins, tomorrow maybe."""
+    monkeypatch.setenv("SPRINGSCALE_BATCH__SILENCE_S", "1.0")
+    log = config.parent / "drive.log"
+    write_candump(bus_drive(39.9, seed=5), "can0", log)
+    settings = load_settings(config)
+    told: list[int] = []
+
+    def on_started(gateway: Gateway) -> None:
+        loop = asyncio.get_running_loop()
+
+        def play() -> None:
+            replay(log, "virtual", settings.bus.channel, speed="max")
+            wait_until(lambda: len(gateway.store.reader().estimates().items) == 2)
+            told.append(len(gateway.store.reader().estimates().items))
+            loop.call_soon_threadsafe(gateway.request_stop)
+
+        threading.Thread(target=play, daemon=True).start()
+
+    Gateway(settings, setup_of(settings), on_started=on_started).run()
+    assert told == [2]
+
+
 def springscale(*arguments: str, **environment: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "gateway", *arguments],

@@ -1,10 +1,13 @@
 """The third gyro axis on recorded drives: calibrated with a roll rate, what is promised of loads that lie sideways, and
-of sister vehicles that inherit this calibration.
+of sister vehicles that inherit this calibration, at a desk or commissioned at a running service.
 
 The bounds are promises to users, not fits: they may only ever be tightened.
 """
 
 import json
+import os
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -12,11 +15,23 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from support.recordings import recordings
+from support.sister_van import Commissioned, commissioned
 
 from gateway.cli import springscale
 
 CROSS = ("--estimator", "cross_spectrum")
 QUANTITIES = ("payload", "front_share", "cg_left")
+NUMBERS = (
+    "t_end_ns",
+    "payload_kg",
+    "payload_std_kg",
+    "front_share_pct",
+    "front_share_std_pct",
+    "cg_left_m",
+    "cg_left_std_m",
+)
+VANS = ("van_1", "van_2")
+N_LOGS = int(os.environ.get("SPRINGSCALE_SISTER_LOGS", "2"))  # of each van's six loads are replayed into the service
 
 
 def run(*arguments: str | Path) -> str:
@@ -90,7 +105,50 @@ def test_empty_drives_calibrate_a_sister(
     calibration: Path, tmp_path: Path, arguments: list[str], payload_pct: float, front_share_pct: float
 ) -> None:
     """On mixed drives with other loads, where priors of any vehicle refuse every batch at another speed."""
-    judged = [_sister(calibration, tmp_path / "van.json", name, arguments) for name in ("van_1", "van_2")]
+    _require_true(
+        [_sister(calibration, tmp_path / "van.json", name, arguments) for name in VANS], payload_pct, front_share_pct
+    )
+
+
+@pytest.fixture(scope="module")
+def commissioned_vans(calibration: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Commissioned]:
+    """A sister after her quarter of an hour at the running service, and her drives with loads; each once."""
+
+    @cache
+    def van(name: str) -> Commissioned:
+        return commissioned(name, calibration, tmp_path_factory.mktemp(name), N_LOGS)
+
+    return van
+
+
+@pytest.mark.parametrize("name", VANS)
+def test_commissioned_at_a_service_a_sister_weighs_as_calibrated_at_a_desk(
+    commissioned_vans: Callable[[str], Commissioned], calibration: Path, tmp_path: Path, name: str
+) -> None:
+    """Over HTTP and a bus, provisional estimates and all, or from logs: the same numbers, to the last bit."""
+    van = commissioned_vans(name)
+    run("calibrate", van.desk_campaign, "--like", calibration, "--output", tmp_path / "desk.json", "--json", *CROSS)
+    desk, box = (json.loads(path.read_text()) for path in (tmp_path / "desk.json", van.calibration))
+    assert box["cross_spectrum"] == desk["cross_spectrum"]
+    assert box["line"] == desk["line"]
+    maps = ("--signals", van.signals, "--calibration", tmp_path / "desk.json", "--json", *CROSS)
+    told = [json.loads(line) for line in run("estimate", *van.logs, *maps).splitlines()]
+    counted = [[one[key] for key in NUMBERS] for one in told if not one["rejected"]]
+    assert len(counted) == 3 * len(van.logs)
+    assert [[one[key] for key in NUMBERS] for one in van.weighed if not one["rejected"]] == counted
+
+
+def test_commissioned_at_a_service_errors_stay_small_and_intervals_true(
+    commissioned_vans: Callable[[str], Commissioned],
+) -> None:
+    """As of one empty drive at a desk: a quarter of an hour is enough."""
+    vans = {name: commissioned_vans(name) for name in VANS}
+    assert all(van.n_windows <= 3 for van in vans.values())
+    _require_true([_evaluated(van.calibration, name) for name, van in vans.items()], 3.5, 1.5)
+
+
+def _require_true(judged: list[dict[str, Any]], payload_pct: float, front_share_pct: float) -> None:
+    """Mean errors of both vans, no batch refused, intervals of each that hold."""
     assert [one["n_batches"] for one in judged] == [18, 18]
     assert [one["n_rejected"] for one in judged] == [0, 0]
     assert fmean(one["payload"]["mean_abs_pct"] for one in judged) <= payload_pct
@@ -102,6 +160,11 @@ def _sister(calibration: Path, output: Path, name: str, arguments: list[str]) ->
     drives = recordings() / "siblings" / name
     like = ("--like", calibration, "--output", output, "--json", *CROSS)
     run("calibrate", drives / "empty" / "campaign_roll.toml", *like, *arguments)
-    judged = run("evaluate", drives / "test" / "campaign_roll.toml", "--calibration", output, "--json", *CROSS)
-    found: dict[str, Any] = json.loads(judged)
+    return _evaluated(output, name)
+
+
+def _evaluated(calibration: Path, name: str) -> dict[str, Any]:
+    """On her drives with loads."""
+    tests = recordings() / "siblings" / name / "test" / "campaign_roll.toml"
+    found: dict[str, Any] = json.loads(run("evaluate", tests, "--calibration", calibration, "--json", *CROSS))
     return found

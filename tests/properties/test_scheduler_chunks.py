@@ -11,7 +11,8 @@ from support.drives import assert_same_batch, drive, joined, later, steady, with
 
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.records import Batch, Motion
+from gateway.records import Batch, Motion, Why
+from gateway.units import NS_PER_S
 
 RATE_HZ = 50.0
 
@@ -53,6 +54,17 @@ def batches_of(motion: Motion, cuts: list[int], provisional_every_s: float) -> t
 
 
 WHOLE = {(name, every_s): batches_of(motion, [], every_s) for name, motion in DRIVES.items() for every_s in (0.0, 7.0)}
+
+
+def test_a_silence_that_is_heard_ends_a_drive_as_the_next_row_would():
+    motion = DRIVES["with_silence"]
+    begin_s = (motion.t_ns - motion.t_ns[0]) / NS_PER_S
+    before = int(np.searchsorted(begin_s, 40.0))
+    scheduler = Scheduler(BatchSettings(window_s=20.0, provisional_every_s=7.0), {})
+    found = [*scheduler.feed(motion.part(0, before)), *scheduler.flush(Why.GAP), *scheduler.flush(Why.GAP)]
+    found += [*scheduler.feed(motion.part(before, len(motion))), *scheduler.flush()]
+    for one, other in zip(found, WHOLE["with_silence", 7.0][0], strict=True):
+        assert_same_batch(one, other)
 
 
 @pytest.mark.parametrize("provisional_every_s", [0.0, 7.0])

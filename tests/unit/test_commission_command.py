@@ -41,7 +41,7 @@ def test_one_call_answers_everything(url: str, bench: Bench) -> None:
     bench.worker.finish(fitted(payload_std_kg=36.0))
     shown = run(url, "show")
     assert "next: drive, empty" in shown.stdout
-    assert "5 min driven, 1 windows: 50% of what is wanted is known" in shown.stdout
+    assert "5 min driven, one window: 50% of what is wanted is known" in shown.stdout
     assert "next: the calibration is being made" in run(url, "fit").stdout
     bench.worker.finish(fitted(payload_std_kg=36.0))
     made = run(url, "show").stdout
@@ -49,6 +49,13 @@ def test_one_call_answers_everything(url: str, bench: Bench) -> None:
     assert "van-17 without a line, one window, made 2026-09-21T14:13:20Z by local (yard)" in made
     assert "another calibration counts from the next drive on" in made
     assert "undone" in run(url, "undo").stdout
+
+
+def test_what_it_may_carry_can_be_said(url: str) -> None:
+    begun = json.loads(
+        run(url, "start", "--line", "none", *VEHICLE, "--payload-kg", "1200", "--empty", "--json").stdout
+    )
+    assert begun["underway"]["vehicle"]["payload_range_kg"] == [0.0, 1200.0]
 
 
 def test_steps_may_come_one_by_one(url: str) -> None:

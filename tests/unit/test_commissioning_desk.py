@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Callable
 from contextlib import suppress
+from importlib.resources import files
 from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from support.power import KilledError, kill_at
 
 from gateway.calibration.commissioning import Result
 from gateway.calibration.commissioning.job import Found
+from gateway.calibration.file import CalibrationFile
 from gateway.config import Settings
 from gateway.config.sections import CommissioningSection
 from gateway.errors import CommissioningRefusedError
@@ -228,6 +230,26 @@ def test_line_and_vehicle_may_be_answered_anew_and_what_was_driven_stays(driving
     assert (underway(driving)["step"], underway(driving)["n_batches"]) == ("drive", 1)
     assert underway(driving)["learned"] is None
     assert driving.worker.jobs[-1].vehicle.wheelbase_m == 2.9
+
+
+@pytest.mark.parametrize(
+    ("typed", "payload_kg"), [({}, 900.0), ({"payload_range_kg": (0.0, 700.0)}, 700.0)], ids=["as its line", "said"]
+)
+def test_what_a_line_shares_need_not_be_typed(tmp_path: Path, typed: dict[str, Any], payload_kg: float) -> None:
+    sister = json.loads((Path(str(files("gateway"))) / "demo" / "paper_van.json").read_text())
+    sister["vehicle"] |= {"payload_range_kg": [0.0, 900.0], "gross_limit_kg": 2300.0, "track_width_m": 1.6}
+    held = CalibrationFile.model_validate({key: part for key, part in sister.items() if key != "id"})
+    (tmp_path / "sister.json").write_text(held.to_json())
+    bench = Bench(tmp_path / "state", lines=tmp_path)
+    bench.desk.begin("workshop", None)
+    bench.desk.choose_line("sister.json", "administrator")
+    bench.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, "wheelbase_m": held.vehicle.wheelbase_m, **typed}))
+    bench.desk.is_empty("workshop")
+    bench.drive(0)
+    vehicle = bench.worker.jobs[-1].vehicle
+    assert vehicle.payload_range_kg == (0.0, payload_kg)
+    assert (vehicle.gross_limit_kg, vehicle.track_width_m) == (2300.0, 1.6)
+    assert vehicle.kerb_front_axle_kg == ANSWERS["kerb_front_axle_kg"]
 
 
 def test_cancel_forgets_all_but_what_was_made(driving: Bench) -> None:

@@ -65,7 +65,7 @@ def furthest_apart(told: list[Answer], others: list[Answer]) -> tuple[float, flo
 
 
 def whole_batches(records: list[Answer]) -> list[Answer]:
-    """Those that span a whole window; the rest of a drive before is told when the next one begins."""
+    """Those that span a whole window; the rest of a drive is told once the bus sleeps."""
     return [record for record in records if abs(length_s(record) - WINDOW_S) < 0.001]
 
 

@@ -5,7 +5,7 @@
 ``Result``. Who decides what is done when is the service (gateway.service.commissioning).
 """
 
-from gateway.calibration.commissioning.answers import vehicle_table
+from gateway.calibration.commissioning.answers import OF_THE_LINE, vehicle_table
 from gateway.calibration.commissioning.job import JOB, RESULT, Drive, Found, Job, Learned, Planned, Result
 
-__all__ = ["JOB", "RESULT", "Drive", "Found", "Job", "Learned", "Planned", "Result", "vehicle_table"]
+__all__ = ["JOB", "OF_THE_LINE", "RESULT", "Drive", "Found", "Job", "Learned", "Planned", "Result", "vehicle_table"]

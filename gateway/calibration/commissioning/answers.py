@@ -1,4 +1,8 @@
-"""The vehicle that follows from what a fitter typed."""
+"""The vehicle that follows from what a fitter typed, and from what its line says of all its vehicles."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -8,8 +12,22 @@ from gateway.errors import CampaignError
 from gateway.stated import VehicleAnswers
 from gateway.toml_file import describe_faults
 
+OF_THE_LINE: Final = (
+    "track_width_m",
+    "payload_range_kg",
+    "front_share_range_pct",
+    "gross_limit_kg",
+    "front_axle_limit_kg",
+    "rear_axle_limit_kg",
+    "front_wheel_limit_kg",
+    "rear_wheel_limit_kg",
+)
+"""What the vehicles of a line share beside what a fit inherits: taken from it where nothing else is said."""
 
-def vehicle_table(said: VehicleAnswers, name: str) -> VehicleTable:
+NO_LINE: Final[Mapping[str, Any]] = MappingProxyType({})
+
+
+def vehicle_table(said: VehicleAnswers, name: str, of_the_line: Mapping[str, Any] = NO_LINE) -> VehicleTable:
     """[vehicle] of a campaign; ``name`` where none was typed. Raises CampaignError in words for people."""
     if (said.empty_mass_kg is None) != (said.empty_front_share_pct is None):
         raise CampaignError("empty_mass_kg and empty_front_share_pct belong together: give both or neither")
@@ -19,6 +37,7 @@ def vehicle_table(said: VehicleAnswers, name: str) -> VehicleTable:
     )
     try:
         sprung = sprung_of(weights, said.division_kg)
-        return VehicleTable.model_validate(sprung.vehicle_keys() | typed | {"name": said.name.strip() or name})
+        named = {"name": said.name.strip() or name}
+        return VehicleTable.model_validate(sprung.vehicle_keys() | dict(of_the_line) | typed | named)
     except ValidationError as fault:
         raise CampaignError(describe_faults("the vehicle that follows", fault)) from None

@@ -19,6 +19,7 @@ PATH: Final = "/api/v1/calibration/commissioning"
 LOOK_EVERY_S: Final = 5.0
 MOST_UNANSWERED: Final = 6
 NO_LINE: Final = "none"
+MOST_PAYLOAD: Final = "payload_range_kg"
 SAID: Final = {  # option: key of the vehicle, question, whether it must be answered
     "front_axle_kg": ("kerb_front_axle_kg", "Under the front axle, empty [kg]", True),
     "rear_axle_kg": ("kerb_rear_axle_kg", "Under the rear axle, empty [kg]", True),
@@ -26,6 +27,7 @@ SAID: Final = {  # option: key of the vehicle, question, whether it must be answ
     "sensor_m": ("sensor_position_m", "Sensor behind the front axle [m]", True),
     "sensor_left_m": ("sensor_offset_left_m", "", False),
     "track_m": ("track_width_m", "", False),
+    "payload_kg": (MOST_PAYLOAD, "", False),
     "name": ("name", "", False),
 }
 
@@ -44,6 +46,7 @@ def commission() -> None:
 @click.option("--sensor-m", type=float, default=None, help="sensor behind the front axle; negative: ahead of it")
 @click.option("--sensor-left-m", type=float, default=None, help="sensor left of the centre line; negative: right of it")
 @click.option("--track-m", type=float, default=None, help="between the middles of left and right tyres")
+@click.option("--payload-kg", type=float, default=None, help="most that it may carry [default: as its line, else 450]")
 @click.option("--empty", is_flag=True, help="you know that the vehicle is empty, and will be until this is over")
 @click.option("--note", default=None, help="kept in the history")
 @click.option("--follow/--no-follow", default=None, help="show progress until it is made [default: at a terminal]")
@@ -186,7 +189,7 @@ def _vehicle(said: dict[str, Any]) -> dict[str, Any]:
                 raise click.UsageError(f"say --{option.replace('_', '-')}: the vehicle needs it")
             answer = click.prompt(question, type=float)
         if answer is not None:
-            vehicle[key] = answer
+            vehicle[key] = [0.0, answer] if key == MOST_PAYLOAD else answer
     return vehicle
 
 

@@ -42,7 +42,7 @@ def underway_text(underway: dict[str, Any]) -> str:
 
 def progress_text(underway: dict[str, Any]) -> str:
     """One line, while it is driven."""
-    driven = f"{underway['driven_s'] / 60.0:.0f} min driven, {underway['n_batches']} windows"
+    driven = f"{underway['driven_s'] / 60.0:.0f} min driven, {one_or_more(underway['n_batches'], 'window', 'windows')}"
     learned = underway["learned"]
     if learned is None:
         return f"{driven}: nothing is known yet"

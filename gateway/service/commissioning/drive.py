@@ -144,7 +144,8 @@ class EmptyDrive:
             if one in there
         ]
         if files:
-            self._start(self._jobs.job(self._table(underway.vehicle), underway.line, files, is_fit=True))
+            vehicle = self._table(underway.vehicle, underway.line)
+            self._start(self._jobs.job(vehicle, underway.line, files, is_fit=True))
 
     def _look(self, kept: KeptBatch) -> None:
         """Begin the inspection of one window."""
@@ -152,7 +153,8 @@ class EmptyDrive:
         if underway is None or underway.vehicle is None or underway.line is None:
             return
         file = BatchFile(self._worker.folder / LOOKED_AT, kept.batch.t_start_ns, kept.batch.t_end_ns)
-        job = self._jobs.job(self._table(underway.vehicle), underway.line, [file], is_fit=False)
+        vehicle = self._table(underway.vehicle, underway.line)
+        job = self._jobs.job(vehicle, underway.line, [file], is_fit=False)
         self._start(job, {LOOKED_AT: packed(kept)})
 
     def _start(self, job: Job, files: Mapping[str, bytes] | None = None) -> None:
@@ -192,14 +194,15 @@ class EmptyDrive:
         self._book.write(name, result.calibration.encode())
         if load_calibration(self._book.directory / name).id != result.calibration_id:  # read as the next start will
             raise CalibrationFileError(f"{name}: is not what was fitted")
+        line = underway.line or LineChoice(name="")
         made = Made(
             id=result.calibration_id,
             file_name=name,
             at=self._book.now(),
             by=underway.by,
             note=underway.note,
-            line=underway.line or LineChoice(name=""),
-            vehicle=self._table(vehicle),
+            line=line,
+            vehicle=self._table(vehicle, line),
             batches=underway.batches,
             learned=result.learned,
             warnings=result.warnings,
@@ -214,8 +217,8 @@ class EmptyDrive:
             self._book.forget_others()
         self._book.tell(Event.COMMISSIONED, {"calibration_id": made.id, "by": made.by, "n_batches": len(made.batches)})
 
-    def _table(self, answers: VehicleAnswers) -> VehicleTable:
-        table = vehicle_table(answers, self._vehicle.name)
+    def _table(self, answers: VehicleAnswers, line: LineChoice) -> VehicleTable:
+        table = vehicle_table(answers, self._vehicle.name, line.shared)
         return table.model_copy(update={"name": self._vehicle.name}) if self._vehicle.is_name_fixed else table
 
 

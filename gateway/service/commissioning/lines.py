@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.calibration.campaign import VehicleTable
+from gateway.calibration.commissioning import OF_THE_LINE
 from gateway.calibration.file import CalibrationFile, LikeFile, line_of_files, load_like
 from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError, LineError
 from gateway.files.kept import KeptFiles
@@ -67,7 +68,9 @@ class Lines:
         except ConfigurationError as fault:
             raise CommissioningRefusedError("line_unusable", str(fault)) from None
         copy_name = f"line-{hashlib.sha256(content).hexdigest()[:16]}.json"
-        return LineChoice(name=name, id=held.id, source=source, copy_name=copy_name), content
+        figures = _figures(held)
+        shared = {key: figures[key] for key in OF_THE_LINE if figures.get(key) is not None}
+        return LineChoice(name=name, id=held.id, source=source, copy_name=copy_name, shared=shared), content
 
     def upload(self, name: str, content: str, signature: str | None) -> LineFound:
         """Keep a file under this name; on disk when this returns. Raises CommissioningRefusedError."""
@@ -135,4 +138,9 @@ def _figures(held: LikeFile) -> dict[str, object]:
     """What of it a form may be filled with."""
     if isinstance(held, CalibrationFile):
         return held.vehicle.model_dump(mode="json")
-    return {"name": held.siblings[0].name, "wheelbase_m": held.line.wheelbase_m}
+    most_kg = held.line.seen.payload_seen_kg[1]
+    return {
+        "name": held.siblings[0].name,
+        "wheelbase_m": held.line.wheelbase_m,
+        "payload_range_kg": [0.0, most_kg] if most_kg > 0.0 else None,
+    }

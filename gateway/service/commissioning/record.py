@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from pydantic import Field, ValidationError
 
@@ -21,12 +21,16 @@ Source = Literal["package", "administrator", "uploaded"]
 
 
 class LineChoice(Part):
-    """The line that was chosen. ``copy_name`` is its copy in the service's folder, None for no line at all."""
+    """The line that was chosen. ``copy_name`` is its copy in the service's folder, None for no line at all.
+
+    ``shared`` is what it says of the vehicle of which nothing was typed.
+    """
 
     name: str
     id: str | None = None
     source: Source | None = None
     copy_name: str | None = None
+    shared: dict[str, Any] = Field(default_factory=dict)
 
 
 class EmptyClaim(Part):

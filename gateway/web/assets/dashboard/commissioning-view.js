@@ -10,7 +10,7 @@ const STEPS = ["line", "vehicle", "empty", "drive", "fit"];
 const TONES = { fault: "alarm", warning: "warning", note: "soft" };
 const WHY_ENDED = { undone: "undone", back_to_factory: "back to the settings' own" };
 const NO_LINE = "";
-const OPTIONAL = new Set(["sensor_offset_left_m", "track_width_m", "name"]);
+const OPTIONAL = new Set(["sensor_offset_left_m", "track_width_m", "payload_range_kg", "name"]);
 
 const card = element("commissioning");
 let lines = [];
@@ -108,6 +108,8 @@ function fillVehicle() {
     const field = element("commissioning-vehicle").elements[name];
     if (sister?.[name] && field.value === "") field.value = sister[name];
   }
+  const most = element("commissioning-vehicle").elements.payload_range_kg;
+  if (sister?.payload_range_kg && most.value === "") most.value = sister.payload_range_kg[1];
 }
 
 /** One question to the gateway: its own words where it refuses, and no button twice. */
@@ -149,6 +151,7 @@ function stateVehicle(form) {
   for (const field of form.querySelectorAll("input")) {
     if (field.value !== "" || !OPTIONAL.has(field.name)) said[field.name] = field.type === "number" ? Number(field.value) : field.value;
   }
+  if (said.payload_range_kg) said.payload_range_kg = [0, said.payload_range_kg];
   return step(form, "/vehicle", said);
 }
 
