@@ -151,15 +151,22 @@ class Outbox:
         return [one for one in letters if one.kind in self._only], beside.cursors[-1]
 
     def _behind(self, cursor: str | None, limit: int) -> list[Letter]:
-        """Estimates, and what was told beside them, by their numbers; where there is more of one, the other waits."""
+        """Estimates, and what was told beside them, by their numbers; where there is more of one, the other waits.
+
+        Whichever is asked for last has all up to the end of the other: what came between two questions is no gap.
+        """
         page = self._history.estimates(cursor=cursor, limit=limit, with_spectra=False)
         beside = self._history.entries(cursor=cursor, limit=limit, upto=page.next_cursor)
+        ends = [beside.next_cursor]
+        if beside.cursors and not (page.cursors and _is_behind(beside.cursors[-1], page.cursors[-1])):
+            page = self._history.estimates(cursor=cursor, limit=limit, with_spectra=False)
+            ends.append(beside.cursors[-1])
         letters = [
             _letter(place, previous, self._shown(json.loads(text)))
             for place, previous, text in zip(page.cursors, page.previous, page.items, strict=True)
         ]
         letters += (self._entry(place, text) for place, text in zip(beside.cursors, beside.items, strict=True))
-        last = min((_number(place) for place in (beside.next_cursor, page.next_cursor) if place), default=None)
+        last = min((_number(place) for place in (*ends, page.next_cursor) if place), default=None)
         kept = [one for one in letters if last is None or _number(one.cursor) <= last]
         return sorted(kept, key=lambda one: _number(one.cursor))
 
