@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 # The last lie beside the checkout
-PROMISED = ("chromium", "playwright", "mosquitto", "ssh-keygen", "a test machine", "recorded drives")
+PROMISED = ("chromium", "playwright", "mosquitto", "postgresql", "ssh-keygen", "a test machine", "recorded drives")
 
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")

@@ -1,10 +1,14 @@
 """deploy/fleet without containers: a few vehicles, and what breaks. `make fleet-test` does it with fifty."""
 
+import json
 from collections.abc import Iterator
 
+import paho.mqtt.client as mqtt
+import psycopg
 import pytest
+from paho.mqtt.enums import CallbackAPIVersion
 from support.broker import needs_mosquitto
-from support.fleet_view import FleetView, fleet_view
+from support.fleet_view import FLEET, FleetView, fleet_view, provision, write_table
 from support.patience import wait_until
 from support.postgres import needs_postgres
 
@@ -20,6 +24,20 @@ def view(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetView]:
 def drive(view: FleetView, n: int) -> None:
     for vehicle in view.vehicles:
         vehicle.drive(n)
+
+
+def queries() -> Iterator[tuple[str, str]]:
+    """Title and SQL of each panel, as Grafana would send it with every vehicle chosen, over a week."""
+    board = json.loads((FLEET / "grafana/dashboards/fleet.json").read_text())
+    (variable,) = board["templating"]["list"]
+    for panel in board["panels"]:
+        (target,) = panel["targets"]
+        sql = target["rawSql"].replace("IN ($vehicle)", f"IN ({variable['query'].replace(' ORDER BY 1', '')})")
+        for column in ("t_end", "received", "before_t_end"):
+            chosen = f"{column} BETWEEN now() - interval '7 days' AND now() + interval '1 day'"
+            sql = sql.replace(f"$__timeFilter({column})", chosen)
+        assert "$" not in sql, sql
+        yield panel["title"], sql
 
 
 def settled(view: FleetView) -> None:
@@ -44,6 +62,49 @@ def test_a_killed_broker_costs_nothing(view: FleetView) -> None:
     settled(view)
 
 
+def test_the_dashboards_queries_run_as_the_role_that_may_only_read(view: FleetView) -> None:
+    """Each query of grafana/dashboards/fleet.json, with Grafana's own words replaced as Grafana does."""
+    with view.database.connect(user="springscale_reader") as connection:
+        found = {title: connection.execute(sql).fetchall() for title, sql in queries()}
+        with pytest.raises(psycopg.errors.InsufficientPrivilege):
+            connection.execute("DELETE FROM estimate")
+    n_vehicles = len(view.vehicles)
+    assert found["Vehicles"] == found["Connected"] == [(n_vehicles,)]
+    assert found["Records that never came"] == found["Unreadable messages"] == [(0,)]
+    assert {row[0] for row in found["The fleet now"]} == {vehicle.id for vehicle in view.vehicles}
+    assert len(found["Payload"]) == view.n_estimates
+    assert sum(row[1] for row in found["Records taken in five minutes"]) == view.n_estimates
+    told = {title for title, rows in found.items() if rows}
+    assert told == set(found) - {"Alarms that stand", "Why batches were not weighed"}  # there was none
+
+
+def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: FleetView) -> None:
+    one, another = view.vehicles[:2]
+    folder = view.output / "vehicles" / one.id
+    client = mqtt.Client(CallbackAPIVersion.VERSION2, "intruder", protocol=mqtt.MQTTv5)
+    client.username_pw_set(one.id, (folder / "broker-password").read_text().strip())
+    client.tls_set(str(folder / "fleet-ca.pem"))
+    heard: list[str] = []
+    answers: dict[int, str] = {}
+    client.on_message = lambda _client, _userdata, message: heard.append(message.topic)
+    client.on_publish = lambda _client, _userdata, mid, code, _told: answers.update({mid: str(code)})
+    client.connect("127.0.0.1", view.broker.port)
+    client.subscribe("springscale/#", qos=1)
+    client.loop_start()
+    forged = client.publish(f"springscale/{another.id}/estimates", b"{}", qos=1).mid
+    broken = client.publish(f"springscale/{one.id}/estimates", b"no JSON \0", qos=1).mid
+    assert wait_until(lambda: {forged, broken} <= set(answers))
+    client.disconnect()
+    client.loop_stop()
+    assert (answers[forged], answers[broken], heard) == ("Not authorized", "Success", [])
+    assert wait_until(lambda: view.count("unreadable") == 1)
+    with view.database.connect() as connection:
+        (row,) = connection.execute("DELETE FROM unreadable RETURNING topic, fault, payload").fetchall()
+    assert row[0] == f"springscale/{one.id}/estimates"
+    assert "JSONDecodeError" in str(row[1])
+    assert row[2] == b"no JSON \0"
+
+
 def test_a_killed_subscriber_costs_nothing(view: FleetView) -> None:
     drive(view, 20)
     view.subscriber.kill()
@@ -59,3 +120,28 @@ def test_a_database_that_is_away_costs_nothing(view: FleetView) -> None:
     assert wait_until(lambda: "database away" in view.subscriber.said)
     view.database.start()
     settled(view)
+
+
+def test_who_is_taken_from_the_table_is_refused(view: FleetView) -> None:
+    """provision.py again, without one of them: the others keep their passwords."""
+    kept = {
+        vehicle.id: (view.output / f"vehicles/{vehicle.id}/broker-password").read_text() for vehicle in view.vehicles
+    }
+    gone = view.vehicles.pop()
+    gone.stop()  # its state lies in the folder that goes with it
+    write_table(view.folder / "fleet.csv", [vehicle.id for vehicle in view.vehicles])
+    provision(view.folder, f"127.0.0.1:{view.broker.port}")
+    view.broker.reload()
+    for vehicle in view.vehicles:
+        assert (view.output / f"vehicles/{vehicle.id}/broker-password").read_text() == kept[vehicle.id]
+    assert not (view.output / "vehicles" / gone.id).exists()
+    refused = mqtt.Client(CallbackAPIVersion.VERSION2, "gone", protocol=mqtt.MQTTv5)
+    refused.username_pw_set(gone.id, kept[gone.id].strip())
+    refused.tls_set(str(view.folder / "ca.pem"))
+    told: list[str] = []
+    refused.on_connect = lambda _client, _userdata, _flags, code, _told: told.append(str(code))
+    refused.connect("127.0.0.1", view.broker.port)
+    assert wait_until(lambda: refused.loop(0.1) is not None and bool(told))
+    assert told == ["Not authorized"]
+    drive(view, 5)
+    assert wait_until(lambda: view.count(f"estimate WHERE vehicle_id <> '{gone.id}'") == view.n_estimates)

@@ -4,6 +4,7 @@ import contextlib
 import csv
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -11,8 +12,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import trustme
 
 from gateway.config import load_settings
 from gateway.core.events import EntryKind
@@ -36,11 +35,7 @@ SAVES_EVERY_S = 1  # mosquitto.conf's 30 would make the test as long
 
 def provisioned(folder: Path, names: list[str], broker: str) -> Path:
     """deploy/fleet/provision.py's output for vehicles of these names."""
-    authority = trustme.CA()
-    authority.cert_pem.write_to_path(folder / "ca.pem")
-    issued = authority.issue_cert("127.0.0.1", "localhost")
-    issued.private_key_pem.write_to_path(folder / "broker.key")
-    issued.cert_chain_pems[0].write_to_path(folder / "broker.pem")
+    subprocess.run([FLEET / "make_certificates.sh", "127.0.0.1", folder], check=True, capture_output=True)
     write_table(folder / "fleet.csv", names)
     (folder / "settings.toml").write_text('signals = "springscale:reference"\n[web]\nport = 0\n')
     provision(folder, broker)
@@ -90,6 +85,11 @@ class FleetBroker:
         log = (self._folder / "mosquitto.log").open("ab")
         with log:
             self._process = subprocess.Popen([MOSQUITTO, "-c", self._folder / "mosquitto.conf"], stderr=log)
+
+    def reload(self) -> None:
+        """Read passwords and access list anew."""
+        assert self._process is not None
+        self._process.send_signal(signal.SIGHUP)
 
     def kill(self) -> None:
         """As the kernel does when memory is short: nothing is saved any more."""

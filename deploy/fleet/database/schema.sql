@@ -73,10 +73,15 @@ WHERE late.previous > 0
 
 -- The newest answer of each vehicle; rejections are no answers.
 CREATE OR REPLACE VIEW latest AS
-SELECT DISTINCT ON (vehicle_id) *
-FROM estimate
-WHERE rejected = '{}'
-ORDER BY vehicle_id, t_end DESC;
+SELECT found.*
+FROM vehicle
+CROSS JOIN LATERAL (
+    SELECT *
+    FROM estimate
+    WHERE estimate.vehicle_id = vehicle.vehicle_id AND rejected = '{}'
+    ORDER BY t_end DESC
+    LIMIT 1
+) AS found;
 
 DO $$
 BEGIN
