@@ -153,6 +153,32 @@ class UplinkStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class DeadLetter:
+    """One that the webhook gave up."""
+
+    id: str
+    reason: str
+    at: str
+
+
+@dataclass(frozen=True, slots=True)
+class WebhookStatus:
+    """How alarms and events get to the webhook's receiver; counts begin at the start but for those the store keeps."""
+
+    receiver: Annotated[str, Field(examples=["https://fleet.example:443"])]
+    n_delivered: Annotated[int, Field(description="answered with 2xx")] = 0
+    n_failed: Annotated[int, Field(description="attempts that were not")] = 0
+    n_dead: Annotated[int, Field(description="letters given up: found wrong, or refused for too long")] = 0
+    dead: Annotated[tuple[DeadLetter, ...], Field(description="the last of them, the newest at the end")] = ()
+    n_waiting: Annotated[int, Field(description="still to be delivered; as of a few seconds ago")] = 0
+    waiting_age_s: Annotated[
+        float | None, Field(description="of the oldest of them, since its receipt; null: none waits")
+    ] = None
+    n_pruned: Annotated[int, Field(description="removed by retention before they could be delivered")] = 0
+    last_fault: Annotated[str | None, Field(description="null while letters are taken")] = None
+
+
+@dataclass(frozen=True, slots=True)
 class RecordStatus:
     """How the ring log goes; counts begin at the start of the service."""
 
@@ -207,6 +233,7 @@ class Status(_Told):
     batches: BatchCounts = BatchCounts()
     store: StoreStatus = StoreStatus()
     uplink: UplinkStatus | None = Field(None, description="null where no broker is configured")
+    webhook: WebhookStatus | None = Field(None, description="null where none is configured")
     record: RecordStatus | None = Field(None, description="the ring log; null where it is off")
     verification: VerificationStatus = VerificationStatus()
     alarms: AlarmsStatus = AlarmsStatus()

@@ -14,6 +14,7 @@ from gateway.records import json_line
 from gateway.service.startable import startable_faults
 from gateway.setup import Setup, setup_of
 from gateway.uplink import uplink_settings
+from gateway.uplink.webhook import webhook_settings
 
 
 @click.command("check-config")
@@ -43,6 +44,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
     if faults:
         raise ConfigurationError("\n".join(f"{config}: {fault}" for fault in faults))
     forwarding = uplink_settings(settings.uplink, settings.vehicle)
+    pushing = webhook_settings(settings.webhook, settings.vehicle)
     summary = {
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
@@ -54,6 +56,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
         "trusted_keys": [key.fingerprint for key in trust.keys],
         "limits": limits_in_force(setup),
         "uplink": forwarding.broker if forwarding else None,
+        "webhook": pushing.receiver if pushing else None,
     }
     if as_json:
         click.echo(json_line(summary))

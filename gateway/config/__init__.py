@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
-from gateway.config.alarms import AlarmsSection
+from gateway.config.alarms import AlarmsSection, WebhookSection
 from gateway.config.sections import (
     OF_CALIBRATION,
     BroadcastSection,
@@ -230,6 +230,7 @@ class Settings(BaseSettings):
     position: PositionSection = PositionSection()
     alarms: AlarmsSection = AlarmsSection()
     uplink: UplinkSection = UplinkSection()
+    webhook: WebhookSection = WebhookSection()
     broadcast: BroadcastSection = BroadcastSection()
     trust: TrustSection = TrustSection()
     log: LogSection = LogSection()
@@ -286,6 +287,8 @@ def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:
     changed["web"] = settings.web.model_copy(update={key: folder / path for key, path in tls.items() if path})
     files = settings.uplink.model_dump(include={"ca", "certificate", "key", "password_file"}, exclude_none=True)
     changed["uplink"] = settings.uplink.model_copy(update={name: folder / path for name, path in files.items()})
+    files = settings.webhook.model_dump(include={"ca", "secret_file"}, exclude_none=True)
+    changed["webhook"] = settings.webhook.model_copy(update={name: folder / path for name, path in files.items()})
     if settings.commissioning.lines is not None:
         lines = folder / settings.commissioning.lines
         changed["commissioning"] = settings.commissioning.model_copy(update={"lines": lines})

@@ -1,8 +1,10 @@
 """Tables of springscale.toml about who must know: when an alarm is told, and where to."""
 
-from typing import Annotated, Self
+from pathlib import Path
+from typing import Annotated, Final, Literal, Self
+from urllib.parse import urlsplit
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from gateway.config.sections import Section
 from gateway.core.alarms import CAUSE_NAMES, AlarmRules
@@ -58,3 +60,46 @@ class AlarmsSection(Section):
         """The same settings for the core."""
         chosen = self.model_dump(exclude={"no_estimate_min"})
         return AlarmRules(**chosen, no_estimate_s=60.0 * self.no_estimate_min)
+
+
+_LOCAL: Final = frozenset({"127.0.0.1", "::1", "localhost"})
+
+
+class WebhookSection(Section):
+    """Where alarms and events are pushed to: an address that takes signed HTTP requests."""
+
+    url: str | None = Field(None, description="its address, https:// (http:// on this machine alone); without it none")
+    secret_file: Path | None = Field(
+        None, description="file with the secret we sign with: `whsec_` and base64, a line each; the first is the newest"
+    )
+    ca: Path | None = Field(
+        None, description="PEM file of the authority that signed the receiver's certificate [default: the system's]"
+    )
+    send: tuple[Literal["alarms", "events", "trips", "estimates"], ...] = Field(
+        ("alarms", "events"), min_length=1, description="what it is sent"
+    )
+    timeout_s: float = Field(20.0, ge=1.0, le=300.0, description="an answer that takes longer is none")
+    back_off_max_s: float = Field(300.0, gt=0.0, le=86_400.0, description="longest pause between two tries")
+    give_up_h: float = Field(
+        72.0, gt=0.0, le=8760.0, description="hours after which a letter that is answered with a refusal is given up"
+    )
+
+    @field_validator("url")
+    @classmethod
+    def _is_an_address(cls, url: str | None) -> str | None:
+        if url is None:
+            return None
+        parts = urlsplit(url)  # raises ValueError for a port that is none, when it is asked for
+        if parts.scheme not in {"https", "http"} or not parts.hostname or (parts.port or 1) < 1:
+            raise ValueError("is no https:// address")
+        if parts.username is not None or parts.fragment or not url.isascii() or not url.isprintable() or " " in url:
+            raise ValueError("may hold neither a user nor a fragment, and no character that must be escaped")
+        if parts.scheme == "http" and parts.hostname not in _LOCAL:
+            raise ValueError("would cross the network in the clear: use https://")
+        return url
+
+    @model_validator(mode="after")
+    def _signs(self) -> Self:
+        if self.url is not None and self.secret_file is None:
+            raise ValueError("url needs secret_file")
+        return self

@@ -19,6 +19,7 @@ from gateway.service.day_book import DayBook
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
 from gateway.service.parts import (
+    Forwarding,
     board_of,
     broadcaster_of,
     commissioning_of,
@@ -28,6 +29,7 @@ from gateway.service.parts import (
     store_of,
     tickets_of,
     uplink_of,
+    webhook_of,
 )
 from gateway.service.pipeline import Pipeline
 from gateway.service.proving import Proving
@@ -37,7 +39,6 @@ from gateway.service.tare_desk import Subject, TareDesk
 from gateway.service.web_server import WebServer
 from gateway.setup import Setup
 from gateway.status import State
-from gateway.uplink import uplink_settings
 from gateway.web import (
     KnownLoads,
     Scales,
@@ -80,8 +81,8 @@ class Gateway:
         self._on_started = on_started
         self._tokens = token_file = TokenFile(settings.store.directory / "tokens.json")
         refuse_open_address(settings.web.host, has_tokens=token_file.are_in_use())
-        forwarding = uplink_settings(settings.uplink, settings.vehicle)
-        self.store = store_of(settings.store, forwarding)
+        forwarding, with_places = Forwarding.of(settings), settings.position.forward
+        self.store = store_of(settings.store, forwarding.queues)
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
             if setup_fault is None:
@@ -108,7 +109,9 @@ class Gateway:
             told_in_turn(log_batch, DayBook(setup, self.store, self.board), self.alarms),
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
-        self.uplink = uplink_of(forwarding, setup, self.store, with_places=settings.position.forward)
+        self.uplink = uplink_of(forwarding.broker, setup, self.store, with_places=with_places)
+        self.webhook = webhook_of(forwarding.webhook, self.store, with_places=with_places)
+        self._senders = [part for part in (self.uplink, self.webhook) if part is not None]
         self.tare = TareDesk(
             settings.store.directory,
             subject,
@@ -131,6 +134,7 @@ class Gateway:
             self.store,
             self.board,
             self.uplink,
+            self.webhook,
             self.ring_log,
             self.proving.verification.status,
             around=self.around,
@@ -202,8 +206,8 @@ class Gateway:
             part.start()
         self.source.start()
         self.pipeline.start()
-        if self.uplink is not None:
-            self.uplink.start()
+        for sender in self._senders:
+            sender.start()
         self.store.write_event("started", {"interface": self._settings.bus.interface})
         serving = asyncio.create_task(self._serve_web())
         supervising = asyncio.create_task(self._supervise(serving))
@@ -268,9 +272,9 @@ class Gateway:
             return f"the pipeline died: {self.pipeline.failure!r}"
         if not self.store.is_alive():
             return "the database writer died"
-        for name, part in (("uplink", self.uplink), ("sender of weights", self.broadcaster)):
+        for part in (*self._senders, self.broadcaster):
             if part is not None and not part.is_alive():
-                return f"the {name} died"
+                return f"the {part.NAME} died"
         if serving.done():
             return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: is it taken?"
         return None
@@ -287,8 +291,8 @@ class Gateway:
         self.pipeline.stop()
         for part in self._beside:
             part.stop()
-        if self.uplink is not None:
-            self.uplink.stop()
+        for sender in self._senders:
+            sender.stop()
         self.board.close()
         self.store.write_event("stopped", {"failure": self._failure})
         n_lost = self.store.close()

@@ -1,7 +1,7 @@
 """The parts of a service, each built from its section of the settings."""
 
 import logging
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 
 from gateway.bus.broadcast import Broadcaster, Sender
@@ -21,7 +21,8 @@ from gateway.service.proving import TicketDesk
 from gateway.service.tare_desk import Subject
 from gateway.setup import Setup
 from gateway.store import Retention, Store
-from gateway.uplink import Outbox, Uplink, UplinkSettings
+from gateway.uplink import Outbox, Uplink, UplinkSettings, uplink_settings
+from gateway.uplink.webhook import Webhook, WebhookSettings, webhook_settings
 from gateway.web import Board
 
 SECONDS_PER_DAY = 86_400.0
@@ -48,11 +49,40 @@ def _queue_name(wanted: UplinkSettings) -> str:
     return f"mqtt://{wanted.broker}/{wanted.topic}"
 
 
-def store_of(wanted: StoreSection, forwarding: UplinkSettings | None) -> Store:
+@dataclass(frozen=True, slots=True)
+class Forwarding:
+    """Who is told of what is stored, as the settings have it; None where there is nobody."""
+
+    broker: UplinkSettings | None
+    webhook: WebhookSettings | None
+
+    @classmethod
+    def of(cls, settings: Settings) -> "Forwarding":
+        """Raises ConfigurationError for what cannot work."""
+        return cls(
+            uplink_settings(settings.uplink, settings.vehicle), webhook_settings(settings.webhook, settings.vehicle)
+        )
+
+    @property
+    def queues(self) -> tuple[str, ...]:
+        """Names of their places in the queue."""
+        broker = () if self.broker is None else (_queue_name(self.broker),)
+        return broker if self.webhook is None else (*broker, self.webhook.queue)
+
+
+def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: bool) -> Webhook | None:
+    """None where none is configured."""
+    if wanted is None:
+        return None
+    outbox = Outbox(store.reader(), store, wanted.queue, with_places=with_places, only=wanted.kinds)
+    return Webhook(wanted, outbox, store.write_event)
+
+
+def store_of(wanted: StoreSection, undelivered_to: tuple[str, ...]) -> Store:
     keep = Retention(
         max_age_s=wanted.max_age_days * SECONDS_PER_DAY,
         max_bytes=round(wanted.max_size_mb * BYTES_PER_MB),
-        undelivered_to=() if forwarding is None else (_queue_name(forwarding),),
+        undelivered_to=undelivered_to,
     )
     return Store.open(wanted.directory, keep)
 

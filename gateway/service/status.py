@@ -26,6 +26,7 @@ from gateway.status import (
 )
 from gateway.store import Store
 from gateway.uplink import Uplink
+from gateway.uplink.webhook import Webhook
 from gateway.web import Board
 
 SENSOR_LOST_S = 10.0  # a sensor silent for this long on a bus that is alive is at fault
@@ -50,6 +51,7 @@ class StatusReport:
         store: Store,
         board: Board,
         uplink: Uplink | None = None,
+        webhook: Webhook | None = None,
         ring_log: RingLog | None = None,
         verification: Callable[[], VerificationStatus] = VerificationStatus,
         *,
@@ -64,6 +66,7 @@ class StatusReport:
         self._store = store
         self._board = board
         self._uplink = uplink
+        self._webhook = webhook
         self._around = around
         self._ring_log = ring_log
         self._verification = verification
@@ -98,6 +101,7 @@ class StatusReport:
             ),
             store=self._store.health(),
             uplink=self._uplink.report() if self._uplink else None,
+            webhook=self._webhook.report() if self._webhook else None,
             record=self._ring_log.status() if self._ring_log else None,
             verification=self._verification(),
             alarms=self._alarms(),

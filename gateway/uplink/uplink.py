@@ -41,6 +41,8 @@ class Uplink:
     those may whose delivery was not on disk yet. What fails is told in :meth:`report` and tried again.
     """
 
+    NAME = "uplink"
+
     def __init__(
         self,
         settings: UplinkSettings,

@@ -17,7 +17,18 @@ from support.web import Client, Gateway
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Quantity
-from gateway.status import BatchCounts, BusStatus, DecodeCount, RecordStatus, SignalHealth, State, Status, UplinkStatus
+from gateway.status import (
+    AlarmsStatus,
+    BatchCounts,
+    BusStatus,
+    DecodeCount,
+    RecordStatus,
+    SignalHealth,
+    State,
+    Status,
+    UplinkStatus,
+    WebhookStatus,
+)
 from gateway.web import create_app
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
@@ -48,7 +59,9 @@ def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set
             signals=(SignalHealth(signal="speed", rate_hz=5.0, last_age_s=0.1, rejected_share=0.0),),
             batches=BatchCounts(n_estimates=1, n_rejected=2, rejected_by_reason={"gap": 2}),
             uplink=UplinkStatus(broker="fleet.example:8883", waiting_age_s=7.0),
+            webhook=WebhookStatus(receiver="https://fleet.example:443", waiting_age_s=7.0),
             record=RecordStatus(n_frames_written=7),
+            alarms=AlarmsStatus({"overload.gross": "early"}, watched=("overload.gross", "drift.zero")),
         )
         gateway.publish(replace(make_estimate(0), front_share=Quantity(50.5, 0.5)))
         calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0))

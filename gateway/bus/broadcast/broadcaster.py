@@ -22,6 +22,8 @@ class Broadcaster:
     ``weighed_now`` returns None for what is too old to be told. ``fault`` says why nothing is sent, for people.
     """
 
+    NAME = "sender of weights"
+
     def __init__(
         self,
         interface: str,

@@ -11,7 +11,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from gateway.estimate import PLACES
 from gateway.status import RecordStatus, State, Status, UplinkStatus, VerificationStatus
 from gateway.web.live.board import Board
-from gateway.web.routes.alarms.figures import alarm_metrics
+from gateway.web.routes.alarms.figures import alarm_metrics, webhook_metrics
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 
 
@@ -41,6 +41,8 @@ class StatusCollector:
             yield from _record(now.record)
         if now.uplink is not None:
             yield from _uplink(now.uplink)
+        if now.webhook is not None:
+            yield from webhook_metrics(now.webhook)
         yield from _web(self._board, self._responses)
         yield from _estimate(self._board)
         yield from _weights(weigh_latest(self._board, self._scales))

@@ -1,0 +1,283 @@
+"""The webhook against a real receiver: killed, slow, cut, failing, refusing, with TLS; and the sender killed."""
+
+import json
+import random
+import ssl
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+import trustme
+from support.alarms import LIMIT_KG, AlarmBench, of_load
+from support.patience import PATIENCE_S, wait_until
+from support.ports import free_port
+from support.receiver import SECRET_TEXT, Fault, Receiver, cut, slow, status, trickle
+
+from gateway.records import json_line
+from gateway.store import Store
+from gateway.uplink import Outbox
+from gateway.uplink.back_off import BackOff
+from gateway.uplink.webhook import Webhook, WebhookSettings
+from gateway.uplink.webhook.webhook import TRIES
+
+KINDS = ("alarm", "event")
+
+SENDER = """
+import pathlib, sys, time
+from gateway.store import Store
+from gateway.uplink import Outbox
+from gateway.uplink.back_off import BackOff
+from gateway.uplink.webhook import Webhook, WebhookSettings
+
+store = Store.open(pathlib.Path(sys.argv[1]))
+settings = WebhookSettings(False, "127.0.0.1", int(sys.argv[2]), "/hook", pathlib.Path(sys.argv[3]), ("alarm", "event"))
+outbox = Outbox(store.reader(), store, settings.queue, only=settings.kinds)
+Webhook(settings, outbox, back_off=BackOff(0.01, 0.05), poll_s=0.02).start()
+print("started", flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.fixture
+def secret_file(tmp_path: Path) -> Path:
+    path = tmp_path / "secret"
+    path.write_text(SECRET_TEXT)
+    return path
+
+
+class Sending:
+    """A store with letters in it, and a webhook that takes them to a port."""
+
+    def __init__(self, directory: Path, port: int, secret_file: Path, **changed: object) -> None:
+        self.store = Store.open(directory)
+        told = {"timeout_s": 5.0, "give_up_s": 3600.0, "kinds": KINDS, "is_tls": False, "host": "127.0.0.1", **changed}
+        self.clock_s = 0.0
+        settings = WebhookSettings(port=port, path="/hook", secret_file=secret_file, **told)  # type: ignore[arg-type]
+        self.kept: list[tuple[str, dict[str, str]]] = []
+        self.webhook = Webhook(
+            settings,
+            Outbox(self.store.reader(), self.store, settings.queue, only=settings.kinds),
+            lambda kind, detail: self.kept.append((kind, dict(detail))),
+            BackOff(0.005, 0.02),
+            clock_s=lambda: self.clock_s,
+            poll_s=0.02,
+        )
+        self.webhook.start()
+
+    def __enter__(self) -> "Sending":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.webhook.stop(PATIENCE_S)
+        self.store.close()
+
+
+def tell(store: Store, *numbers: int) -> list[str]:
+    """Entries, some of them nothing that the receiver wants -> ids of the letters that it should get."""
+    wanted = []
+    for n in numbers:
+        kind = ("alarm", "trip", "event")[n % 3]
+        record = {"id": f"{kind}-{n}", "revision": 1, "kind": "drift", "where": "zero", "t_end": None}
+        store.write_entry(kind, record["id"], n, json_line(record))
+        if kind in KINDS:
+            wanted.append(f"{kind}-{n}-1")
+    return wanted
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [status(500), status(503, Retry_After="0"), status(429), status(302, Location="/other"), status(401), cut],
+    ids=["500", "503", "429", "302", "401", "cut"],
+)
+def test_each_fault_is_tried_again_and_nothing_overtakes(tmp_path: Path, secret_file: Path, fault: Fault) -> None:
+    with Receiver([fault, status(200), fault, fault]) as receiver:
+        with Sending(tmp_path / "state", receiver.port, secret_file) as sending:
+            wanted = tell(sending.store, *range(9))
+            assert wait_until(lambda: len(receiver.ids) == len(wanted))
+        assert receiver.ids == wanted
+        assert receiver.wrong == []
+        assert len(receiver.seen) == len(wanted) + 3
+    report = sending.webhook.report()
+    assert (report.n_delivered, report.n_failed, report.n_dead, report.last_fault) == (len(wanted), 3, 0, None)
+
+
+def test_through_cuts_failures_restarts_of_the_receiver_and_kills_of_the_sender(
+    tmp_path: Path, secret_file: Path
+) -> None:
+    """Each letter taken; by id each once, and the first of each in its turn."""
+    dice = random.Random(18)
+    with_store = Store.open(tmp_path / "state")
+    wanted = tell(with_store, *range(450))
+    with_store.close()
+    port = free_port()
+    blows = dice.sample(["kill"] * 5 + ["restart"] * 4, 9)
+    moments = sorted(dice.sample(range(20, len(wanted) - 20), len(blows)))
+    weather = [cut, status(500), status(503), status(429), slow(0.02)]
+    taken: list[str] = []
+    wrong: list[str] = []
+    with ExitStack() as at_the_end:
+        receiver = Receiver(_some(dice, weather), port)
+        sender = _sender(tmp_path / "state", port, secret_file)
+        at_the_end.callback(lambda: _kill(sender))
+        for moment, blow in zip(moments, blows, strict=True):
+            assert _have_come(moment, taken, receiver), f"stuck before a {blow}"
+            if blow == "kill":
+                _kill(sender)
+                sender = _sender(tmp_path / "state", port, secret_file)
+            else:
+                receiver.close()
+                taken += [letter_id for letter_id, _ in receiver.taken]
+                wrong += receiver.wrong
+                receiver = Receiver(_some(dice, weather), port)
+        at_the_end.callback(receiver.close)
+        assert _have_come(len(wanted), taken, receiver)
+        taken += [letter_id for letter_id, _ in receiver.taken]
+        wrong += receiver.wrong
+    assert list(dict.fromkeys(taken)) == wanted
+    assert wrong == []
+
+
+def _have_come(n: int, taken: list[str], receiver: Receiver) -> bool:
+    return wait_until(lambda: len({*taken, *receiver.ids}) >= n)
+
+
+def _some(dice: random.Random, weather: list[Fault]) -> list[Fault]:
+    return [dice.choice(weather) if dice.random() < 0.15 else status(200) for _ in range(1000)]
+
+
+def _sender(state: Path, port: int, secret_file: Path) -> "subprocess.Popen[str]":
+    process = subprocess.Popen(
+        [sys.executable, "-c", SENDER, str(state), str(port), str(secret_file)], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "started\n"
+    process.stdout.close()
+    return process
+
+
+def _kill(process: "subprocess.Popen[str]") -> None:
+    process.kill()
+    process.wait()
+
+
+def test_nobody_there_and_then_somebody(tmp_path: Path, secret_file: Path) -> None:
+    port = free_port()
+    with Sending(tmp_path / "state", port, secret_file) as sending:
+        wanted = tell(sending.store, *range(6))
+        assert wait_until(lambda: "refused" in (sending.webhook.report().last_fault or ""))
+        sending.clock_s = 1e6  # however long: who is away gave no answer
+        with Receiver(port=port) as receiver:
+            assert wait_until(lambda: len(receiver.ids) == len(wanted))
+            assert receiver.ids == wanted
+    assert sending.webhook.report().n_dead == 0
+
+
+@pytest.mark.parametrize("fault", [slow(2.0), trickle], ids=["slow", "trickle"])
+def test_one_that_does_not_answer_in_time_is_left_and_asked_again(
+    tmp_path: Path, secret_file: Path, fault: Fault
+) -> None:
+    with (
+        Receiver([fault]) as receiver,
+        Sending(tmp_path / "state", receiver.port, secret_file, timeout_s=0.3) as sending,
+    ):
+        wanted = tell(sending.store, 0, 3)
+        assert wait_until(lambda: len(receiver.ids) == len(wanted))
+        assert receiver.ids == wanted
+        assert sending.webhook.report().n_failed == 1
+
+
+def test_a_letter_that_the_receiver_finds_wrong_holds_nobody_up(tmp_path: Path, secret_file: Path) -> None:
+    with (
+        Receiver([status(422)] * TRIES) as receiver,
+        Sending(tmp_path / "state", receiver.port, secret_file) as sending,
+    ):
+        wanted = tell(sending.store, *range(6))
+        assert wait_until(lambda: len(receiver.ids) == len(wanted) - 1)
+        assert receiver.ids == wanted[1:]
+        report = sending.webhook.report()
+        assert (report.n_dead, [dead.id for dead in report.dead]) == (1, wanted[:1])
+        assert sending.kept[0][0] == "webhook_dead_letter"
+        assert sending.kept[0][1]["id"] == wanted[0]
+
+
+def test_refused_for_long_enough_the_queue_moves_on(tmp_path: Path, secret_file: Path) -> None:
+    """A 404 is of the address, and is waited out; not for ever."""
+    with Receiver([status(404)] * 500) as receiver, Sending(tmp_path / "state", receiver.port, secret_file) as sending:
+        wanted = tell(sending.store, *range(6))
+        assert wait_until(lambda: len(receiver.seen) >= 2 * TRIES)
+        assert set(receiver.seen) == {wanted[0]}
+        sending.clock_s = 3601.0
+        assert wait_until(lambda: sending.webhook.report().n_dead >= 2)
+        receiver.faults.clear()
+        assert wait_until(lambda: receiver.ids[-1:] == wanted[-1:])
+        dead = [one.id for one in sending.webhook.report().dead]
+    assert dead + receiver.ids == wanted
+
+
+def test_retry_after_is_heeded(tmp_path: Path, secret_file: Path) -> None:
+    with (
+        Receiver([status(503, Retry_After="3600")]) as receiver,
+        Sending(tmp_path / "state", receiver.port, secret_file) as sending,
+    ):
+        tell(sending.store, 0)
+        assert wait_until(lambda: sending.webhook.report().n_failed == 1)
+        time.sleep(0.2)  # ten times the longest pause without it
+        assert len(receiver.seen) == 1
+
+
+def test_tls_is_checked(tmp_path: Path, secret_file: Path) -> None:
+    authority, stranger = trustme.CA(), trustme.CA()
+    ca, other = tmp_path / "ca.pem", tmp_path / "other.pem"
+    authority.cert_pem.write_to_path(str(ca))
+    stranger.cert_pem.write_to_path(str(other))
+    tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    authority.issue_cert("localhost").configure_cert(tls)
+    known = {"is_tls": True, "host": "localhost"}
+    with Receiver(tls=tls) as receiver:
+        with Sending(tmp_path / "wrong", receiver.port, secret_file, ca=other, **known) as sending:
+            tell(sending.store, 0)
+            assert wait_until(lambda: "CERTIFICATE_VERIFY_FAILED" in (sending.webhook.report().last_fault or ""))
+        assert receiver.seen == []
+        with Sending(tmp_path / "right", receiver.port, secret_file, ca=ca, **known) as sending:
+            wanted = tell(sending.store, 0, 3)
+            assert wait_until(lambda: receiver.ids == wanted)
+        assert receiver.wrong == []
+
+
+def test_a_secret_that_is_gone_is_told_and_taken_up_when_it_is_back(tmp_path: Path, secret_file: Path) -> None:
+    with Receiver() as receiver, Sending(tmp_path / "state", receiver.port, secret_file) as sending:
+        secret_file.unlink()
+        wanted = tell(sending.store, 0)
+        assert wait_until(lambda: "secret_file" in (sending.webhook.report().last_fault or ""))
+        secret_file.write_text(SECRET_TEXT)
+        assert wait_until(lambda: receiver.ids == wanted)
+
+
+def test_every_revision_of_an_alarm_that_is_told_in_time_comes(tmp_path: Path, secret_file: Path) -> None:
+    bench = AlarmBench(tmp_path / "state")
+    with Receiver() as receiver:
+        settings = WebhookSettings(False, "127.0.0.1", receiver.port, "/hook", secret_file, ("alarm",))
+        outbox = Outbox(bench.store.reader(), bench.store, settings.queue, only=settings.kinds)
+        webhook = Webhook(settings, outbox, poll_s=0.02)
+        webhook.start()
+        _step(receiver, 1, lambda: bench.weigh(of_load(0, LIMIT_KG + 60.0)))
+        _step(receiver, 2, lambda: bench.weigh(of_load(1, LIMIT_KG + 60.0, n_batches=2)))
+        _step(receiver, 3, lambda: bench.desk.acknowledge(bench.standing()[0]["id"], "yard", None))
+        _step(receiver, 4, lambda: bench.weigh(of_load(2, 100.0)))
+        webhook.stop(PATIENCE_S)
+    bench.store.close()
+    told = [json.loads(json.dumps(body)) for _, body in receiver.taken]
+    assert [body["type"] for body in told] == ["alarm"] * 4
+    assert [(body["data"]["revision"], body["data"]["state"]) for body in told] == [
+        (1, "early"), (2, "final"), (3, "final"), (4, "cleared"),
+    ]  # fmt: skip
+    assert len({body["data"]["id"] for body in told}) == 1
+
+
+def _step(receiver: Receiver, n: int, does: Callable[[], object]) -> None:
+    does()
+    assert wait_until(lambda: len(receiver.taken) == n)

@@ -1,0 +1,126 @@
+"""What a webhook signs, how it reads answers, and which settings it refuses."""
+
+import base64
+import json
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+from support.receiver import SECRET, SECRET_TEXT
+
+from gateway.config import VehicleSection
+from gateway.config.alarms import WebhookSection
+from gateway.errors import ConfigurationError
+from gateway.records import json_line
+from gateway.uplink.outbox import Letter
+from gateway.uplink.webhook import SecretError, Verdict, secrets_of, signed, webhook_settings
+from gateway.uplink.webhook.receiver import MOST_PAUSE_S, _seconds, body_of, verdict_of
+
+VAN = VehicleSection(id="van-17")
+
+
+def test_the_signature_is_that_of_the_specification() -> None:
+    """The example that Standard Webhooks' own libraries are tested with."""
+    (secret,) = secrets_of("whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw")
+    headers = signed((secret,), "msg_p5jXN8AQM9LWM0D4loKWxJek", 1614265330, b'{"test": 2432232314}')
+    assert headers == {
+        "webhook-id": "msg_p5jXN8AQM9LWM0D4loKWxJek",
+        "webhook-timestamp": "1614265330",
+        "webhook-signature": "v1,g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE=",
+    }
+
+
+def test_an_older_secret_signs_too() -> None:
+    new, old = secrets_of(f"{SECRET_TEXT}\n{base64.b64encode(b'x' * 24).decode()}\n")
+    both = signed((new, old), "a-1", 1, b"{}")["webhook-signature"].split(" ")
+    assert both == [signed((one,), "a-1", 1, b"{}")["webhook-signature"] for one in (new, old)]
+    assert new == SECRET
+
+
+@pytest.mark.parametrize("text", ["", "whsec_", "whsec_not base64", base64.b64encode(b"short").decode(), "ü"])
+def test_what_is_no_secret_is_refused(text: str) -> None:
+    with pytest.raises(SecretError):
+        secrets_of(text)
+
+
+@pytest.mark.parametrize(
+    ("status", "verdict"),
+    [
+        (200, Verdict.TAKEN), (202, Verdict.TAKEN), (204, Verdict.TAKEN),
+        (301, Verdict.REFUSED), (400, Verdict.UNWANTED), (401, Verdict.REFUSED), (403, Verdict.REFUSED),
+        (404, Verdict.REFUSED), (410, Verdict.REFUSED), (413, Verdict.UNWANTED), (422, Verdict.UNWANTED),
+        (429, Verdict.AWAY), (500, Verdict.REFUSED), (502, Verdict.AWAY), (503, Verdict.AWAY), (504, Verdict.AWAY),
+    ],
+)  # fmt: skip
+def test_what_a_status_means(status: int, verdict: Verdict) -> None:
+    assert verdict_of(status) is verdict
+
+
+@pytest.mark.parametrize(
+    ("header", "seconds"),
+    [
+        (None, 0.0), ("17", 17.0), ("999999", MOST_PAUSE_S), ("-3", 0.0), ("soon", 0.0),
+        ("Thu, 01 Jan 1970 00:17:10 GMT", 30.0), ("Thu, 01 Jan 1970 00:00:10 GMT", 0.0),
+    ],
+)  # fmt: skip
+def test_retry_after_is_seconds_or_a_date(header: str | None, seconds: float) -> None:
+    assert _seconds(header, now_s=1000.0) == seconds
+
+
+def test_the_body_says_what_it_is_and_when_it_happened() -> None:
+    record = {"id": "event-5-a", "revision": 2, "t_end": "2026-11-22T08:00:00.000000Z"}
+    letter = Letter("e-1", "event-5-a-2", json_line(record), "events", kind="event")
+    assert json.loads(body_of(letter)) == {"type": "event", "timestamp": record["t_end"], "data": record}
+    seen = {"steps": [{"t": "2026-11-22T08:00:00.000000Z"}], "acknowledged": {"at": "2026-11-22T09:00:00.000000Z"}}
+    letter = Letter("e-1", "alarm-5-a-2", json_line(seen), "alarms/drift/zero", kind="alarm")
+    assert json.loads(body_of(letter))["timestamp"] == "2026-11-22T09:00:00.000000Z"
+
+
+@pytest.fixture
+def secret_file(tmp_path: Path) -> Path:
+    path = tmp_path / "secret"
+    path.write_text(SECRET_TEXT + "\n")
+    return path
+
+
+def test_an_address_in_its_parts(secret_file: Path) -> None:
+    section = WebhookSection(url="https://fleet.example:8443/hooks/van?key=abc", secret_file=secret_file)
+    settings = webhook_settings(section, VAN)
+    assert settings is not None
+    assert (settings.receiver, settings.path) == ("https://fleet.example:8443", "/hooks/van?key=abc")
+    assert settings.kinds == ("alarm", "event")
+    assert "abc" not in settings.queue
+    assert webhook_settings(WebhookSection(), VAN) is None
+    elsewhere = webhook_settings(section.model_copy(update={"url": "https://fleet.example:8443/other"}), VAN)
+    assert elsewhere is not None
+    assert elsewhere.queue != settings.queue
+
+
+@pytest.mark.parametrize(
+    "url",
+    ["http://fleet.example/hook", "ftp://fleet.example", "fleet.example", "https://", "https://u:p@fleet.example/",
+     "https://fleet.example/#here", "https://fleet.example:99999/", "https://fleet.example/a b", "https://flöte.example/"],
+)  # fmt: skip
+def test_addresses_that_cannot_be_meant(url: str, secret_file: Path) -> None:
+    with pytest.raises(ValidationError):
+        WebhookSection(url=url, secret_file=secret_file)
+
+
+def test_what_goes_out_is_signed() -> None:
+    with pytest.raises(ValidationError, match="url needs secret_file"):
+        WebhookSection(url="https://fleet.example/")
+
+
+def test_a_secret_that_cannot_be_used_is_told_at_the_start(tmp_path: Path, secret_file: Path) -> None:
+    section = WebhookSection(url="https://fleet.example/", secret_file=tmp_path / "none")
+    with pytest.raises(ConfigurationError, match=r"secret_file .* cannot be used: .*openssl rand"):
+        webhook_settings(section, VAN)
+    section = WebhookSection(url="https://fleet.example/", secret_file=secret_file, ca=tmp_path / "none.pem")
+    with pytest.raises(ConfigurationError, match=r"ca .* cannot be used"):
+        webhook_settings(section, VAN)
+
+
+def test_a_vehicle_without_a_name_is_refused(secret_file: Path) -> None:
+    section = WebhookSection(url="https://fleet.example/", secret_file=secret_file)
+    with pytest.raises(ConfigurationError, match="set \\[vehicle\\] id"):
+        webhook_settings(section, VehicleSection())
