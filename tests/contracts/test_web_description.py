@@ -58,6 +58,7 @@ PATHS = [
     "/api/v1/export.csv",
     "/api/v1/export.jsonl",
     "/api/v1/weights/latest",
+    "/api/v1/cab",
     "/api/v1/weights/j1939",
     "/api/v1/vss",
     "/api/v1/calibration/tare",
