@@ -1,4 +1,4 @@
-"""Pages for people: the dashboard and the API's own documentation, every file from an installed package."""
+"""Pages for people: dashboard, cab page and the API's own documentation, every file from an installed package."""
 
 from importlib.resources import files
 from pathlib import Path
@@ -17,7 +17,7 @@ SWAGGER_FILES: Final = Path(str(files("fastapi_offline"))) / "static"
 
 
 def install(app: FastAPI, known_loads_path: str = "") -> None:
-    """/, /docs and the files they load. ``known_loads_path`` is where true loads are told, if they are."""
+    """/, /cab, /docs and the files they load. ``known_loads_path`` is where true loads are told, if they are."""
     page = Template((ASSETS / "dashboard.html").read_text(encoding="utf-8")).substitute(
         chart_library=LIBRARY_URL, chart_styles=" ".join(style_ids()), known_loads=known_loads_path
     )
@@ -26,6 +26,10 @@ def install(app: FastAPI, known_loads_path: str = "") -> None:
     @app.get("/", include_in_schema=False)
     async def dashboard() -> Response:
         return HTMLResponse(page, headers=asked_about)
+
+    @app.get("/cab", include_in_schema=False)
+    async def cab() -> Response:
+        return FileResponse(ASSETS / "cab.html", headers=asked_about)
 
     @app.get("/docs", include_in_schema=False)
     async def docs() -> Response:

@@ -54,7 +54,7 @@ def test_without_a_token_nothing_is_told(client: Client, path: str) -> None:
     assert "payload" not in answer.text
 
 
-@pytest.mark.parametrize("path", ["/", "/docs", "/openapi.json", "/health/live", "/assets/dashboard/main.js"])
+@pytest.mark.parametrize("path", ["/", "/cab", "/docs", "/openapi.json", "/health/live", "/assets/dashboard/main.js"])
 def test_what_tells_nothing_of_the_vehicle_is_public(client: Client, path: str) -> None:
     assert client.get(path).status_code == 200
 

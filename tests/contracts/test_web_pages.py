@@ -11,6 +11,7 @@ from support.web import Client, Gateway
 from gateway.web import KnownLoad
 from gateway.web.charting import LIBRARY, LIBRARY_URL
 
+NAMED = re.compile(r"(?:<link[^>]* href=|src=|from )\"(/[^\"]*)\"")
 TRUTH = (KnownLoad(0, 0.0, 50.0), KnownLoad(900 * 10**9, 270.0, 50.6))
 
 
@@ -21,7 +22,7 @@ def client(tmp_path: Path) -> Iterator[Client]:
 
 
 def test_nothing_foreign_and_nothing_inline_is_allowed(client: Client) -> None:
-    for path in ("/", "/api/v1/status", "/assets/dashboard/main.js", "/nothing"):
+    for path in ("/", "/cab", "/api/v1/status", "/assets/dashboard/main.js", "/nothing"):
         policy = client.get(path).headers["content-security-policy"]
         assert "default-src 'none'" in policy
         assert "unsafe" not in policy
@@ -36,8 +37,9 @@ def test_only_the_api_documentation_may_write_styles(client: Client) -> None:
     assert "script-src 'self';" in policies[0]
 
 
-def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client) -> None:
-    page = client.get("/").text
+@pytest.mark.parametrize("path", ["/", "/cab"])
+def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: str) -> None:
+    page = client.get(path).text
     assert re.findall(r"<script(?![^>]*\bsrc=)", page) == []
     assert re.findall(r"<style|\sstyle=|\son[a-z]+=", page) == []
     assert re.findall(r"(?:src|href)=\"(?!/|#)", page) == []
@@ -47,6 +49,17 @@ def test_every_file_the_page_names_is_there(client: Client) -> None:
     named = re.findall(r"(?:src|href|chart-library)=\"(/[^\"]*)\"", client.get("/").text)
     assert LIBRARY_URL in named
     assert [path for path in named if client.get(path).status_code != 200] == []
+
+
+def test_the_cab_page_is_small_with_all_that_it_loads(client: Client) -> None:
+    """A cheap phone on a slow link: 40 kB before compression, less than a tenth of one photograph."""
+    files = {"/cab"}
+    while more := {name for path in files for name in NAMED.findall(client.get(path).text)} - files:
+        files |= more
+    assert {path.rpartition(".")[2] for path in files} == {"/cab", "css", "js", "svg"}
+    answers = [client.get(path) for path in files]
+    assert {answer.status_code for answer in answers} == {200}
+    assert sum(len(answer.content) for answer in answers) < 40_000
 
 
 def test_the_library_is_that_of_the_installed_package_packed_or_not(client: Client) -> None:

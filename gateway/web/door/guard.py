@@ -15,7 +15,7 @@ from gateway.web.door.tokens import Scope, TokenFile
 
 # Nothing of the vehicle is in these: the pages' own files, the API's description, and whether the process lives.
 PUBLIC: Final = ("/assets/", "/swagger/")
-PUBLIC_PATHS: Final = frozenset({"/", "/docs", "/openapi.json", "/health/live"})
+PUBLIC_PATHS: Final = frozenset({"/", "/cab", "/docs", "/openapi.json", "/health/live"})
 # Raw frames may hold where the vehicle was: to look at them is more than to read a weight.
 RECORD_PATH: Final = "/api/v1/record"
 _SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})

@@ -18,8 +18,8 @@ function headers(token = sessionStorage.getItem(TOKEN)) {
 }
 
 /** The response, whatever its body; throws Refused where a token is missing or wrong, Error for anything else. */
-export async function ask(path, more = {}) {
-  const response = await fetch(path, { headers: { ...headers(), ...more }, cache: "no-store" });
+export async function ask(path, more = {}, signal = null) {
+  const response = await fetch(path, { headers: { ...headers(), ...more }, cache: "no-store", signal });
   if (response.status === 401 || response.status === 403) throw new Refused(path);
   if (!response.ok) throw new Error(`${path}: status ${response.status}`);
   return response;

@@ -1,0 +1,105 @@
+// The cab page: asks one small question every few seconds and shows the answer, its age, and what it does not know.
+
+import { stayAwake } from "/assets/cab/wake-lock.js";
+import { aboard, about, eventText, lightText, notSeen, ownReading, question, roomText } from "/assets/cab/sentences.js";
+import { Refused, ask, setToken } from "/assets/dashboard/gateway.js";
+import { element, made, pair, say, write } from "/assets/dashboard/page.js";
+import { duration, number } from "/assets/dashboard/words.js";
+
+const ASK_EVERY_MS = 5000;
+const ANSWER_WITHIN_MS = 4000;
+const GONE_AFTER_S = 15;
+const LONG = 5; // characters: more want a smaller type
+
+const opened = now();
+let cab = null;
+let heard = null; // when `cab` came
+let isRefused = false;
+
+function now() {
+  return { wall: Date.now(), page: performance.now() };
+}
+
+/** Neither clock alone: one may be set, the other may stand still while the phone sleeps. */
+const secondsSince = (then) => Math.max(Date.now() - then.wall, performance.now() - then.page) / 1000;
+
+async function askNow() {
+  const patience = new AbortController();
+  const timer = setTimeout(() => patience.abort(), ANSWER_WITHIN_MS);
+  try {
+    cab = await (await ask("/api/v1/cab", {}, patience.signal)).json();
+    heard = now();
+    isRefused = false;
+  } catch (error) {
+    isRefused = error instanceof Refused;
+  } finally {
+    clearTimeout(timer);
+  }
+  draw();
+}
+
+/** What must be said before anything else; empty while all is well. */
+function alarm(silentS) {
+  if (isRefused) return "The gateway wants a token.";
+  if (silentS > GONE_AFTER_S) {
+    const since = cab ? " What is shown is the last it said." : "";
+    return `No answer from the gateway for ${duration(silentS)}.${since}`;
+  }
+  if (cab === null) return "";
+  if (cab.is_stale) return `Old: weighed ${duration(cab.age_s + silentS)} ago.`;
+  if (cab.state === "sensor_fault" || cab.state === "reader_fault") return "A sensor or the bus is not heard: nothing new is weighed.";
+  return "";
+}
+
+function validity(silentS) {
+  if (isRefused || cab === null) return "asking";
+  if (silentS > GONE_AFTER_S || cab.is_stale) return "old";
+  return cab.load === "weighed" ? "current" : "earlier";
+}
+
+function writeNumber(kg) {
+  const text = kg === null ? "?" : number(kg, 0);
+  element("number").replaceChildren(text, kg === null ? "" : made("small", "\u00a0kg"));
+  element("number").classList.toggle("long", text.length > LONG);
+}
+
+function draw() {
+  const silentS = secondsSince(heard ?? opened);
+  say("bar", alarm(silentS));
+  element("token").hidden = !isRefused;
+  element("main").hidden = isRefused;
+  element("main").dataset.is = validity(silentS);
+  if (cab === null || isRefused) return;
+  element("main").dataset.light = cab.light;
+  const isCurrent = validity(silentS) === "current";
+  const [asked, kg, likely] = question(cab, isCurrent);
+  write("vehicle", cab.vehicle_id ?? "");
+  say("not-seen", notSeen(cab, silentS));
+  write("light", lightText(cab, isCurrent));
+  write("about", about(cab));
+  write("question", asked);
+  writeNumber(kg);
+  write("likely", likely);
+  element("rooms").replaceChildren(...cab.room.map((room) => pair(...roomText(room))));
+  write("aboard", aboard(cab, cab.age_s === null ? null : cab.age_s + silentS));
+  write("last-event", eventText(cab.last_event));
+  element("own").hidden = cab.own_readings.length === 0;
+  element("own-readings").replaceChildren(...cab.own_readings.map((reading) => pair(...ownReading(reading, silentS))));
+}
+
+element("token").addEventListener("submit", (event) => {
+  event.preventDefault();
+  setToken(element("token-text").value);
+  askNow();
+});
+
+document.addEventListener("visibilitychange", () => {
+  if (document.visibilityState !== "visible") return;
+  draw(); // how old it is shows before the answer comes
+  askNow();
+});
+
+askNow();
+setInterval(askNow, ASK_EVERY_MS);
+setInterval(draw, 1000);
+stayAwake((text) => write("awake", text));

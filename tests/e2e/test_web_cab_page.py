@@ -1,0 +1,278 @@
+"""The cab page on a phone: what may go in, how sure and how old that is, and what it cannot see."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
+from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
+from support.web import Gateway, serving
+
+from gateway.records import Why
+from gateway.status import OwnReading, Standing, State
+from gateway.web import Scope, TokenFile
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
+expect = playwright.expect
+
+PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+HURRIED = "{ const set = setInterval; window.setInterval = (draw, ms) => set(draw, ms / 20); }"  # nobody has to wait
+LEAST_NUMBER_PX = 70  # read at arm's length: 70 CSS pixels are about 11 mm on a phone
+WAKE_LOCK = """(() => {
+  const lock = Object.assign(new EventTarget(), {});
+  const request = async (kind) => { window.asked = kind; return lock; };
+  Object.defineProperty(navigator, "wakeLock", { value: { request } });
+  window.letGo = () => lock.dispatchEvent(new Event("release"));
+})()"""
+NO_WAKE_LOCK = 'Object.defineProperty(navigator, "wakeLock", { value: undefined })'
+REFUSED = 'Object.defineProperty(navigator, "wakeLock", { value: { request: async () => { throw new Error("no"); } } })'
+
+
+@pytest.fixture
+def gateway(tmp_path: Path) -> Iterator[Gateway]:
+    with cab_gateway(tmp_path) as opened:
+        yield opened
+
+
+@pytest.fixture
+def phone(browser: Any) -> Iterator[Watched]:
+    """By night."""
+    made = Watched(browser, color_scheme="dark", **PHONE)
+    made.page.add_init_script(HURRIED)
+    yield made
+    made.page.close()
+
+
+def test_at_a_glance_it_says_what_may_still_go_in(gateway: Gateway, phone: Watched) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    load_event(gateway, 300, 240.0)
+    page = phone.page
+    with serving(gateway.app) as server:
+        page.goto(f"{server.url}/cab")
+        expect(page.locator("#light")).to_have_text("Go")
+        expect(page.locator("#question")).to_have_text("May still go in")
+        expect(page.locator("#number")).to_have_text("160 kg")
+        expect(page.locator("#likely")).to_have_text(
+            "That much surely; most likely 169 kg (95 %: 161 to 178 kg), by the limit of the rear axle."
+        )
+        expect(page.locator("#rooms")).to_contain_text("Whole vehicle300 kg left")
+        expect(page.locator("#aboard")).to_contain_text("Aboard: 300 kg (95 %: 288 to 312 kg), weighed 0 s ago.")
+        expect(page.locator("#last-event")).to_have_text(
+            "Last change, by 00:05: 240 kg loaded (95 %: 226 to 254 kg). 500 kg aboard then."
+        )
+        assert page.locator("#main").get_attribute("data-is") == "current"
+        assert page.locator("#number").evaluate("e => parseFloat(getComputedStyle(e).fontSize)") > LEAST_NUMBER_PX
+        assert page.locator("g.go").is_visible()
+        assert not page.locator("g.over").is_visible()
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert page.locator("#number").bounding_box()["y"] < 500  # without scrolling
+        assert {address.split("/")[2] for address in phone.addresses} == {server.url.split("/")[2]}
+        assert phone.complaints == []
+        page.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("payload_kg", "light"), [(300.0, "go"), (592.0, "near"), (620.0, "over")])
+def test_by_day_and_by_night_every_word_can_be_read(
+    gateway: Gateway, browser: Any, scheme: str, payload_kg: float, light: str
+) -> None:
+    gateway.publish(loaded(0, payload_kg, 50.0))
+    gateway.status = BEFORE.model_copy(
+        update={
+            "standing": Standing(stood_s=95.0),
+            "own_readings": (OwnReading(signal="axle_weight", number=912.0, unit="kg", age_s=0.2),),
+        }
+    )
+    gateway.clock_s += 3600.0  # an old one: every colour there is
+    watched = Watched(browser, color_scheme=scheme, **PHONE)
+    with serving(gateway.app) as server:
+        watched.page.goto(f"{server.url}/cab")
+        expect(watched.page.locator("#main")).to_have_attribute("data-light", light)
+        expect(watched.page.locator("#bar")).to_contain_text("Old")
+        assert [text for contrast, text in watched.page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
+        watched.page.close()
+
+
+def test_too_heavy_says_by_how_much_and_what_must_come_out(gateway: Gateway, phone: Watched) -> None:
+    gateway.publish(loaded(0, 620.0, 50.0))
+    with serving(gateway.app) as server:
+        phone.page.goto(f"{server.url}/cab")
+        expect(phone.page.locator("#light")).to_have_text("Too heavy")
+        expect(phone.page.locator("#about")).to_have_text("Whole vehicle, front axle: 99 % likely too heavy.")
+        expect(phone.page.locator("#question")).to_have_text("Too heavy by")
+        expect(phone.page.locator("#number")).to_have_text("20 kg")
+        expect(phone.page.locator("#likely")).to_have_text(
+            "By the limit of the whole vehicle. To be sure take out 35 kg."
+        )
+        expect(phone.page.locator("#rooms")).to_contain_text("Front axle10 kg too much")
+        phone.page.close()
+
+
+def test_near_the_limit_nothing_more_is_promised(gateway: Gateway, phone: Watched) -> None:
+    gateway.publish(loaded(0, 592.0, 50.0))
+    with serving(gateway.app) as server:
+        phone.page.goto(f"{server.url}/cab")
+        expect(phone.page.locator("#light")).to_have_text("Near the limit")
+        expect(phone.page.locator("#number")).to_have_text("0 kg")
+        expect(phone.page.locator("#likely")).to_contain_text("likely 4 kg (95 %: −5 to 13 kg)")
+        phone.page.close()
+
+
+def test_a_lorrys_number_fits_too(tmp_path: Path, phone: Watched) -> None:
+    lorry = replace(VAN.vehicle, gross_limit_kg=18000.0, front_axle_limit_kg=None, rear_axle_limit_kg=None)
+    with Gateway(tmp_path, calibrated=replace(VAN, vehicle=lorry)) as gateway, serving(gateway.app) as server:
+        gateway.status = BEFORE
+        gateway.publish(loaded(0, 300.0, 48.0))
+        phone.page.goto(f"{server.url}/cab")
+        expect(phone.page.locator("#number")).to_have_text("16,285 kg")
+        assert phone.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        phone.page.close()
+
+
+def test_standing_it_says_that_it_cannot_see_what_is_loaded_now(gateway: Gateway, phone: Watched) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    readings = (
+        OwnReading(signal="air_spring_pressure", number=412.35, unit="kPa", age_s=0.4),
+        OwnReading(signal="ride_height", number=-12.0, unit="mm", age_s=200.0),
+    )
+    gateway.status = BEFORE.model_copy(
+        update={"standing": Standing(stood_s=240.0), "state": State.WAITING_FOR_SPEED, "own_readings": readings}
+    )
+    page = phone.page
+    with serving(gateway.app) as server:
+        page.goto(f"{server.url}/cab")
+        expect(page.locator("#not-seen")).to_have_text(
+            re.compile(r"Standing for 4 min\. Weighed last at 00:05\. What is loaded or unloaded now is not seen\.")
+        )
+        expect(page.locator("#light")).to_have_text("Go, when weighed last")
+        expect(page.locator("#question")).to_have_text("May still go in, when weighed last")
+        expect(page.locator("#main")).to_have_attribute("data-is", "earlier")
+        expect(page.locator("#own-readings")).to_contain_text("Air spring pressure412.4 kPa")
+        expect(page.locator("#own-readings")).to_contain_text("Ride height−12 mm, silent for 3 min")
+        expect(page.locator("#own")).to_contain_text("Not weighed by Springscale.")
+        gateway.status = BEFORE.model_copy(update={"standing": Standing(is_load_weighed=False)})
+        expect(page.locator("#not-seen")).to_contain_text("The load may have changed at the last stop.")
+        expect(page.locator("#own")).to_be_hidden()
+        gateway.status = BEFORE
+        expect(page.locator("#not-seen")).to_be_hidden()
+        expect(page.locator("#main")).to_have_attribute("data-is", "current")
+        page.close()
+
+
+def test_an_old_number_is_crossed_through_and_said_loudly(gateway: Gateway, phone: Watched) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    gateway.clock_s += 3.0 * 3600.0
+    with serving(gateway.app) as server:
+        phone.page.goto(f"{server.url}/cab")
+        expect(phone.page.get_by_role("alert")).to_have_text("Old: weighed 3.0 h ago.")
+        expect(phone.page.locator("#light")).to_have_text("Go, when weighed last")
+        crossed = phone.page.locator("#number").evaluate("e => getComputedStyle(e).textDecorationLine")
+        assert crossed == "line-through"
+        phone.page.close()
+
+
+def test_a_gateway_that_is_gone_is_said_loudly_and_comes_back(gateway: Gateway, phone: Watched) -> None:
+    """The page's clocks run ahead, so that nobody has to wait."""
+    gateway.publish(loaded(0, 300.0, 48.0))
+    page = phone.page
+    page.clock.install()
+    with serving(gateway.app) as server:
+        page.goto(f"{server.url}/cab")
+        expect(page.locator("#number")).to_have_text("160 kg")
+        page.route("**/api/v1/cab", lambda route: route.abort())
+        page.clock.run_for(12_000)
+        expect(page.locator("#bar")).to_be_hidden()
+        page.clock.run_for(48_000)
+        expect(page.get_by_role("alert")).to_contain_text("No answer from the gateway for 60 s.")
+        expect(page.locator("#main")).to_have_attribute("data-is", "old")
+        expect(page.locator("#number")).to_have_text("160 kg")
+        expect(page.locator("#aboard")).to_contain_text("weighed 60 s ago")
+        page.unroute("**/api/v1/cab")
+        page.clock.run_for(6_000)
+        expect(page.locator("#bar")).to_be_hidden()
+        expect(page.locator("#main")).to_have_attribute("data-is", "current")
+        page.close()
+
+
+def test_a_sensor_that_is_silent_is_said(gateway: Gateway, phone: Watched) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 0.0, 50.0).refused(Why.ACCELERATION_MISSING))
+    gateway.status = BEFORE.model_copy(update={"state": State.SENSOR_FAULT})
+    with serving(gateway.app) as server:
+        phone.page.goto(f"{server.url}/cab")
+        expect(phone.page.get_by_role("alert")).to_contain_text("nothing new is weighed")
+        expect(phone.page.locator("#aboard")).to_contain_text("Not weighed since: acceleration missing.")
+        phone.page.close()
+
+
+def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path: Path, phone: Watched) -> None:
+    unlimited = replace(VAN.vehicle, gross_limit_kg=None, front_axle_limit_kg=None, rear_axle_limit_kg=None)
+    page = phone.page
+    with Gateway(tmp_path, calibrated=replace(VAN, vehicle=unlimited)) as gateway, serving(gateway.app) as server:
+        gateway.status = BEFORE
+        page.goto(f"{server.url}/cab")
+        expect(page.locator("#light")).to_have_text("Not weighed yet")
+        expect(page.locator("#number")).to_have_text("?")
+        expect(page.locator("#likely")).to_have_text("It is weighed after some minutes of driving.")
+        gateway.publish(loaded(0, 300.0, 48.0))
+        expect(page.locator("#light")).to_have_text("No limit is known")
+        expect(page.locator("#number")).to_have_text("300 kg")
+        expect(page.locator("#question")).to_have_text("Aboard")
+        expect(page.locator("#likely")).to_contain_text("no limit is set ([vehicle] gross_limit_kg")
+        page.close()
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        (WAKE_LOCK, "The screen stays on."),
+        (NO_WAKE_LOCK, "this browser cannot keep it on"),
+        (REFUSED, "it refused to keep it on"),
+    ],
+)
+def test_it_keeps_the_screen_on_or_says_that_it_cannot(
+    gateway: Gateway, phone: Watched, script: str, said: str
+) -> None:
+    page = phone.page
+    page.add_init_script(script)
+    with serving(gateway.app) as server:
+        page.goto(f"{server.url}/cab")
+        expect(page.locator("#awake")).to_contain_text(said)
+        if script == WAKE_LOCK:
+            assert page.evaluate("window.asked") == "screen"
+            page.evaluate("window.letGo()")
+            expect(page.locator("#awake")).to_contain_text("Touch the page to ask again")
+            page.locator("#awake").tap()
+            expect(page.locator("#awake")).to_have_text("The screen stays on.")
+        page.close()
+
+
+def test_where_tokens_are_asked_for_it_asks_and_shows_nothing_before(tmp_path: Path, phone: Watched) -> None:
+    tokens = TokenFile(tmp_path / "tokens.json")
+    token = tokens.create("driver", Scope.READ)
+    page = phone.page
+    with Gateway(tmp_path / "store", tokens=tokens, calibrated=VAN) as gateway, serving(gateway.app) as server:
+        gateway.status = BEFORE
+        gateway.publish(loaded(0, 300.0, 48.0))
+        page.goto(f"{server.url}/cab")
+        expect(page.get_by_role("alert")).to_have_text("The gateway wants a token.")
+        expect(page.locator("#main")).to_be_hidden()
+        page.get_by_label("Token").fill(token)
+        page.get_by_label("Token").press("Enter")
+        expect(page.locator("#number")).to_have_text("160 kg")
+        expect(page.locator("#token")).to_be_hidden()
+        page.close()
+
+
+def test_across_it_fits_without_scrolling(gateway: Gateway, browser: Any) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    watched = Watched(browser, color_scheme="dark", **PHONE | {"viewport": {"width": 844, "height": 390}})
+    with serving(gateway.app) as server:
+        watched.page.goto(f"{server.url}/cab")
+        expect(watched.page.locator("#number")).to_have_text("160 kg")
+        box = watched.page.locator("#number").bounding_box()
+        assert box["y"] + box["height"] < 390
+        assert watched.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        watched.page.close()
