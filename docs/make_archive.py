@@ -71,7 +71,9 @@ as the keys; and a manifest may be such a file alone. An unknown key, a vehicle 
 instant, or a file that cannot be loaded is an error that says where.
 
 {top}
-`[batch]` is that of the [settings](settings.md).
+`[batch]` and `[trust]` are those of the [settings](settings.md): with keys there, signal maps, databases and
+calibrations must be [signed](security.md#signed-files) by one of them; with `reprocess --trusted-keys FILE` the
+manifest too.
 
 ### [[vehicles]]
 
@@ -201,7 +203,9 @@ batch, so no column claims to: what they have changed shows as `tension` and in 
 def archive_page() -> str:
     """The whole page as Markdown."""
     rows = "\n".join(f"| `{name}` | {TYPES[kind]} | {_meaning(name)} |" for name, kind in columns().items())
-    manifest = MANIFEST.format(top=key_table(ManifestFile, "vehicles", "batch"), vehicles=key_table(VehicleEntry))
+    manifest = MANIFEST.format(
+        top=key_table(ManifestFile, "vehicles", "batch", "trust"), vehicles=key_table(VehicleEntry)
+    )
     return "\n".join([INTRODUCTION, manifest, RUNNING, DATASET, SCHEMA.format(version=SCHEMA_VERSION, rows=rows)])
 
 

@@ -20,16 +20,18 @@ from gateway.archive.dataset import table_rows
 from gateway.archive.places import Place, place_of
 from gateway.bus.logs import is_named_as_log
 from gateway.calibration.tare_file import TareHistory, history_of
-from gateway.config import BatchSection, EstimatorName
+from gateway.config import BatchSection, EstimatorName, TrustSection
 from gateway.config.sections import OF_CALIBRATION, LimitKg
 from gateway.core.settings import BatchSettings
 from gateway.core.weights import Limits
 from gateway.errors import ConfigurationError
+from gateway.files.signed import Trust
 from gateway.setup import Setup, load_setup
 from gateway.toml_file import checked
 from gateway.units import NS_PER_S
 
 NAMES: Final = ("archive.toml", "archive.parquet")  # what a folder's own manifest is called
+EVERYBODY: Final = Trust()
 FOREVER_NS: Final = (1 << 63) - 1
 
 
@@ -107,6 +109,7 @@ class ManifestFile(Means):
         None, description="which files are logs, e.g. *.txt.gz [default: those whose suffix says so, packed or not]"
     )
     batch: BatchSection = BatchSection()
+    trust: TrustSection = TrustSection()
     vehicles: tuple[VehicleEntry, ...] = Field((), description="one table a vehicle and span of time")
     vehicles_in: str | None = Field(None, description="a Parquet file of such tables, one row each, in their stead")
 
@@ -141,10 +144,14 @@ class Manifest:
         return not name.startswith(".") and is_named_as_log(name)
 
 
-def load_manifest(named: str) -> Manifest:
-    """The manifest ``named``, or the one in the folder ``named``. Raises ConfigurationError naming every fault."""
-    base, name, content = _found(named)
-    where = base.local(name) or Path(f"{base.url}/{name}")
+def load_manifest(named: str, pinned: Trust = EVERYBODY) -> Manifest:
+    """The manifest ``named``, or the one in the folder ``named``. Raises ConfigurationError naming every fault.
+
+    A key of ``pinned``, if there is any, must have signed it; one of these or of its own ``[trust]`` signal maps,
+    databases and calibrations.
+    """
+    base, name, content = _found(named, pinned)
+    where = base.path(name)
     if name.endswith(".parquet"):
         told = checked({"vehicles": _entries(content, where)}, where, ManifestFile)
     else:
@@ -153,13 +160,14 @@ def load_manifest(named: str) -> Manifest:
     if told.vehicles_in is not None:
         if entries:
             raise ConfigurationError(f"{where}: vehicles and vehicles_in: give one of them")
-        where = base.local(told.vehicles_in) or Path(f"{base.url}/{told.vehicles_in}")
-        rows = {"vehicles": _entries(_read(base, told.vehicles_in), where)}
+        where = base.path(told.vehicles_in)
+        rows = {"vehicles": _entries(_read(base, told.vehicles_in, pinned), where)}
         entries = checked(rows, where, ManifestFile).vehicles
     if not entries:
         raise ConfigurationError(f"{where}: names no vehicle; write [[vehicles]] with id or vin for each")
     _require_distinct(entries, where)
-    load = lru_cache(maxsize=None)(_Loader(base).setup)
+    trusted = Trust((*pinned.keys, *told.trust.for_reading().keys))
+    load = lru_cache(maxsize=None)(_Loader(base, trusted).setup)
     found = tuple(_assignment(base, told, entry, load, f"{where}: vehicles[{i}]") for i, entry in enumerate(entries, 1))
     return Manifest(str(where), found, told.batch.for_core(), told.pattern)
 
@@ -169,22 +177,22 @@ class _Loader:
     """Loads what the manifest names from where the manifest lies."""
 
     base: Place
-
-    def path(self, named: str) -> Path:
-        """As messages show it; :meth:`read` finds the file by it."""
-        return self.base.local(named) or Path(f"{self.base.url}/{named}")
+    trust: Trust
 
     def read(self, path: Path) -> bytes:
-        """What a file beside the manifest holds. Raises FileNotFoundError."""
+        """What a file beside the manifest holds. Raises FileNotFoundError, UntrustedFileError."""
+        return self.trust.read(path, self._raw)
+
+    def _raw(self, path: Path) -> bytes:
         if self.base.local("") is not None:
             return path.read_bytes()
-        return self.base.read(Path(path).relative_to(Path(self.base.url)).as_posix())
+        return self.base.read(path.relative_to(self.base.path("")).as_posix())
 
     def setup(self, signals: str, calibration: str | None, estimator: str | None, limits: Limits) -> Setup:
         """One for all vehicles that share it."""
-        named = signals if signals.startswith("springscale:") else self.path(signals)
+        named = signals if signals.startswith("springscale:") else self.base.path(signals)
         return load_setup(
-            named, self.path(calibration) if calibration else None, estimator, read=self.read, limits=limits
+            named, self.base.path(calibration) if calibration else None, estimator, read=self.read, limits=limits
         )
 
 
@@ -203,16 +211,16 @@ def _assignment(base: Place, told: ManifestFile, entry: VehicleEntry, load: Any,
     return Assignment(entry.name, entry.vin, place, folder.rstrip("/"), entry.span_ns, setup, tares)
 
 
-def _found(named: str) -> tuple[Place, str, bytes]:
+def _found(named: str, pinned: Trust) -> tuple[Place, str, bytes]:
     """Folder, name and content of the manifest."""
     if named.endswith((".toml", ".parquet")):
         folder, _, name = named.rpartition("/")
         base = place_of(folder or (Path("/") if named.startswith("/") else Path()))
-        return base, name, _read(base, name)
+        return base, name, _read(base, name, pinned)
     base = place_of(named)
     for name in NAMES:
         try:
-            return base, name, base.read(name)
+            return base, name, _Loader(base, pinned).read(base.path(name))
         except FileNotFoundError:
             continue
     raise ConfigurationError(
@@ -220,11 +228,13 @@ def _found(named: str) -> tuple[Place, str, bytes]:
     )
 
 
-def _read(base: Place, name: str) -> bytes:
+def _read(base: Place, name: str, trust: Trust = EVERYBODY) -> bytes:
     try:
-        return base.read(name)
-    except FileNotFoundError as fault:
-        raise ConfigurationError(str(fault)) from None
+        return _Loader(base, trust).read(base.path(name))
+    except FileNotFoundError:
+        raise ConfigurationError(f"{base.path(name)}: no such file") from None
+    except OSError as fault:
+        raise ConfigurationError(f"{base.path(name)}: cannot be read: {fault.strerror or fault}") from None
 
 
 def _below(base: Place, named: str) -> Place:

@@ -64,6 +64,10 @@ class Place:
         parts = urlsplit(self.url)
         return Path(unquote(parts.path)) / path if parts.scheme == "file" else None
 
+    def path(self, name: str) -> Path:
+        """Of a file of it, as messages show it."""
+        return self.local(name) or Path(f"{self.url}/{name}")
+
     def items(self, below: str = "") -> list[Item]:
         """Every file below a folder of it, in order of path; none where the folder is not there."""
         obs, here = _obstore(), self.local("")

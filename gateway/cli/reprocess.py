@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import click
 
@@ -12,9 +13,10 @@ from gateway.archive.manifest import load_manifest
 from gateway.archive.places import place_of
 from gateway.archive.processes import Processes
 from gateway.archive.reprocess import reprocess as reprocess_archive
-from gateway.cli.options import as_json
+from gateway.cli.options import as_json, trusted_keys
 from gateway.cli.text.progress import StatusLine
 from gateway.cli.text.reprocess import forecast_in_words, how_far, summary_in_words
+from gateway.files.signed import pinned_by
 from gateway.records import json_line
 
 
@@ -27,6 +29,7 @@ from gateway.records import json_line
 @click.option("--workers", type=click.IntRange(1), default=None, help="processes on this computer [default: its cores]")
 @click.option("--dry-run", is_flag=True, help="tell how much there is and how long it will take; write nothing")
 @click.option("--retry-failed", is_flag=True, help="try those jobs again, too, of which nothing could be made")
+@trusted_keys
 @as_json
 def reprocess(
     archive: str,
@@ -35,6 +38,7 @@ def reprocess(
     workers: int | None,
     dry_run: bool,
     retry_failed: bool,
+    trusted_keys: Path | None,
     as_json: bool,
 ) -> None:
     """Weighs every log of ARCHIVE anew: a manifest (.toml or .parquet), or a folder with an archive.toml in it.
@@ -43,7 +47,7 @@ def reprocess(
     """
     if scheduler is not None and workers is not None:
         raise click.UsageError("give --scheduler ADDRESS or --workers N, not both")
-    dataset, manifest = place_of(output), load_manifest(archive)
+    dataset, manifest = place_of(output), load_manifest(archive, pinned_by(trusted_keys))
     with _workers(scheduler, workers) as at_work:
         if dry_run:
             ahead = forecast(look(manifest, dataset), at_work.n_workers)

@@ -87,12 +87,15 @@ class Trust:
 
     keys: tuple[PublicKey, ...] = ()
 
-    def read(self, path: Path) -> bytes:
-        """What the file holds. Raises OSError; UntrustedFileError saying what is wrong and how to mend it."""
-        content = path.read_bytes()
+    def read(self, path: Path, raw: Read = Path.read_bytes) -> bytes:
+        """What the file holds; ``raw`` gets it, and its signature, where these do not lie on this computer.
+
+        Raises OSError; UntrustedFileError saying what is wrong and how to mend it.
+        """
+        content = raw(path)
         if self.keys:
             try:
-                self._believe(content, _signature_of(path))
+                self._believe(content, _signature_of(path, raw))
             except ValueError as fault:
                 raise UntrustedFileError(f"{path}: {fault}: {COMMAND} {path.name}") from None
         return content
@@ -125,6 +128,11 @@ def load_public_keys(path: Path) -> tuple[str, ...]:
     return tuple(keys.values())
 
 
+def pinned_by(path: Path | None) -> Trust:
+    """Trust in a file of public keys alone; in everybody where none is given. Raises ConfigurationError."""
+    return Trust(tuple(map(PublicKey.of, load_public_keys(path)))) if path else Trust()
+
+
 def to_be_signed(content: bytes, hash_name: str) -> bytes:
     """What the key signs instead of the content."""
     digest = hashlib.new(hash_name, content).digest()
@@ -143,11 +151,10 @@ def signature_path(path: Path) -> Path:
     return path.with_name(path.name + SUFFIX)
 
 
-def _signature_of(path: Path) -> str:
+def _signature_of(path: Path, raw: Read) -> str:
     beside = signature_path(path)
     try:
-        with beside.open("rb") as file:
-            return file.read(MOST_BYTES).decode("ascii")
+        return raw(beside)[:MOST_BYTES].decode("ascii")
     except FileNotFoundError:
         raise ValueError(f"not signed, there is no {beside.name}; sign it where the key is") from None
     except UnicodeDecodeError:
