@@ -5,7 +5,7 @@ PORT := 8000
 BIN := .venv/bin
 PIP := $(BIN)/pip --disable-pip-version-check
 
-.PHONY: demo test check audit bench deb dist soak test-vm vm-image vcan lock docs site screenshots clean
+.PHONY: demo test check audit bench deb dist fleet-test soak test-vm vm-image vcan lock docs site screenshots clean
 .DEFAULT_GOAL := demo
 
 .venv/bin/python:
@@ -52,6 +52,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_performance.py --check
 	$(BIN)/python docs/make_readme_table.py --check
 	$(BIN)/python docs/make_scale.py --check
+	$(BIN)/python docs/make_fleet.py --check
 	$(BIN)/python docs/make_site.py
 	$(BIN)/python docs/make_drawings.py --check
 	$(BIN)/python deploy/dist/audit_locks.py --advisory
@@ -65,6 +66,13 @@ audit: .venv/.development
 bench: .venv/.development
 	$(BIN)/python -m benchmarks.speed --output docs/performance.json
 	$(BIN)/python docs/make_performance.py
+
+# Fifty vehicles into a broker and a database that are killed meanwhile; wants Debian's mosquitto and postgresql. Some
+# minutes; writes docs/fleet_test.json and its place in docs/fleet.md.
+fleet-test: .venv/.development
+	rm -f build/fleet-test.json
+	$(BIN)/python -m pytest tests/fleet
+	test ! -e build/fleet-test.json || $(BIN)/python docs/make_fleet.py build/fleet-test.json
 
 # The installed package on a real vcan0 under real systemd, in a small virtual machine: wants root, /dev/net/tun and the
 # Debian packages that .ci/run names; skips with a reason without them. One machine on each of two processors.
@@ -124,6 +132,7 @@ docs: .venv/.development
 	$(BIN)/python docs/make_tutorial.py
 	$(BIN)/python docs/make_readme_table.py
 	$(BIN)/python docs/make_scale.py
+	$(BIN)/python docs/make_fleet.py
 	$(BIN)/python docs/make_drawings.py
 
 # The documents as a site, in build/site.

@@ -12,7 +12,10 @@ from support.fleet_view import FLEET, FleetView, fleet_view, provision, write_ta
 from support.patience import wait_until
 from support.postgres import needs_postgres
 
-pytestmark = [needs_mosquitto, needs_postgres]
+# paho leaves the socket of a handshake that failed to the garbage collector
+LEFT = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+
+pytestmark = [needs_mosquitto, needs_postgres, LEFT]
 
 
 @pytest.fixture(scope="module")
