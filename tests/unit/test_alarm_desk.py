@@ -72,7 +72,7 @@ def test_a_restart_remembers_how_long_was_driven_without_an_estimate(tmp_path: P
     assert bench.standing() == []
     bench.weigh(replace(batch(25.0, 30.0, None), rejected=(Why.TOO_SLOW,)))
     (alarm,) = bench.standing()
-    assert alarm["sentence"] == "30 minutes were driven without an estimate: too_slow"
+    assert alarm["sentence"] == "30 minutes were driven without an estimate: too slow"
     bench.store.close()
 
 
@@ -130,3 +130,11 @@ def test_an_acknowledgement_that_the_disk_refuses_is_told_as_such(
         bench.desk.acknowledge(alarm["id"], "yard", None)
     assert refusal.value.reason == "not_stored"
     assert bench.standing()[0]["acknowledged"]["by"] == "yard"  # shown all the same, and stored when it can be
+
+
+@pytest.mark.parametrize("text", ['{"id": "alarm-1-a", "revision": 1}', '{"acknowledged": 5, "steps": [7]}'])
+def test_an_alarm_that_cannot_be_read_keeps_no_other_from_being_remembered(bench: AlarmBench, text: str) -> None:
+    bench.weigh(of_load(0, OVER))
+    bench.store.write_entry("alarm", "alarm-1-a", 1, text)
+    bench.restart()
+    assert [alarm["where"] for alarm in bench.standing()] == ["gross"]

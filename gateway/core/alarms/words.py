@@ -24,11 +24,16 @@ def _said(alarm: Alarm, figure: Figure) -> str:
     if cause.kind is AlarmKind.IMBALANCE:
         return f"{_BALANCES[where].capitalize()} bears {_give_or_take(figure, '%')}, {figure.limit:.0f} % are the most"
     if cause.kind is AlarmKind.NO_ESTIMATE:
-        return f"{figure.found:.0f} minutes were driven without an estimate: {figure.detail or 'no reason is known'}"
+        return f"{figure.found:.0f} minutes were driven without an estimate: {_detail(figure) or 'no reason is known'}"
     if cause.kind is AlarmKind.DRIFT:
         return f"{where.replace('_', ' ').capitalize()} drifts: {figure.detail}"
     said = "A sensor is silent" if where == "silent" else "Batches are refused for a sensor's sake"
-    return f"{said}: {figure.detail}" if figure.detail else said
+    return f"{said}: {_detail(figure)}" if figure.detail else said
+
+
+def _detail(figure: Figure) -> str:
+    """Names of reasons as words."""
+    return (figure.detail or "").replace("_", " ")
 
 
 def _give_or_take(figure: Figure, unit: str) -> str:

@@ -117,7 +117,7 @@ class AlarmDesk:
         vehicle_id = self._subject.vehicle_id
         try:
             known, recent = remembered(self._store.reader())
-        except (StoreError, TimeoutError, ValueError, KeyError, TypeError) as fault:  # another version's records
+        except (StoreError, TimeoutError, ValueError, KeyError) as fault:  # the last two: another version's batches
             log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
             return AlarmWatch(self._rules, vehicle_id)
         return AlarmWatch(self._rules, vehicle_id, known, recent)
@@ -138,10 +138,18 @@ class AlarmDesk:
 
 
 def remembered(reader: StoreReader) -> tuple[list[Alarm], list[Estimate]]:
-    """The last alarms and the last batches, oldest first. Raises what the store's reader raises."""
+    """The last alarms and the last batches, oldest first. Raises what the store's reader raises.
+
+    An alarm that cannot be read is passed over: what is the matter is told anew.
+    """
     told = reader.entries(kind=ENTRY_KIND, limit=REMEMBERED, newest_first=True)
     page = reader.estimates(limit=DRIVEN, newest_first=True, with_spectra=False)
-    alarms = [alarm_from_json(json.loads(text)) for text in reversed(told.items)]
+    alarms = []
+    for text in reversed(told.items):
+        try:
+            alarms.append(alarm_from_json(json.loads(text)))
+        except (ValueError, KeyError, TypeError) as fault:
+            log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=f"an alarm: {fault!r}")
     return alarms, [estimate_from_json(json.loads(text)) for text in reversed(page.items)]
 
 

@@ -1,7 +1,8 @@
 // Keeps what the page knows in step with the gateway: asks at the start and now and then, follows the stream between.
 
 import { follow } from "/assets/dashboard/event-stream.js";
-import { COMMISSIONING, Refused, TARE, TICKETS, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
+import { alarmsOf } from "/assets/dashboard/alarm-view.js";
+import { ALARMS, COMMISSIONING, Refused, TARE, TICKETS, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
 import { known, learn } from "/assets/dashboard/known.js";
 
 const ASK_EVERY_MS = 5000;
@@ -36,6 +37,8 @@ async function askDay() {
   const [events, trips] = await Promise.all([load(`/api/v1/events?${ENTRIES}`), load(`/api/v1/trips?${ENTRIES}`)]);
   learn({ events: events.items, trips: trips.items });
 }
+
+const askAlarms = async () => learn({ alarms: alarmsOf(await load(ALARMS)) });
 
 /** With the newest revision of one entry; an older one that comes late changes nothing. */
 function revised(entries, entry) {
@@ -90,6 +93,8 @@ function onEvent(kind, record) {
     learn({ events: revised(known.events, record) });
   } else if (kind === "trip") {
     learn({ trips: revised(known.trips, record) });
+  } else if (kind === "alarm") {
+    learn({ alarms: revised(known.alarms, record) });
   }
 }
 
@@ -99,7 +104,7 @@ const giveUpUntilNext = (error) => console.info(error.message);
 async function catchUp() {
   await askNow();
   await Promise.all([askOnce(), askSpectra(), askTruth(), askTare(), askVerifications(), askTickets(), askCommissioning()]);
-  await askDay();
+  await Promise.all([askAlarms(), askDay()]);
 }
 
 /** Begins; never ends. */

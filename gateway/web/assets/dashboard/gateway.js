@@ -5,6 +5,7 @@ export const TARE = "/api/v1/calibration/tare";
 export const COMMISSIONING = "/api/v1/calibration/commissioning";
 export const VERIFICATIONS = "/api/v1/calibration/verifications";
 export const TREND = "/api/v1/calibration/trend";
+export const ALARMS = "/api/v1/alarms?order=newest_first&limit=50";
 export const TICKETS = "/api/v1/calibration/tickets";
 
 export class Refused extends Error {}

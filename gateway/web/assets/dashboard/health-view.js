@@ -31,8 +31,19 @@ function uplinkPairs(uplink) {
   ];
 }
 
+/** How alarms and events are pushed; nothing where no address is configured. */
+function webhookPairs(webhook) {
+  if (webhook === null) return [];
+  const age = webhook.waiting_age_s === null ? "" : `, the oldest for ${duration(webhook.waiting_age_s)}`;
+  const queue = webhook.n_waiting ? `${number(webhook.n_waiting, 0)} wait${age}` : "nothing waits";
+  const link = webhook.last_fault === null ? "takes letters" : `does not: ${webhook.last_fault}`;
+  const pairs = [pair("Webhook", `${link}; ${queue}`, webhook.last_fault === null ? "" : "over")];
+  if (webhook.n_dead) pairs.push(pair("Letters it refused", number(webhook.n_dead, 0), "over"));
+  return pairs;
+}
+
 show(({ status }) => {
-  const { bus, batches, store, uplink } = status;
+  const { bus, batches, store, uplink, webhook } = status;
   element("signals").replaceChildren(...status.signals.map(signalRow));
   element("bus").replaceChildren(
     pair("Bus", `${bus.interface} ${bus.channel}: ${words(bus.state)}`),
@@ -41,6 +52,7 @@ show(({ status }) => {
     pair("Batches since the start", `${batches.n_estimates} weighed, ${batches.n_rejected} not`),
     pair("Store", store.state === "ok" ? "on disk" : `in memory only: ${store.reason}`, store.state === "ok" ? "" : "over"),
     ...uplinkPairs(uplink),
+    ...webhookPairs(webhook),
     pair("Running for", duration(status.uptime_s)),
   );
 }, "status");

@@ -13,6 +13,7 @@ export const known = {
   verifications: null, // GET /calibration/verifications
   trend: null, // GET /calibration/trend
   tickets: null, // GET /calibration/tickets
+  alarms: null, // newest first, those that stand among them
   events: null, // load events, newest first
   trips: null, // likewise
   reasons: new Map(), // reason -> {happened, advice}

@@ -2,6 +2,7 @@
 
 import "/assets/dashboard/fold.js";
 import "/assets/dashboard/state-view.js";
+import "/assets/dashboard/alarm-view.js";
 import "/assets/dashboard/load-view.js";
 import "/assets/dashboard/van-view.js";
 import "/assets/dashboard/health-view.js";
