@@ -1,4 +1,4 @@
-"""Writes the pictures of the dashboard and of the calibration report in docs/images (`make screenshots`).
+"""Writes the pictures of the dashboard, the cab page and the calibration report in docs/images (`make screenshots`).
 
 Runs `springscale demo` as anybody would, opens its dashboard in Debian's chromium through playwright, and takes
 the pictures on the second drive, when a loaded batch has been weighed and the next is under way. The tutorial's own
@@ -29,6 +29,7 @@ N_FIRST_DRIVE: Final = 7  # its last rest is closed by the first frames of the s
 N_WEIGHED: Final = 9  # the first drive's five batches, the second's three empty ones and its first loaded one
 PATIENCE_S: Final = 300.0
 MOST_BYTES: Final = 300_000
+GAP_PX: Final = 24
 LAPTOP: Final[dict[str, Any]] = {"viewport": {"width": 1240, "height": 1075}, "color_scheme": "light"}
 PHONE: Final[dict[str, Any]] = {
     "viewport": {"width": 390, "height": 844},
@@ -103,6 +104,32 @@ def take_dashboard(browser: Browser) -> None:
         save(laptop.locator("#spectra").screenshot(), "dashboard-spectra.png")
 
 
+def take_cab(browser: Browser) -> None:
+    """cab.md's picture: on the second drive, by night while it is empty, by day with a load that is too heavy."""
+    with demonstration("20") as url:
+        wait_for_batches(url, weighed(1))
+        taken = []
+        for scheme, light in (("dark", "go"), ("light", "over")):
+            page = browser.new_page(locale="en-GB", timezone_id="UTC", **PHONE | {"color_scheme": scheme})
+            page.goto(f"{url}/cab")
+            page.wait_for_selector(f"#main[data-is=current][data-light={light}]", timeout=PATIENCE_S * 1000.0)
+            taken.append(page.screenshot())
+        save(beside(*taken), "cab.png")
+
+
+def beside(*pictures: bytes) -> bytes:
+    """As one picture, from left to right."""
+    images = [Image.open(BytesIO(picture)) for picture in pictures]
+    whole = Image.new("RGB", (sum(one.width for one in images) + GAP_PX * (len(images) - 1), images[0].height), "grey")
+    left = 0
+    for one in images:
+        whole.paste(one, (left, 0))
+        left += one.width + GAP_PX
+    kept = BytesIO()
+    whole.save(kept, "PNG")
+    return kept.getvalue()
+
+
 def take_tutorial(browser: Browser) -> None:
     """The dashboard as the tutorial's reader meets it."""
     with demonstration("1") as url:
@@ -128,7 +155,7 @@ def take_report(browser: Browser) -> None:
         save(page.screenshot(), "calibration-report.png")
 
 
-TAKEN: Final = {"dashboard": take_dashboard, "tutorial": take_tutorial, "report": take_report}
+TAKEN: Final = {"dashboard": take_dashboard, "cab": take_cab, "tutorial": take_tutorial, "report": take_report}
 
 
 def main() -> None:

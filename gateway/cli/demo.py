@@ -29,6 +29,11 @@ ROUND_NS: Final = 1800 * NS_PER_S  # from the start of one drive to the start of
 N_QUICK_ROUNDS: Final = 1  # driven at full speed, so that there is a history to look at
 
 
+VAN: Final = VehicleSection(
+    id="demo-van", gross_limit_kg=1750.0, front_axle_limit_kg=900.0, rear_axle_limit_kg=950.0
+)  # of the three loads, the heaviest is too much
+
+
 @click.command("demo")
 @click.option("--once", is_flag=True, help="end after the first drives' estimates and print them")
 @click.option("--json", "as_json", is_flag=True, help="print estimates as JSON lines")
@@ -44,7 +49,7 @@ def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
         settings = Settings(
             signals="springscale:reference",
             calibration=shipped / "paper_van.json",
-            vehicle=VehicleSection(id="demo-van"),
+            vehicle=VAN,
             bus=BusSection(interface="virtual", channel=CHANNEL),
             web=WebSection(port=0 if once else port),
             store=StoreSection(directory=Path(folder)),
