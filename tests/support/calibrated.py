@@ -104,3 +104,10 @@ def first_version() -> dict[str, Any]:
     content["version"] = 1
     content["id"] = content_id(content)
     return content
+
+
+def calibration_text(**vehicle: float | None) -> str:
+    """The same as a file, the vehicle's figures changed so."""
+    told: dict[str, Any] = json.loads(calibration_file().to_json())
+    told["vehicle"] |= vehicle
+    return json.dumps({**told, "id": content_id(told)})

@@ -4,19 +4,17 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from support.archive import write_manifest
-from support.calibrated import calibration_file
+from support.calibrated import calibration_text
 from support.estimates import make_estimate
 from support.web import Client, Gateway
 
 from gateway.archive.manifest import load_manifest
-from gateway.calibration.file.calibration_file import content_id
 from gateway.cli import springscale
 from gateway.config import load_settings
 from gateway.core.vehicle import Vehicle
@@ -29,6 +27,7 @@ from gateway.uplink import Outbox
 
 KG = st.floats(0.0, 50_000.0)
 STD_KG = st.floats(0.01, 500.0)
+UNSPRUNG = {"unsprung_front_kg": 80.0, "unsprung_rear_kg": 80.0}
 
 
 @pytest.mark.parametrize(
@@ -72,17 +71,10 @@ def test_what_is_stated_stands_before_the_vehicles_own() -> None:
     assert Limits().on(vehicle) == vehicle
 
 
-def named_anew(told: dict[str, Any]) -> str:
-    """A calibration file's text after a change, with its id."""
-    return json.dumps({**told, "id": content_id(told)})
-
-
 def configured(folder: Path, vehicle: str = "") -> Path:
     """springscale.toml beside a calibration that allows 2000 kg, and nothing else."""
     folder.mkdir(exist_ok=True)
-    told = json.loads(calibration_file().to_json())
-    told["vehicle"] |= {"unsprung_front_kg": 80.0, "unsprung_rear_kg": 80.0, "rear_axle_limit_kg": 1100.0}
-    (folder / "vehicle.json").write_text(named_anew(told))
+    (folder / "vehicle.json").write_text(calibration_text(rear_axle_limit_kg=1100.0, **UNSPRUNG))
     state = f'[store]\ndirectory = "{folder / "state"}"\n'
     path = folder / "springscale.toml"
     path.write_text(
@@ -172,9 +164,7 @@ def test_check_config_says_which_limits_stand(tmp_path: Path) -> None:
 
 def test_no_limit_is_told_too(tmp_path: Path) -> None:
     path = configured(tmp_path)
-    told = json.loads((tmp_path / "vehicle.json").read_text())
-    told["vehicle"] |= {"gross_limit_kg": None, "rear_axle_limit_kg": None}
-    (tmp_path / "vehicle.json").write_text(named_anew(told))
+    (tmp_path / "vehicle.json").write_text(calibration_text(gross_limit_kg=None))
     assert "No limit is known" in CliRunner().invoke(springscale, ["check-config", str(path)]).output
 
 
