@@ -63,7 +63,7 @@ audit: .venv/.development
 
 # Everything about speed, beside others where these are installed (pip install --group bench), in one run and one table;
 # writes docs/performance.json and its page. A quarter of an hour and ten gigabytes of disk.
-bench: .venv/.development
+bench: .venv/.development deb
 	$(BIN)/python -m benchmarks.speed --output docs/performance.json
 	$(BIN)/python docs/make_performance.py
 

@@ -3,7 +3,8 @@
     python -m benchmarks.speed.start [--json]
 
 CPU time of the imports, the time from the command to READY=1 of the service as systemd hears it (on an in-process bus,
-with the demo's calibration), and the bytes of everything that a vehicle's install holds.
+with the demo's calibration), the bytes of everything that an install by pip holds, and what the Debian package that
+`make deb` built takes in a vehicle, compiled code included.
 """
 
 import argparse
@@ -94,6 +95,17 @@ def _bytes_under(folder: Path) -> float:
     return float(sum(f.stat().st_size for f in folder.rglob("*") if f.is_file() and "__pycache__" not in f.parts))
 
 
+def package_mb() -> float | None:
+    """What the vehicle's Debian package takes when installed; None where none was built, or nobody can read it."""
+    package = max((REPOSITORY / "build").glob("springscale_*.deb"), key=lambda one: one.stat().st_mtime, default=None)
+    if package is None or shutil.which("dpkg-deb") is None:
+        return None
+    told = subprocess.run(
+        ["dpkg-deb", "--field", package, "Installed-Size"], check=True, capture_output=True, text=True
+    )
+    return int(told.stdout) * 1024 / 1e6
+
+
 def measure() -> dict[str, Any]:
     """All of it."""
     with tempfile.TemporaryDirectory() as folder:
@@ -105,6 +117,7 @@ def measure() -> dict[str, Any]:
     return {
         "imports_s": {name: imports_s(name) for name in ("gateway.cli", "gateway.service.gateway")},
         "ready_s": min(times),
+        "package_mb": package_mb(),
         "install_mb": sum(sizes.values()),
         "largest_mb": dict(list(sizes.items())[:6]),
     }

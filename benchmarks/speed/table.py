@@ -25,7 +25,7 @@ def lines_of(found: Mapping[str, Any]) -> list[Line]:
     """Every line that the figures of a run allow; a part that was left out has none."""
     parts = {
         "decode": _decode, "formats": _formats, "day": _day, "live": _live, "service": _service, "web": _web,
-        "weigh": _weigh, "start": _start, "simulator": _simulator,
+        "weigh": _weigh, "archive": _archive, "start": _start, "simulator": _simulator,
     }  # fmt: skip
     return [line for name, part in parts.items() if name in found for line in part(found[name])]
 
@@ -113,6 +113,22 @@ def _weigh(found: Mapping[str, Any]) -> Iterator[Line]:
     for name, seconds in found["batch_s"].items():
         yield _below(section, f"a batch of 5 minutes, {name}", 1e3 * seconds, "ms", 150, 0)
     yield _below(section, "calibration on ten drives of 15 minutes", found["calibration"]["cpu_s"], "s", 60, 0)
+    if "commissioning" in found:
+        fit = found["commissioning"]
+        yield Line(section, "a commissioning's fit, memory", f"{fit['peak_mb']:.0f} MB")
+        yield _below(section, "a commissioning's fit of 15 minutes", fit["cpu_s"], "s", 60)
+
+
+def _archive(found: Mapping[str, Any]) -> Iterator[Line]:
+    section = f"a fleet's archive: {found['vehicles']} vehicles of {found['hours']:g} h"
+    driven_s, runs = 3600.0 * found["hours"] * found["vehicles"], found["workers"]
+    for n, run in runs.items():
+        told = f"{run['clock_s']:.1f} s by the clock, {driven_s / run['clock_s']:,.0f} x real time"
+        yield Line(section, "one process" if n == "1" else f"{n} processes", told)
+    cores = found["cores"]
+    if cores > 1:
+        times, least = runs["1"]["clock_s"] / runs[str(cores)]["clock_s"], 0.8 * cores
+        yield Line(section, f"faster by {cores} cores", f"{times:.2f} x", f"at least {least:g} x", times >= least)
 
 
 def _start(found: Mapping[str, Any]) -> Iterator[Line]:
@@ -121,8 +137,13 @@ def _start(found: Mapping[str, Any]) -> Iterator[Line]:
         yield _below(section, f"import {module}", seconds, "s", 0.6, 2)
     yield _below(section, "READY", found["ready_s"], "s by the clock", 2, 2)
     largest = ", ".join(f"{name} {size:.0f}" for name, size in found["largest_mb"].items())
-    size = found["install_mb"]
-    yield Line(section, "a vehicle's install", f"{size:.0f} MB ({largest})", "at most 250 MB", size <= 250)
+    size, package = found["install_mb"], found.get("package_mb")
+    by_pip = f"{size:.0f} MB ({largest})"
+    if package is None:
+        yield Line(section, "a vehicle's install by pip", by_pip, "at most 250 MB", size <= 250)
+    else:
+        yield _below(section, "a vehicle's install by its Debian package", package, "MB", 250, 0)
+        yield Line(section, "the same by pip, others' tests along", by_pip)
 
 
 def _simulator(found: Mapping[str, Any]) -> Iterator[Line]:

@@ -1,4 +1,5 @@
-"""What weighing costs: one batch of five minutes by each estimator, and a calibration on ten drives of 15 minutes.
+"""What weighing costs: one batch of five minutes by each estimator, a calibration on ten drives of 15 minutes, and a
+commissioning on the vehicle's own machine.
 
     python -m benchmarks.speed.weigh [--json]
 
@@ -15,6 +16,7 @@ import time
 from pathlib import Path
 from typing import Any, Final
 
+from benchmarks.speed import commissioning
 from benchmarks.speed.meter import ONE_THREAD, best_of, cpu_s
 from gateway.bus.signals import Decoder
 from gateway.config import ESTIMATOR_NAMES
@@ -40,13 +42,15 @@ def batch_s() -> dict[str, float]:
     return {name: best_of(3, lambda name=name: weigh_all(name))["seconds"] / len(sound) for name in ESTIMATOR_NAMES}  # type: ignore[misc] # a default binds the loop's name
 
 
-def calibration() -> dict[str, float]:
-    """CPU and clock time of `springscale calibrate` on ten drives."""
-    with tempfile.TemporaryDirectory() as folder:
-        _springscale("simulate", "campaign", "experiment", folder)
+def fits() -> dict[str, dict[str, float]]:
+    """CPU and clock time of `springscale calibrate` on ten drives, and of a commissioning on the vehicle's line."""
+    with tempfile.TemporaryDirectory() as name:
+        campaign, line = Path(name) / "campaign.toml", Path(name) / "vehicle.json"
+        _springscale("simulate", "campaign", "experiment", name)
         begun_s, begun_cpu_s = time.monotonic(), cpu_s()
-        _springscale("calibrate", f"{folder}/campaign.toml", "--output", f"{folder}/vehicle.json")
-        return {"cpu_s": cpu_s() - begun_cpu_s, "clock_s": time.monotonic() - begun_s}
+        _springscale("calibrate", str(campaign), "--output", str(line))
+        calibration = {"cpu_s": cpu_s() - begun_cpu_s, "clock_s": time.monotonic() - begun_s}
+        return {"calibration": calibration, "commissioning": commissioning.measure(campaign, line, Path(name) / "job")}
 
 
 def _springscale(*arguments: str) -> None:
@@ -57,8 +61,8 @@ def _springscale(*arguments: str) -> None:
 
 
 def measure() -> dict[str, Any]:
-    """Both."""
-    return {"batch_s": batch_s(), "calibration": calibration()}
+    """All of it."""
+    return {"batch_s": batch_s(), **fits()}
 
 
 def main() -> None:

@@ -1,0 +1,88 @@
+"""What a commissioning costs on the machine that weighs: the process that fits a quarter of an hour of empty driving.
+
+The drive is cut and kept as the service does it; then the process runs as the service starts it, on the calibration of
+a sister vehicle as its line.
+"""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+from benchmarks.speed.meter import ONE_THREAD, cpu_s
+from gateway.bus.signals import SignalMap, load_signal_map
+from gateway.calibration.campaign import CampaignTable, load_campaign
+from gateway.calibration.commissioning import JOB, RESULT, Drive, Job, Result
+from gateway.calibration.commissioning.job import to_file
+from gateway.calibration.kept import KeptBatch, kept_batch_of, packed
+from gateway.config.sections import CommissioningSection
+from gateway.core.flow import Flow, Identity
+from gateway.core.settings import BatchSettings
+from gateway.estimate import Estimate
+from gateway.offline.batches import read_whole_log
+from gateway.records import Batch, Motion
+from gateway.toml_file import checked, read_toml
+
+PROGRAM: Final = (sys.executable, "-m", "gateway.calibration.commissioning.work")
+
+
+def measure(campaign: Path, line: Path, folder: Path) -> dict[str, float]:
+    """CPU time, clock and memory of the fit of the campaign's first drive, which is an empty one."""
+    folder.mkdir()
+    to_file(_job(campaign, line, folder), folder / JOB)
+    begun_s = cpu_s()
+    subprocess.run([*PROGRAM, str(folder)], check=True, env=os.environ | ONE_THREAD)
+    taken_s = cpu_s() - begun_s
+    result = Result.model_validate_json((folder / RESULT).read_bytes())
+    if result.calibration is None:
+        raise SystemExit(f"the commissioning made no calibration: {result.fault or result.refusal}")
+    return {"cpu_s": taken_s, "clock_s": result.seconds, "peak_mb": result.most_memory_mb}
+
+
+def _job(campaign: Path, line: Path, folder: Path) -> Job:
+    loaded, wanted = load_campaign(campaign), CommissioningSection()
+    [first, *_] = loaded.runs
+    if first.payload_kg:
+        raise SystemExit(f"{campaign}: its first drive is not empty")
+    signal_map = load_signal_map(loaded.signals)
+    motion, _ = read_whole_log(loaded.log_of(first), signal_map)
+    return Job(
+        vehicle=checked(read_toml(campaign), campaign, CampaignTable).vehicle,
+        drives=(
+            Drive(
+                name="empty drive",
+                front_share_pct=loaded.front_share_pct(first),
+                batches=tuple(_files(kept_of(motion, signal_map), folder)),
+            ),
+        ),
+        settings=asdict(BatchSettings()),
+        like=(line,),
+        goal_std_share=wanted.goal_pct / 100.0,
+        most_memory_mb=wanted.memory_mb,
+        command="benchmark",
+    )
+
+
+def kept_of(motion: Motion, signal_map: SignalMap) -> list[KeptBatch]:
+    """What a service keeps of the rows."""
+    found: list[KeptBatch] = []
+    flow = Flow(BatchSettings(), signal_map.traits, None, "cross_spectrum", Identity("van-17"))
+
+    def keep(batch: Batch, estimate: Estimate, rows: Motion) -> None:
+        if not batch.rejected and not batch.is_provisional:
+            found.append(kept_batch_of(estimate.id, signal_map.id, batch, rows, signal_map.traits))
+
+    flow.on_batch = keep
+    for _ in (*flow.feed(motion), *flow.flush()):
+        pass
+    return found
+
+
+def _files(batches: list[KeptBatch], folder: Path) -> Iterator[Path]:
+    for number, kept in enumerate(batches):
+        path = folder / f"{number}.batch"
+        path.write_bytes(packed(kept))
+        yield path
