@@ -12,7 +12,7 @@ from support.web import Client, Gateway
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.estimate import Epoch, Quantity
 from gateway.records import Why
-from gateway.status import OwnReading, Standing, State
+from gateway.status import AlarmsStatus, OwnReading, Standing, State
 
 
 @pytest.fixture
@@ -117,6 +117,14 @@ def test_the_last_load_event_by_the_clock_is_told_and_none_that_was_withdrawn(ga
     last = told(gateway)["last_event"]
     assert (last["change_kg"], last["payload_kg"], last["probability"]) == (-180.0, 500.0, 0.999)
     assert last["t_end"] == "1970-01-01T00:03:20.000000Z"
+
+
+def test_alarms_that_stand_are_told_by_name(gateway: Gateway) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    assert told(gateway)["alarms"] == {}
+    standing = {"overload.gross": "final", "drift.zero": "early"}
+    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=standing)})
+    assert told(gateway)["alarms"] == standing
 
 
 def test_what_the_vehicles_own_sensors_say_is_passed_on_under_its_name(gateway: Gateway) -> None:

@@ -12,7 +12,7 @@ from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
 from support.web import Gateway, serving
 
 from gateway.records import Why
-from gateway.status import OwnReading, Standing, State
+from gateway.status import AlarmsStatus, OwnReading, Standing, State
 from gateway.web import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
@@ -108,6 +108,20 @@ def test_too_heavy_says_by_how_much_and_what_must_come_out(gateway: Gateway, pho
             "By the limit of the whole vehicle. To be sure take out 35 kg."
         )
         expect(phone.page.locator("#rooms")).to_contain_text("Front axle10 kg too much")
+        phone.page.close()
+
+
+def test_alarms_that_stand_are_said_in_words(gateway: Gateway, phone: Watched) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    with serving(gateway.app) as server:
+        phone.page.goto(f"{server.url}/cab")
+        expect(phone.page.locator("#number")).to_have_text("160 kg")
+        expect(phone.page.locator("#alarms")).to_be_hidden()
+        names = {"imbalance.left_right": "final", "overload.rear_left": "final", "drift.zero": "early"}
+        gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=names)})
+        expect(phone.page.locator("#alarms")).to_have_text(
+            "Alarm: load too far to one side, rear left too heavy. First sign: drift: zero."
+        )
         phone.page.close()
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from support.estimates import make_estimate
 
 from gateway.cli.text.estimate import sentence
-from gateway.estimate import Estimate, Quantity
+from gateway.estimate import Estimate, Quantity, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
 
@@ -30,3 +30,8 @@ def test_where_the_load_lies_sideways_is_said_where_something_tells() -> None:
 
 def test_a_refusal_says_why() -> None:
     assert line(make_estimate(0, Why.AMBIGUOUS)) == "1970-01-01T00:00:00Z  no estimate: ambiguous"
+
+
+def test_too_much_is_said_last() -> None:
+    heavy = Weights(gross=Weight(2010.0, 6.0, 2000.0, None), rear_axle=Weight(1120.0, 5.0, 1100.0, None))
+    assert line(replace(ANSWER, weights=heavy)).endswith(" 50.4 km/h   over the limit: gross, rear axle")

@@ -1,7 +1,7 @@
 // The cab page: asks one small question every few seconds and shows the answer, its age, and what it does not know.
 
 import { stayAwake } from "/assets/cab/wake-lock.js";
-import { aboard, about, eventText, lightText, notSeen, ownReading, question, roomText } from "/assets/cab/sentences.js";
+import { aboard, about, alarmText, eventText, lightText, notSeen, ownReading, question, roomText } from "/assets/cab/sentences.js";
 import { Refused, ask, setToken } from "/assets/dashboard/gateway.js";
 import { element, made, pair, say, write } from "/assets/dashboard/page.js";
 import { duration, number } from "/assets/dashboard/words.js";
@@ -81,6 +81,7 @@ function draw() {
   writeNumber(kg);
   write("likely", likely);
   element("rooms").replaceChildren(...cab.room.map((room) => pair(...roomText(room))));
+  say("alarms", alarmText(cab));
   write("aboard", aboard(cab, cab.age_s === null ? null : cab.age_s + silentS));
   write("last-event", eventText(cab.last_event));
   element("own").hidden = cab.own_readings.length === 0;

@@ -10,6 +10,14 @@ const LIGHTS = { go: "Go", near: "Near the limit", over: "Too heavy", unknown: "
 const PLACES = { gross: "whole vehicle" };
 const OWN = { axle_weight: "Axle weight", air_spring_pressure: "Air spring pressure", ride_height: "Ride height" };
 
+const ALARMS = {
+  "imbalance.left_right": "load too far to one side",
+  "imbalance.front_rear": "load too far to one end",
+  "sensor_fault.silent": "a sensor is silent",
+  "sensor_fault.refused": "a sensor is not believed",
+  no_estimate: "not weighed for long",
+};
+
 const placeName = (place) => PLACES[place] || words(place);
 
 const hour = (iso) => new Date(iso).toLocaleTimeString(undefined, { hour: "2-digit", minute: "2-digit" });
@@ -66,6 +74,19 @@ export function notSeen(cab, silentS) {
   }
   if (cab.load === "not_weighed_yet") return "The load may have changed at the last stop. These numbers are of before it; the new load is weighed after some minutes of driving.";
   return "";
+}
+
+function alarmName(name) {
+  const [kind, where] = name.split(".");
+  if (kind === "overload") return `${placeName(where)} too heavy`;
+  return ALARMS[name] || words(name.replace(".", ": "));
+}
+
+/** Those that stand, the confirmed ones first. */
+export function alarmText(cab) {
+  const told = (level) => Object.keys(cab.alarms).filter((name) => cab.alarms[name] === level).map(alarmName);
+  const [sure, early] = [told("final"), told("early")];
+  return [sure.length ? `Alarm: ${sure.join(", ")}.` : "", early.length ? `First sign: ${early.join(", ")}.` : ""].filter(Boolean).join(" ");
 }
 
 export function aboard(cab, ageS) {

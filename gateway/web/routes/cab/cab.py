@@ -51,6 +51,7 @@ def cab_router(board: Board, reader: Reader, status: Callable[[], Status], scale
             lacks=weights.gross.lacks,
             payload_kg=None if load is None else _or_none(load.payload.number, 1),
             payload_interval95_kg=None if load is None else _interval(load.payload),
+            alarms=now.alarms.standing,
             rejected=_rejected(board.heard(), shown.estimate),
             last_event=_newest(await asyncio.to_thread(_events, reader)),
             own_readings=now.own_readings,
