@@ -14,6 +14,7 @@ from typing import Any, Final
 import click
 
 from benchmarks.accuracy import advice as on_advice
+from benchmarks.accuracy import alarms as on_alarms
 from benchmarks.accuracy import coverage as on_coverage
 from benchmarks.accuracy import delivery as on_delivery
 from benchmarks.accuracy import disturbances as on_disturbances
@@ -138,6 +139,17 @@ def delivery(n_days: int, seed: int, workers: int, kept: Path | None, output: Pa
     with counted("driving delivery days") as on_day:
         found = on_delivery.delivery(n_days, seed, workers=workers, kept=kept, on_day=on_day)
     _hand_out("events", found, delivery_page(found), output)
+
+
+@studies.command("alarms")
+@click.option("--loads", "n_loads", type=click.IntRange(min=1), default=on_alarms.N_LOADS, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=on_alarms.SEED, show_default=True)
+@_output
+def alarms(n_loads: int, seed: int, output: Path | None) -> None:
+    """Are the rules of the alarms right, and do alarms come and go? Made-up loads about a limit; a minute."""
+    with counted("weighing loads about a limit") as on_line:
+        found = on_alarms.alarms(n_loads, seed, on_line)
+    _hand_out("alarm_rules", found, on_alarms.alarms_page(found), output)
 
 
 @studies.command("sensitivity")

@@ -26,10 +26,10 @@ class AlarmsSection(Section):
         (), description='alarms that are not wanted, by name or by kind: `["drift", "overload.front_left"]`'
     )
     early_probability: float = Field(
-        0.9, gt=0.5, lt=1.0, description="one batch warns where it is so probable that a limit is passed"
+        0.9, gt=0.5, lt=1.0, description="told early where it is so probable that a limit is passed, be it by one batch"
     )
     final_probability: float = Field(
-        0.95, gt=0.5, lt=1.0, description="the batches of one load confirm it where they together make it so probable"
+        0.95, gt=0.5, lt=1.0, description="confirmed where the batches of one load together make it so probable"
     )
     final_batches: int = Field(2, ge=2, le=20, description="how many batches of one load it takes at least")
     clear_probability: float = Field(

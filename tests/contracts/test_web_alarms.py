@@ -3,15 +3,19 @@
 import asyncio
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import jsonschema_rs
 import pytest
 from support.alarms import LIMIT_KG, AlarmBench, of_load
 from support.web import Client
 
+from gateway.records import Why
 from gateway.status import State, Status
 from gateway.web import Scope, TokenFile, create_app
 from gateway.web.live.stream import EventStream
+from gateway.web.routes.alarms.routes import Alarm
 
 URL = "/api/v1/alarms"
 OVER = LIMIT_KG + 60.0
@@ -122,3 +126,20 @@ def test_a_stream_that_is_resumed_tells_what_was_missed(alarmed: Alarmed) -> Non
 
 def _bearer(token: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {token}"}
+
+
+def test_what_is_told_is_as_the_schema_says(alarmed: Alarmed) -> None:
+    schema = json.loads((Path(__file__).parents[2] / "docs/alarms.schema.json").read_text())
+    validator = jsonschema_rs.validator_for(schema)
+    client = Client(alarmed.app)
+    (alarm,) = client.get(URL).json()["active"]
+    validator.validate(alarm)
+    client.request("POST", f"{URL}/{alarm['id']}/acknowledgement", json={"note": "unloading"})
+    alarmed.bench.weigh(of_load(1, OVER, n_batches=2))
+    alarmed.bench.weigh(replace(of_load(2, 100.0), rejected=(Why.PITCH_RATE_STUCK,)))
+    alarmed.bench.weigh(of_load(3, 100.0))
+    items = client.get(URL).json()["items"]
+    assert sorted(one["kind"] for one in items) == ["overload", "sensor_fault"]
+    for one in items:
+        validator.validate(one)
+    assert set(schema["properties"]) == set(Alarm.model_fields)

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks.accuracy.alarms import alarms_page
 from benchmarks.accuracy.coverage_drives import TRIPS
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.coverage_table import ALL_KINDS
@@ -29,6 +30,7 @@ PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "disturbances": disturbances_page,
     "siblings": siblings_page,
     "events": delivery_page,
+    "alarm_rules": alarms_page,
     "sensitivity": sensitivity_page,
 }
 
@@ -88,3 +90,12 @@ def test_a_sister_is_worth_more_than_priors_and_her_intervals_hold() -> None:
         assert rows[way]["payload_coverage"]["share"] >= 0.93
         assert rows[way]["front_share_coverage"]["share"] >= 0.93
         assert rows[way]["n_rejected"] <= 0.12 * rows[way]["n_batches"]
+
+
+def test_alarms_are_told_of_what_is_too_heavy_and_hardly_of_what_is_not() -> None:
+    found = numbers("alarm_rules")
+    lines = {line["distance"]: line for line in found["lines"]}
+    assert lines[-2.0]["n_final"] == 0
+    assert lines[3.0]["n_final"] >= 0.99 * found["n_loads"]
+    for line in lines.values():  # the gap keeps them from coming and going
+        assert line["n_alarms"] <= line["n_alarms_without_gap"]

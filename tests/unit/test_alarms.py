@@ -28,7 +28,7 @@ from gateway.core.alarms import (
 from gateway.core.alarms.alarm import NO_ESTIMATE, REFUSED, SILENT
 from gateway.core.alarms.weighing import beyond_probability
 from gateway.errors import AlarmRefusedError
-from gateway.estimate import Estimate, Quantity, Weight, Weights
+from gateway.estimate import Estimate, Quantity
 from gateway.records import Why, json_line
 
 RULES = AlarmRules()
@@ -94,7 +94,7 @@ def test_without_a_limit_nothing_is_too_much_and_what_stood_is_over() -> None:
 def test_a_weight_that_nobody_knows_changes_nothing() -> None:
     watch = watching()
     assert told(watch, of_load(0, LIMIT_KG + 60.0))
-    assert told(watch, replace(of_load(1, 0.0), weights=Weights(gross=Weight(limit_kg=2500.0)), epoch=None)) == []
+    assert told(watch, replace(of_load(1, 0.0), payload=Quantity(), epoch=None)) == []
     assert told(watch, batch(10.0, 15.0, None)) == []
     assert [alarm.cause for alarm in watch.active()] == [GROSS]
 

@@ -43,6 +43,8 @@ def test_defaults_that_the_shipped_configuration_tells_are_the_defaults(tmp_path
         "interface",  # of another bus
         "channel",
         "source_address",
+        "url",
+        "secret_file",
         *(one.name for one in fields(Limits)),
     ]
     kept = [

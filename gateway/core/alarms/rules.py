@@ -57,17 +57,17 @@ class AlarmRules:
     def is_on(self, cause: Cause) -> bool:
         return not cause.is_named_in(self.off)
 
-    def of_probability(self, batch: float, load: float, n_batches: int) -> Verdict:
-        """``batch`` is the probability by the last batch alone, ``load`` by all ``n_batches`` of its load together.
+    def of_probability(self, probability: float, n_batches: int) -> Verdict:
+        """``probability`` is what all ``n_batches`` of a load together give; NaN where nothing is known.
 
-        Final: so many batches of one load together are sure. Early: one batch is, and the load does not deny it. Over:
-        the load together says rather no than yes, by as much as is between the two probabilities, so that a weight
-        about its limit does not make the alarm come and go.
+        Final: enough batches are sure together. Early: they are nearly so, or a single one is. Over: they say rather no
+        than yes, by as much as is between the two probabilities, so that a weight about its limit does not make the
+        alarm come and go.
         """
-        if math.isnan(load) or math.isnan(batch):
+        if math.isnan(probability):
             return Verdict.HOLD
-        if n_batches >= self.final_batches and load >= self.final_probability:
+        if n_batches >= self.final_batches and probability >= self.final_probability:
             return Verdict.FINAL
-        if load <= self.clear_probability:
+        if probability <= self.clear_probability:
             return Verdict.CLEAR
-        return Verdict.EARLY if batch >= self.early_probability else Verdict.HOLD
+        return Verdict.EARLY if probability >= self.early_probability else Verdict.HOLD

@@ -1,4 +1,4 @@
-"""What one batch, and the batches of its load together, say of overload and imbalance."""
+"""What the batches of a load together say of overload and imbalance."""
 
 import math
 from collections.abc import Iterator
@@ -20,24 +20,22 @@ def verdicts_of(
     are taken to be as correlated as the batch's.
     """
     load, n_batches = as_of_load(estimate), 1 if estimate.epoch is None else estimate.epoch.n_batches
-    together = weighed(load, vehicle, unsprung).weights if vehicle else estimate.weights
-    for cause, (place, alone) in zip(OVERLOADS, estimate.weights.items(), strict=True):
-        one = getattr(together, place)
-        if one.limit_kg is None:
+    weights = weighed(load, vehicle, unsprung).weights if vehicle else estimate.weights
+    for cause, (_, weight) in zip(OVERLOADS, weights.items(), strict=True):
+        if weight.limit_kg is None:
             yield Says(cause, Verdict.CLEAR, Figure(detail="no limit is given"))
             continue
-        probability = over_limit_probability(one.kg, one.std_kg, one.limit_kg)
-        by_batch = over_limit_probability(alone.kg, alone.std_kg, one.limit_kg)
-        figure = Figure(one.kg, one.std_kg, one.limit_kg, "kg", probability)
-        yield Says(cause, rules.of_probability(by_batch, probability, n_batches), figure)
+        probability = over_limit_probability(weight.kg, weight.std_kg, weight.limit_kg)
+        figure = Figure(weight.kg, weight.std_kg, weight.limit_kg, "kg", probability)
+        yield Says(cause, rules.of_probability(probability, n_batches), figure)
     shares = (
-        (SIDES, _left_share(estimate, vehicle), _left_share(load, vehicle), rules.side_share_max_pct),
-        (AXLES, estimate.front_share, load.front_share, rules.axle_share_max_pct),
+        (SIDES, _left_share(load, vehicle), rules.side_share_max_pct),
+        (AXLES, load.front_share, rules.axle_share_max_pct),
     )
-    for cause, by_one, by_all, most_pct in shares:
-        probability = beyond_probability(by_all, most_pct)
-        figure = Figure(_larger(by_all.number), by_all.std, most_pct, "%", probability)
-        yield Says(cause, rules.of_probability(beyond_probability(by_one, most_pct), probability, n_batches), figure)
+    for cause, share, most_pct in shares:
+        probability = beyond_probability(share, most_pct)
+        figure = Figure(_larger(share.number), share.std, most_pct, "%", probability)
+        yield Says(cause, rules.of_probability(probability, n_batches), figure)
 
 
 def as_of_load(estimate: Estimate) -> Estimate:
