@@ -30,7 +30,7 @@ def table(counts: dict[str, Any]) -> str:
     blows = ", ".join(f"{blow} {times[n]}" for blow, n in counts["blows"].items())
     rows = {
         "Estimates written by the vehicles, rows of them": f"{counts['estimates']}, {counts['estimate_rows']}",
-        "Load events and trips, rows of them": f"{counts['entries']}, {counts['entry_rows']}",
+        "Load events, trips and alarms, rows of them": f"{counts['entries']}, {counts['entry_rows']}",
         "Lost": counts["estimates"] + counts["entries"] - counts["estimate_rows"] - counts["entry_rows"],
         "Ids in more than one row": counts["ids_doubled"],
         "Records whose predecessor is missing": counts["records_missing"],

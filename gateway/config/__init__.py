@@ -1,6 +1,7 @@
 """springscale.toml and SPRINGSCALE_* variables -> frozen settings. An unknown key is an error that names it.
 
-Tables about what a service keeps, and how it is calibrated and verified, are in ``sections``.
+Tables about what a service keeps, and how it is calibrated and verified, are in ``sections``, about where
+weights are sent in ``outward``.
 """
 
 from pathlib import Path
@@ -10,14 +11,15 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
 from gateway.config.alarms import AlarmsSection, WebhookSection
+from gateway.config.outward import BroadcastSection, UplinkSection
 from gateway.config.sections import (
     OF_CALIBRATION,
-    BroadcastSection,
     CommissioningSection,
     KeepSection,
     LimitKg,
     PositionSection,
     RecordSection,
+    Seconds,
     Section,
     VerificationSection,
 )
@@ -26,7 +28,6 @@ from gateway.errors import ConfigurationError
 from gateway.files.signed import PublicKey, Trust, load_public_keys
 from gateway.toml_file import describe_faults, read_toml
 
-Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years, in nanoseconds within 64 bits
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
 EstimatorName = Literal["cross_spectrum", "ratio_index"]  # those of core.estimator, which loads too much for this
@@ -138,42 +139,6 @@ class StoreSection(Section):
     directory: Path = Field(Path("/var/lib/springscale"), description="folder of the database")
     max_age_days: float = Field(400.0, gt=0.0, le=36_500.0, description="older records are removed")
     max_size_mb: float = Field(512.0, ge=4.0, le=1e9, description="the oldest records are removed beyond this size")
-
-
-class UplinkSection(Section):
-    """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that nobody can ask."""
-
-    host: str | None = Field(None, min_length=1, description="the broker; without it nothing is forwarded")
-    port: int | None = Field(None, ge=1, le=65535, description="its port [default: 8883 with TLS, 1883 without]")
-    tls: bool = Field(True, description="encrypted, the broker's certificate checked")
-    ca: Path | None = Field(
-        None, description="PEM file of the authority that signed the broker's certificate [default: the system's]"
-    )
-    certificate: Path | None = Field(None, description="PEM file of our certificate, for a broker that asks for one")
-    key: Path | None = Field(None, description="PEM file of its key")
-    username: str | None = Field(None, description="name under which the broker knows us")
-    password_file: Path | None = Field(None, description="file that holds nothing but the password")
-    topic: str = Field("springscale/{vehicle_id}", min_length=1, description="branch below which this vehicle reports")
-    client_id: str | None = Field(None, min_length=1, description="[default: springscale- and the vehicle's id]")
-    keep_alive_s: int = Field(60, ge=5, le=3600, description="the link is probed after this long without traffic")
-    back_off_max_s: Seconds = Field(300.0, description="longest pause between two tries to connect")
-    repeat_s: float = Field(
-        0.0,
-        ge=0.0,
-        le=86_400.0,
-        description="after a break, what was delivered in the last so many seconds before it is sent again: more than "
-        "the broker forgets when it is killed",
-    )
-
-    @model_validator(mode="after")
-    def _keeps_its_secrets(self) -> "UplinkSection":
-        if (self.certificate is None) != (self.key is None):
-            raise ValueError("certificate and key belong together: give both or neither")
-        if self.password_file is not None and self.username is None:
-            raise ValueError("password_file needs username")
-        if self.password_file is not None and not self.tls and self.host not in {"127.0.0.1", "::1", "localhost"}:
-            raise ValueError("a password would cross the network in the clear: set tls = true")
-        return self
 
 
 def _of_a_key(line: str) -> str:

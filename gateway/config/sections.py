@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field
 
+Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years, in nanoseconds within 64 bits
 LimitKg = Annotated[float | None, Field(gt=0.0, le=100_000.0, allow_inf_nan=False)]  # more is no road vehicle's
 OF_CALIBRATION = "[default: as the calibration has it]"
 
@@ -75,32 +76,3 @@ class PositionSection(Section):
         None, ge=0, le=7, description="decimals of a degree kept: 2 is about 1 km, 4 about 10 m [default: none is kept]"
     )
     forward: bool = Field(False, description="forward kept positions to the broker of [uplink] too")
-
-
-class BroadcastSection(Section):
-    """Weights sent onto another CAN bus than the one that is listened to, as J1939 frames."""
-
-    interface: str | None = Field(
-        None, min_length=1, description="any python-can interface; without it nothing is ever sent on any bus"
-    )
-    channel: str | None = Field(None, min_length=1, description="its channel; never that of [bus]")
-    options: dict[str, str | int | float | bool] = Field(
-        default_factory=dict, description="further arguments of that python-can interface, e.g. bitrate"
-    )
-    source_address: int | None = Field(
-        None, ge=0, le=253, description="J1939 address to send under, which nobody else on that bus may have"
-    )
-    priority: int = Field(6, ge=0, le=7, description="J1939 priority; 0 is the most urgent")
-    every_s: float = Field(1.0, ge=0.1, le=3600.0, description="frames are sent so often")
-    first_axle: int = Field(1, ge=0, le=1, description="number that the receivers expect of the front axle")
-    draws_trailers: bool = Field(
-        False, description="the gross weight of the combination, which is not known then, is not told"
-    )
-
-    @model_validator(mode="after")
-    def _whole(self) -> "BroadcastSection":
-        if self.interface is not None and (self.channel is None or self.source_address is None):
-            raise ValueError("interface needs channel and source_address beside it")
-        if self.interface is None and (self.channel is not None or self.source_address is not None):
-            raise ValueError("nothing is sent without interface: give it, or leave out channel and source_address")
-        return self

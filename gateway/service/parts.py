@@ -10,7 +10,8 @@ from gateway.bus.ring import RingLimits, RingLog
 from gateway.calibration.kept import Shelf, ShelfLimits
 from gateway.calibration.kept.shelf import FOLDER
 from gateway.config import BusSection, Settings, StoreSection
-from gateway.config.sections import BroadcastSection, KeepSection
+from gateway.config.outward import BroadcastSection
+from gateway.config.sections import KeepSection
 from gateway.core.flow import Flow
 from gateway.errors import StoreError
 from gateway.estimate import Estimate

@@ -11,6 +11,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
+from gateway.uplink.home_assistant import discovery
 from gateway.uplink.outbox import Letter
 from gateway.uplink.settings import UplinkSettings
 
@@ -61,6 +62,8 @@ class MqttLink:
         self._client = self._make_client()
         self._connect()
         self._announce(birth)
+        if settings.home_assistant is not None:
+            self._introduce(*discovery(settings.home_assistant, settings.topic, birth))
 
     def send(self, letter: Letter) -> int:
         """Hand a letter to the broker -> the number its answer will carry. What it said is too large is not sent."""
@@ -145,6 +148,10 @@ class MqttLink:
 
     def _announce(self, presence: Mapping[str, Any]) -> int:
         return self._publish("status", json.dumps(presence), retain=True)
+
+    def _introduce(self, topic: str, text: str) -> None:
+        """To Home Assistant; a broker that does not want it there is no reason not to deliver."""
+        self._client.publish(topic, text.encode(), qos=1, retain=True)
 
     def _publish(self, leaf: str, text: str, *, retain: bool = False, properties: Properties | None = None) -> int:
         sent = self._client.publish(

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from gateway.config import UplinkSection, VehicleSection
+from gateway.config import VehicleSection
+from gateway.config.outward import UplinkSection
 from gateway.errors import ConfigurationError
 
 MOST_NAME_BYTES: Final = 65_535
@@ -33,6 +34,7 @@ class UplinkSettings:
     keep_alive_s: int = 60
     back_off_max_s: float = 300.0
     repeat_s: float = 0.0
+    home_assistant: str | None = None
 
     @property
     def broker(self) -> str:
@@ -89,7 +91,12 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
         keep_alive_s=section.keep_alive_s,
         back_off_max_s=section.back_off_max_s,
         repeat_s=section.repeat_s,
+        home_assistant=section.home_assistant,
     )
+    if any(character in (section.home_assistant or "") for character in "+#\0"):
+        raise ConfigurationError(
+            f"[uplink] home_assistant {section.home_assistant!r}: MQTT allows no +, # or NUL there"
+        )
     names = {"topic": f"{topic}/estimates", "client_id": settings.client_id, "username": settings.username}
     for name, text in names.items():
         _check_name(name, text)

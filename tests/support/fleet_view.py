@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.config import load_settings
+from gateway.core.alarms.alarm import Alarm, AlarmKind, AlarmState, Cause, Figure, Step, alarm_to_json
 from gateway.core.events import EntryKind
 from gateway.core.events.entry import entry_id
 from gateway.estimate import Estimate, Weight, Weights
@@ -154,14 +155,14 @@ class SimulatedVehicle:
         self.uplink = Uplink(wanted, outbox, birth, back_off=BackOff(0.05, 0.5))
 
     def drive(self, n: int) -> None:
-        """``n`` more batches; with every tenth a load event, told again in a second revision, and a trip."""
+        """``n`` more batches; with every tenth a load event, told again in a second revision, a trip and an alarm."""
         for _ in range(n):
             found = self._batch(self.n_estimates)
             self.store.write_estimate(estimate_to_json(found))
             if self.n_estimates % 10 == 0:
                 for entry in _entries(found):
                     self.store.write_entry(entry["id"].partition("-")[0], entry["id"], found.t_end_ns, json_line(entry))
-                self.n_entries += 2
+                self.n_entries += 3
             self.n_estimates += 1
 
     def _batch(self, n: int) -> Estimate:
@@ -179,7 +180,7 @@ class SimulatedVehicle:
 
 
 def _entries(found: Estimate) -> Iterator[dict[str, Any]]:
-    """A load event in two revisions, and a trip."""
+    """A load event in two revisions, a trip, and an alarm."""
     t_start, t_end = iso_utc(found.t_start_ns), iso_utc(found.t_end_ns)
     shared = {"vehicle_id": found.vehicle_id, "t_start": t_start, "t_end": t_end}
     for revision in (1, 2):
@@ -192,6 +193,8 @@ def _entries(found: Estimate) -> Iterator[dict[str, Any]]:
         }
     way = {"distance_m": 12_000.0, "carried_tkm": 2.4, "empty_share": 0.5, "overloaded_share": 0.0}
     yield {"id": entry_id(EntryKind.TRIP, found.vehicle_id, found.t_end_ns), "revision": 1, **shared, **way}
+    step = Step(AlarmState.FINAL, found.t_end_ns, Figure(2050.0, 8.0, 2000.0, "kg", 0.99))
+    yield alarm_to_json(Alarm.begun(Cause(AlarmKind.OVERLOAD, "gross"), found.vehicle_id, step), "50 kg too much")
 
 
 class FleetView:

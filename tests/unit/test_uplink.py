@@ -11,7 +11,8 @@ from support.estimates import make_record
 from support.log import fields_of, names
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.config import UplinkSection, VehicleSection
+from gateway.config import VehicleSection
+from gateway.config.outward import UplinkSection
 from gateway.errors import ConfigurationError
 from gateway.log import Event
 from gateway.store import Retention, Store

@@ -1,0 +1,69 @@
+"""What Home Assistant is told, so that the vehicle appears there by itself: MQTT device discovery.
+
+One retained message names the device and its entities, each a template over the estimates that are sent anyway. As
+https://www.home-assistant.io/integrations/mqtt, "Device discovery payload", has it (Home Assistant 2024.11 and later).
+"""
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from typing import Any, Final
+
+_WEIGHT: Final = {
+    "platform": "sensor",
+    "device_class": "weight",
+    "unit_of_measurement": "kg",
+    "state_class": "measurement",
+}
+_SHARE: Final = {"platform": "sensor", "unit_of_measurement": "%", "state_class": "measurement"}
+_REST: Final = {"suggested_display_precision": 0}
+_DIAGNOSTIC: Final = {"entity_category": "diagnostic"}
+_OVERLOAD: Final = (
+    "{{ 'None' if value_json.weights.gross.kg is none else "
+    "'ON' if value_json.weights.values() | selectattr('is_over_limit') | list else 'OFF' }}"
+)
+# Name, template, and what Home Assistant has to know of it. None, an unknown number, is its "unknown"
+ENTITIES: Final[dict[str, tuple[str, str, dict[str, Any]]]] = {
+    "payload": ("Payload", "{{ value_json.payload_kg }}", _WEIGHT | _REST),
+    "payload_std": ("Payload standard deviation", "{{ value_json.payload_std_kg }}", _WEIGHT | _REST | _DIAGNOSTIC),
+    "front_share": ("Front share", "{{ value_json.front_share_pct }}", _SHARE),
+    "gross": ("Gross weight", "{{ value_json.weights.gross.kg }}", _WEIGHT | _REST),
+    "front_axle": ("Front axle", "{{ value_json.weights.front_axle.kg }}", _WEIGHT | _REST),
+    "rear_axle": ("Rear axle", "{{ value_json.weights.rear_axle.kg }}", _WEIGHT | _REST),
+    "overload": ("Overload", _OVERLOAD, {"platform": "binary_sensor", "device_class": "problem"}),
+    "weighed": ("Weighed", "{{ value_json.t_end }}", {"platform": "sensor", "device_class": "timestamp"} | _DIAGNOSTIC),
+    "refused": ("Why not weighed", "{{ value_json.rejected | join(', ') }}", {"platform": "sensor"} | _DIAGNOSTIC),
+}
+
+
+def discovery(prefix: str, topic: str, birth: Mapping[str, Any]) -> tuple[str, str]:
+    """Topic and JSON of the message; ``birth`` is what the vehicle says of itself when it connects."""
+    vehicle = _object_id(str(birth["vehicle_id"]))
+    device = {
+        "identifiers": [f"springscale_{vehicle}"],
+        "name": birth["vehicle_id"],
+        "manufacturer": "Springscale",
+        "serial_number": birth.get("vin"),
+        "sw_version": birth.get("version"),
+    }
+    components = {
+        key: {"name": name, "unique_id": f"springscale_{vehicle}_{key}", "value_template": template, **more}
+        for key, (name, template, more) in ENTITIES.items()
+    }
+    told = {
+        "device": {key: known for key, known in device.items() if known is not None},
+        "origin": {"name": "springscale", "sw_version": birth.get("version") or "unknown"},
+        "components": components,
+        "state_topic": f"{topic}/estimates",
+        "availability_topic": f"{topic}/status",
+        "availability_template": "{{ value_json.state }}",
+        "qos": 1,
+    }
+    return f"{prefix}/device/springscale_{vehicle}/config", json.dumps(told)
+
+
+def _object_id(name: str) -> str:
+    """As the topic allows it; a name that had to be changed for it stays different from every other."""
+    safe = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+    return safe if safe == name else f"{safe}_{hashlib.sha256(name.encode()).hexdigest()[:8]}"

@@ -1,0 +1,129 @@
+"""MQTT discovery: what Home Assistant is told fits the records it is about."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jinja2.sandbox import SandboxedEnvironment
+from support.broker import Listener, needs_mosquitto, running_broker
+from support.estimates import make_estimate, make_record, with_everything
+from support.patience import wait_until
+
+from gateway.config import VehicleSection
+from gateway.config.outward import UplinkSection
+from gateway.errors import ConfigurationError
+from gateway.estimate import Estimate, Weight, Weights
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Why
+from gateway.store import Store
+from gateway.uplink import Outbox, Uplink, uplink_settings
+from gateway.uplink.home_assistant import discovery
+
+BIRTH = {"vehicle_id": "van-17", "vin": "WVWZZZ1KZAW000001", "version": "1.2.3", "estimator": "cross_spectrum"}
+
+
+def told(**changed: Any) -> dict[str, Any]:
+    _, text = discovery("homeassistant", "springscale/van-17", BIRTH | changed)
+    found: dict[str, Any] = json.loads(text)
+    return found
+
+
+def states(estimate: Estimate) -> dict[str, str]:
+    """What each entity shows after a record, as Home Assistant renders templates: in a sandbox, JSON as value_json."""
+    templates = SandboxedEnvironment()
+    record = json.loads(json.dumps(estimate_to_json(estimate)))
+    components = told()["components"]
+    return {
+        key: templates.from_string(component["value_template"]).render(value_json=record)
+        for key, component in components.items()
+    }
+
+
+def test_an_estimate_is_shown_as_it_is() -> None:
+    weights = Weights(gross=Weight(1711.3, 6.1, 2000.0, None), front_axle=Weight(1006.1, 5.4, 1000.0, None))
+    found = states(replace(with_everything(3), weights=weights))
+    assert (found["payload"], found["payload_std"], found["gross"]) == ("103.0", "6.0", "1711.3")
+    assert (found["front_axle"], found["rear_axle"], found["overload"]) == ("1006.1", "None", "ON")
+    assert found["weighed"].startswith("1970-01-01T00:20:00")
+    assert found["refused"] == ""
+
+
+def test_what_is_not_known_is_unknown_and_no_overload_is_none() -> None:
+    """Home Assistant takes the word None for "unknown"."""
+    refused = states(make_estimate(3, Why.TOO_SLOW))
+    assert {refused[key] for key in ("payload", "payload_std", "gross", "front_axle", "overload")} == {"None"}
+    assert refused["refused"] == "too_slow"
+    light = Weights(gross=Weight(1500.0, 6.1, 2000.0, None), front_axle=Weight(800.0, 5.4, math.nan, None))
+    assert states(replace(make_estimate(3), weights=light))["overload"] == "OFF"
+
+
+def test_the_message_has_what_device_discovery_asks_for() -> None:
+    found = told()
+    assert found["device"]["identifiers"] == ["springscale_van-17"]
+    assert found["device"]["serial_number"] == "WVWZZZ1KZAW000001"
+    assert found["origin"]["name"] == "springscale"
+    assert (found["state_topic"], found["availability_topic"]) == (
+        "springscale/van-17/estimates",
+        "springscale/van-17/status",
+    )
+    names = [component["unique_id"] for component in found["components"].values()]
+    assert len(set(names)) == len(names)
+    for component in found["components"].values():
+        assert component["platform"] in ("sensor", "binary_sensor")
+    assert "serial_number" not in told(vin=None)["device"]
+
+
+def test_a_name_that_no_topic_may_hold_stays_different_from_others() -> None:
+    topics = {
+        discovery("homeassistant", "x", BIRTH | {"vehicle_id": name})[0] for name in ("van 17", "van.17", "van_17")
+    }
+    assert len(topics) == 3
+    assert all(" " not in topic and "." not in topic for topic in topics)
+
+
+@needs_mosquitto
+def test_it_is_retained_at_a_real_broker_and_estimates_still_go_out(tmp_path: Path) -> None:
+    section = UplinkSection(host="127.0.0.1", tls=False, home_assistant="ha")
+    store = Store.open(tmp_path / "state")
+    store.write_estimate(make_record(1))
+    with running_broker(tmp_path) as broker:
+        settings = uplink_settings(section.model_copy(update={"port": broker.port}), VehicleSection(id="van-17"))
+        assert settings is not None
+        uplink = Uplink(settings, Outbox(store.reader(), store, "fleet"), BIRTH)
+        uplink.start()
+        assert wait_until(lambda: uplink.report().n_delivered == 1), uplink.report()
+        listener = Listener(broker.port, "ha/#")
+        assert listener.wait_for(1)
+        listener.close()
+        uplink.stop()
+    store.close()
+    (message,) = listener.heard
+    assert (message.topic, message.retain) == ("ha/device/springscale_van-17/config", True)
+    assert json.loads(message.payload) == told()
+
+
+@needs_mosquitto
+def test_a_broker_that_does_not_want_it_there_gets_the_estimates_all_the_same(tmp_path: Path) -> None:
+    (tmp_path / "acl").write_text("topic read #\ntopic write springscale/#\n")
+    section = UplinkSection(host="127.0.0.1", tls=False, home_assistant="homeassistant")
+    store = Store.open(tmp_path / "state")
+    store.write_estimate(make_record(1))
+    # with an unlimited queue, which the other tests have, mosquitto 2.0.11 cuts who writes where it may not
+    extra = f"allow_anonymous true\nacl_file {tmp_path}/acl\nmax_queued_messages 1000"
+    with running_broker(tmp_path, extra) as broker:
+        settings = uplink_settings(section.model_copy(update={"port": broker.port}), VehicleSection(id="van-17"))
+        assert settings is not None
+        uplink = Uplink(settings, Outbox(store.reader(), store, "fleet"), BIRTH)
+        uplink.start()
+        assert wait_until(lambda: uplink.report().n_delivered == 1), uplink.report()
+        uplink.stop()
+    store.close()
+
+
+def test_a_prefix_that_mqtt_forbids_is_told() -> None:
+    section = UplinkSection(host="fleet.example", home_assistant="home/#")
+    with pytest.raises(ConfigurationError, match=r"home_assistant 'home/#'"):
+        uplink_settings(section, VehicleSection(id="van-17"))
