@@ -28,6 +28,7 @@ WAKE_LOCK = """(() => {
   window.letGo = () => lock.dispatchEvent(new Event("release"));
 })()"""
 NO_WAKE_LOCK = 'Object.defineProperty(navigator, "wakeLock", { value: undefined })'
+INSECURE = 'Object.defineProperty(window, "isSecureContext", { value: false })'
 REFUSED = 'Object.defineProperty(navigator, "wakeLock", { value: { request: async () => { throw new Error("no"); } } })'
 
 
@@ -91,7 +92,7 @@ def test_by_day_and_by_night_every_word_can_be_read(
     with serving(gateway.app) as server:
         watched.page.goto(f"{server.url}/cab")
         expect(watched.page.locator("#main")).to_have_attribute("data-light", light)
-        expect(watched.page.locator("#bar")).to_contain_text("Old")
+        expect(watched.page.locator("#bar")).to_contain_text("old")
         assert [text for contrast, text in watched.page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
         watched.page.close()
 
@@ -181,7 +182,8 @@ def test_an_old_number_is_crossed_through_and_said_loudly(gateway: Gateway, phon
     gateway.clock_s += 3.0 * 3600.0
     with serving(gateway.app) as server:
         phone.page.goto(f"{server.url}/cab")
-        expect(phone.page.get_by_role("alert")).to_have_text("Old: weighed 3.0 h ago.")
+        expect(phone.page.get_by_role("alert")).to_have_text("These numbers are old.")
+        expect(phone.page.locator("#bar")).to_have_text("These numbers are old. Weighed 3.0 h ago.")
         expect(phone.page.locator("#light")).to_have_text("Go, when weighed last")
         crossed = phone.page.locator("#number").evaluate("e => getComputedStyle(e).textDecorationLine")
         assert crossed == "line-through"
@@ -200,7 +202,10 @@ def test_a_gateway_that_is_gone_is_said_loudly_and_comes_back(gateway: Gateway, 
         page.clock.run_for(12_000)
         expect(page.locator("#bar")).to_be_hidden()
         page.clock.run_for(48_000)
-        expect(page.get_by_role("alert")).to_contain_text("No answer from the gateway for 60 s.")
+        expect(page.get_by_role("alert")).to_have_text(
+            "The gateway does not answer. What is shown is the last it said."
+        )
+        expect(page.locator("#bar-how-long")).to_have_text("For 60 s now.")
         expect(page.locator("#main")).to_have_attribute("data-is", "old")
         expect(page.locator("#number")).to_have_text("160 kg")
         expect(page.locator("#aboard")).to_contain_text("weighed 60 s ago")
@@ -243,6 +248,7 @@ def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path
     [
         (WAKE_LOCK, "The screen stays on."),
         (NO_WAKE_LOCK, "this browser cannot keep it on"),
+        (f"{NO_WAKE_LOCK}; {INSECURE}", "browsers keep it on over HTTPS only"),
         (REFUSED, "it refused to keep it on"),
     ],
 )

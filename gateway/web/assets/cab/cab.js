@@ -1,7 +1,7 @@
 // The cab page: asks one small question every few seconds and shows the answer, its age, and what it does not know.
 
 import { stayAwake } from "/assets/cab/wake-lock.js";
-import { aboard, about, alarmText, eventText, lightText, notSeen, ownReading, question, roomText } from "/assets/cab/sentences.js";
+import { aboard, about, alarmText, eventText, lightText, notSeen, ownReading, question, roomText, stood } from "/assets/cab/sentences.js";
 import { Refused, ask, setToken } from "/assets/dashboard/gateway.js";
 import { element, made, pair, say, write } from "/assets/dashboard/page.js";
 import { duration, number } from "/assets/dashboard/words.js";
@@ -38,17 +38,21 @@ async function askNow() {
   draw();
 }
 
-/** What must be said before anything else; empty while all is well. */
+/** What must be said before anything else, and what of it grows from second to second: a screen reader need not. */
 function alarm(silentS) {
-  if (isRefused) return "The gateway wants a token.";
-  if (silentS > GONE_AFTER_S) {
-    const since = cab ? " What is shown is the last it said." : "";
-    return `No answer from the gateway for ${duration(silentS)}.${since}`;
-  }
-  if (cab === null) return "";
-  if (cab.is_stale) return `Old: weighed ${duration(cab.age_s + silentS)} ago.`;
-  if (cab.state === "sensor_fault" || cab.state === "reader_fault") return "A sensor or the bus is not heard: nothing new is weighed.";
-  return "";
+  if (isRefused) return ["The gateway wants a token.", ""];
+  if (silentS > GONE_AFTER_S) return [`The gateway does not answer.${cab ? " What is shown is the last it said." : ""}`, `For ${duration(silentS)} now.`];
+  if (cab === null) return ["", ""];
+  if (cab.is_stale) return ["These numbers are old.", `Weighed ${duration(cab.age_s + silentS)} ago.`];
+  if (cab.state === "sensor_fault" || cab.state === "reader_fault") return ["A sensor or the bus is not heard: nothing new is weighed.", ""];
+  return ["", ""];
+}
+
+/** Two texts in a place, or none of it where both are empty. */
+function sayBoth(id, [first, one], [second, other]) {
+  write(first, one);
+  write(second, other);
+  element(id).hidden = one + other === "";
 }
 
 function validity(silentS) {
@@ -65,7 +69,8 @@ function writeNumber(kg) {
 
 function draw() {
   const silentS = secondsSince(heard ?? opened);
-  say("bar", alarm(silentS));
+  const [alarmed, howLong] = alarm(silentS);
+  sayBoth("bar", ["bar-what", alarmed], ["bar-how-long", howLong]);
   element("token").hidden = !isRefused;
   element("main").hidden = isRefused;
   element("main").dataset.is = validity(silentS);
@@ -74,7 +79,7 @@ function draw() {
   const isCurrent = validity(silentS) === "current";
   const [asked, kg, likely] = question(cab, isCurrent);
   write("vehicle", cab.vehicle_id ?? "");
-  say("not-seen", notSeen(cab, silentS));
+  sayBoth("not-seen", ["stood", stood(cab, silentS)], ["not-seen-what", notSeen(cab)]);
   write("light", lightText(cab, isCurrent));
   write("about", about(cab));
   write("question", asked);

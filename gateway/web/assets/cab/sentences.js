@@ -67,11 +67,8 @@ function whyNot(cab) {
 export const roomText = (room) => [capital(placeName(room.place)), room.kg < 0 ? `${figure(-room.kg, 0, "kg")} too much` : `${figure(room.kg, 0, "kg")} left`];
 
 /** What nobody can see now; empty where what was weighed is what is aboard. */
-export function notSeen(cab, silentS) {
-  if (cab.load === "standing") {
-    const loaded = cab.t_end === null ? "" : ` Weighed last at ${hour(cab.t_end)}.`;
-    return `Standing for ${duration(cab.stood_s + silentS)}.${loaded} What is loaded or unloaded now is not seen.`;
-  }
+export function notSeen(cab) {
+  if (cab.load === "standing") return `Weighed last at ${hour(cab.t_end)}. What is loaded or unloaded now is not seen.`;
   if (cab.load === "not_weighed_yet") return "The load may have changed at the last stop. These numbers are of before it; the new load is weighed after some minutes of driving.";
   return "";
 }
@@ -88,6 +85,8 @@ export function alarmText(cab) {
   const [sure, early] = [told("final"), told("early")];
   return [sure.length ? `Alarm: ${sure.join(", ")}.` : "", early.length ? `First sign: ${early.join(", ")}.` : ""].filter(Boolean).join(" ");
 }
+
+export const stood = (cab, silentS) => (cab.load === "standing" ? `Standing for ${duration(cab.stood_s + silentS)}.` : "");
 
 export function aboard(cab, ageS) {
   if (cab.payload_kg === null) return "";
