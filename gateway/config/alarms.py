@@ -7,7 +7,14 @@ from urllib.parse import urlsplit
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from gateway.config.sections import Section
-from gateway.core.alarms import CAUSE_NAMES, AlarmRules
+
+CAUSE_NAMES: Final = (  # those of core.alarms, which loads too much for this
+    *("overload", "imbalance", "sensor_fault", "drift", "no_estimate"),
+    *("overload.gross", "overload.front_axle", "overload.rear_axle"),
+    *("overload.front_left", "overload.front_right", "overload.rear_left", "overload.rear_right"),
+    *("imbalance.left_right", "imbalance.front_rear", "sensor_fault.silent", "sensor_fault.refused"),
+    *("drift.damper_front", "drift.damper_rear", "drift.delay", "drift.zero"),
+)
 
 
 def _of_a_cause(name: str) -> str:
@@ -55,11 +62,6 @@ class AlarmsSection(Section):
         if self.sensor_silent_final_s < self.sensor_silent_s:
             raise ValueError("sensor_silent_final_s must not be below sensor_silent_s")
         return self
-
-    def for_core(self) -> AlarmRules:
-        """The same settings for the core."""
-        chosen = self.model_dump(exclude={"no_estimate_min"})
-        return AlarmRules(**chosen, no_estimate_s=60.0 * self.no_estimate_min)
 
 
 _LOCAL: Final = frozenset({"127.0.0.1", "::1", "localhost"})

@@ -13,7 +13,7 @@ from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
-from gateway.service.alarm_desk import AlarmDesk
+from gateway.service.alarm_desk import AlarmDesk, rules_of
 from gateway.service.changes import BatchLog, StateLog, told_in_turn
 from gateway.service.day_book import DayBook
 from gateway.service.last_good import keep_copy
@@ -99,7 +99,7 @@ class Gateway:
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
         subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
-        self.alarms = AlarmDesk(settings.alarms.for_core(), subject, self.store, self.board)
+        self.alarms = AlarmDesk(rules_of(settings.alarms), subject, self.store, self.board)
         self.pipeline = Pipeline(
             self.source.inbox,
             Decoder(setup.signal_map),

@@ -11,10 +11,12 @@ from support.days import batch
 from support.patience import PATIENCE_S
 
 from gateway.calibration.trend import Point, Trend
-from gateway.core.alarms import AlarmRules
+from gateway.config import alarms as settings
+from gateway.core.alarms import CAUSE_NAMES, AlarmRules
 from gateway.core.events import Rules
 from gateway.errors import AlarmRefusedError
 from gateway.records import Why
+from gateway.service.alarm_desk import rules_of
 from gateway.service.day_book import ledger_of
 from gateway.status import State, Status
 
@@ -138,3 +140,14 @@ def test_an_alarm_that_cannot_be_read_keeps_no_other_from_being_remembered(bench
     bench.store.write_entry("alarm", "alarm-1-a", 1, text)
     bench.restart()
     assert [alarm["where"] for alarm in bench.standing()] == ["gross"]
+
+
+def test_settings_are_the_cores() -> None:
+    """Names and defaults stand in both: settings are read where the core would load too much."""
+    assert set(settings.CAUSE_NAMES) == set(CAUSE_NAMES)
+    assert rules_of(settings.AlarmsSection()) == AlarmRules()
+
+
+def test_an_alarm_that_there_is_not_cannot_be_switched_off() -> None:
+    with pytest.raises(ValueError, match="is no alarm; there are overload, "):
+        settings.AlarmsSection(off=("overlaod",))

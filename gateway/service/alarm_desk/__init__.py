@@ -1,6 +1,6 @@
 """Alarms in the running service: what batches and the service's own state say, stored, shown, logged, acknowledged."""
 
 from gateway.service.alarm_desk.conditions import Silence, drift_says
-from gateway.service.alarm_desk.desk import AlarmDesk
+from gateway.service.alarm_desk.desk import AlarmDesk, rules_of
 
-__all__ = ["AlarmDesk", "Silence", "drift_says"]
+__all__ = ["AlarmDesk", "Silence", "drift_says", "rules_of"]

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 from gateway.calibration.trend import Trend
+from gateway.config.alarms import AlarmsSection
 from gateway.core.alarms import (
     ENTRY_KIND,
     Alarm,
@@ -38,6 +39,12 @@ _EVENTS: Final = {
     AlarmState.FINAL: (Event.ALARM_FINAL, logging.WARNING),
     AlarmState.CLEARED: (Event.ALARM_CLEARED, logging.INFO),
 }
+
+
+def rules_of(section: AlarmsSection) -> AlarmRules:
+    """The settings as the core has them."""
+    chosen = section.model_dump(exclude={"no_estimate_min"})
+    return AlarmRules(**chosen, no_estimate_s=60.0 * section.no_estimate_min)
 
 
 class AlarmDesk:
