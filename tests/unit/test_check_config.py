@@ -33,6 +33,12 @@ def test_a_sound_configuration_is_good(tmp_path: Path) -> None:
         ({"bus": 'interface = "udp_multicast"\nchannel = "239.0.0.1"'}, "needs the Python package msgpack"),
         ({"web": 'host = "0.0.0.0"'}, "springscale token create NAME --config"),
         ({"web": "stale_after_s = 200.0"}, "stale_after_s = 200 is below [batch] window_s = 300"),
+        ({"alarms": 'off = ["overlaod"]'}, "is no alarm; there are overload, imbalance, "),
+        ({"webhook": 'url = "https://fleet.example/hook"'}, "url needs secret_file"),
+        (
+            {"webhook": 'url = "http://fleet.example/hook"\nsecret_file = "none"'},
+            "would cross the network in the clear",
+        ),
     ],
 )
 def test_what_cannot_run_is_not_called_good(
