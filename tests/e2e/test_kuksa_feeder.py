@@ -1,0 +1,172 @@
+"""deploy/kuksa/feeder.py from a real service into a small databroker, made of the stubs that its client comes with."""
+
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import grpc
+import pytest
+import yaml
+from kuksa.val.v1 import types_pb2 as types_v1
+from kuksa.val.v1 import val_pb2 as v1
+from kuksa.val.v1 import val_pb2_grpc as v1_grpc
+from kuksa.val.v2 import val_pb2 as v2
+from kuksa.val.v2 import val_pb2_grpc as v2_grpc
+from support.estimates import make_estimate
+from support.patience import PATIENCE_S, wait_until
+from support.ports import free_port
+from support.web import Gateway, serving
+
+ROOT = Path(__file__).parents[2]
+OVERLAY = {
+    path: node
+    for path, node in yaml.safe_load((ROOT / "docs/vss/springscale.vspec").read_text()).items()
+    if node["type"] != "branch"
+}
+CORE = ("Vehicle.CurrentOverallWeight", "Vehicle.CurbWeight", "Vehicle.GrossWeight")
+PAYLOAD = "Vehicle.Load.Payload"
+
+
+class Metadata(v1_grpc.VALServicer):
+    """kuksa.val.v1, which the client asks for the types of paths: 404 for those that nobody loaded."""
+
+    def __init__(self, paths: list[str]) -> None:
+        self._paths = paths
+
+    def Get(self, request: Any, _context: Any) -> Any:
+        answer = v1.GetResponse()
+        for asked in request.entries:
+            if asked.path not in self._paths:
+                answer.error.CopyFrom(types_v1.Error(code=404, reason="not_found"))
+                return answer
+            kind = "DATA_TYPE_UINT16" if asked.path in CORE else "DATA_TYPE_FLOAT"
+            metadata = types_v1.Metadata(data_type=types_v1.DataType.Value(kind))
+            answer.entries.append(types_v1.DataEntry(path=asked.path, metadata=metadata))
+        return answer
+
+    def GetServerInfo(self, _request: Any, _context: Any) -> Any:
+        return v1.GetServerInfoResponse(name="databroker", version="0.0.0")
+
+
+class Databroker(v2_grpc.VALServicer):
+    """kuksa.val.v2, which takes values; ``now`` has what it would tell a reader, None for not available."""
+
+    def __init__(self, port: int, paths: list[str]) -> None:
+        self.port = port
+        self.now: dict[str, float | int | None] = {}
+        self.published: list[str] = []
+        self._metadata = Metadata(paths)
+        self.start()
+
+    def start(self) -> None:
+        self._server = grpc.server(ThreadPoolExecutor(2))
+        v1_grpc.add_VALServicer_to_server(self._metadata, self._server)
+        v2_grpc.add_VALServicer_to_server(self, self._server)
+        assert self._server.add_insecure_port(f"127.0.0.1:{self.port}") == self.port
+        self._server.start()
+
+    def stop(self) -> None:
+        self._server.stop(None).wait()
+        self.now = {}
+
+    def PublishValue(self, request: Any, _context: Any) -> Any:
+        told = request.data_point.value
+        kind = told.WhichOneof("typed_value")
+        self.now[request.signal_id.path] = getattr(told, kind) if kind else None
+        self.published.append(request.signal_id.path)
+        return v2.PublishValueResponse()
+
+
+@contextmanager
+def databroker(paths: list[str]) -> Iterator[Databroker]:
+    broker = Databroker(free_port(), paths)
+    try:
+        yield broker
+    finally:
+        broker.stop()
+
+
+@contextmanager
+def feeding(url: str, port: int, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    options = ["--url", url, "--databroker", f"127.0.0.1:{port}", "--every-s", "0.1"]
+    with log.open("wb") as said:
+        feeder = subprocess.Popen([sys.executable, ROOT / "deploy/kuksa/feeder.py", *options], stderr=said)
+    try:
+        yield feeder
+    finally:
+        feeder.terminate()
+        assert feeder.wait(PATIENCE_S) == 0, log.read_text()
+
+
+@pytest.fixture
+def gateway(tmp_path: Path) -> Iterator[Gateway]:
+    with Gateway(tmp_path / "state") as opened:
+        yield opened
+
+
+def test_weights_reach_the_databroker_and_what_is_old_becomes_not_available(tmp_path: Path, gateway: Gateway) -> None:
+    with (
+        databroker([*CORE, *OVERLAY]) as broker,
+        serving(gateway.app) as service,
+        feeding(service.url, broker.port, tmp_path / "log"),
+    ):
+        assert wait_until(lambda: broker.now.get(PAYLOAD, 0) is None)  # nothing was weighed yet
+        gateway.publish(make_estimate(3))
+        assert wait_until(lambda: broker.now[PAYLOAD] == 103.0)
+        assert set(broker.now) == {*CORE, *OVERLAY}
+        gateway.clock_s += 3600.0
+        assert wait_until(lambda: broker.now[PAYLOAD] is None)
+        time.sleep(0.5)  # some more rounds
+    times = Counter(broker.published)
+    assert times[PAYLOAD] == 3  # unknown, known, too old: only news is published
+    assert times["Vehicle.CurbWeight"] == 1  # which does not age
+    assert (tmp_path / "log").read_text() == ""
+
+
+def test_a_databroker_that_comes_back_is_told_all_again(tmp_path: Path, gateway: Gateway) -> None:
+    gateway.publish(make_estimate(3))
+    with (
+        databroker([*CORE, *OVERLAY]) as broker,
+        serving(gateway.app) as service,
+        feeding(service.url, broker.port, tmp_path / "log"),
+    ):
+        assert wait_until(lambda: broker.now.get(PAYLOAD) == 103.0)
+        broker.stop()
+        gateway.publish(make_estimate(4))
+        assert wait_until(lambda: str(broker.port) in (tmp_path / "log").read_text())
+        broker.start()
+        assert wait_until(lambda: broker.now.get(PAYLOAD) == 104.0)
+
+
+def test_without_the_overlay_the_core_is_fed_and_the_rest_is_told_once(tmp_path: Path, gateway: Gateway) -> None:
+    gateway.publish(make_estimate(3))
+    with (
+        databroker([*CORE]) as broker,
+        serving(gateway.app) as service,
+        feeding(service.url, broker.port, tmp_path / "log"),
+    ):
+        assert wait_until(lambda: set(broker.now) == set(CORE))
+        gateway.publish(make_estimate(4))
+    (line,) = (tmp_path / "log").read_text().splitlines()
+    assert PAYLOAD in line
+    assert "load docs/vss/springscale.vspec" in line
+    assert not any(path in line for path in CORE)
+
+
+def test_a_service_that_goes_away_leaves_nothing_that_looks_known(tmp_path: Path, gateway: Gateway) -> None:
+    gateway.publish(make_estimate(3))
+    with (
+        databroker([*CORE, *OVERLAY]) as broker,
+        serving(gateway.app) as service,
+        feeding(service.url, broker.port, tmp_path / "log"),
+    ):
+        assert wait_until(lambda: broker.now.get(PAYLOAD) == 103.0)
+        service.uvicorn.should_exit = True
+        assert wait_until(lambda: broker.now[PAYLOAD] is None)
+    assert "does not answer" in (tmp_path / "log").read_text()
