@@ -45,6 +45,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
         raise ConfigurationError("\n".join(f"{config}: {fault}" for fault in faults))
     forwarding = uplink_settings(settings.uplink, settings.vehicle)
     pushing = webhook_settings(settings.webhook, settings.vehicle)
+    sends_on = settings.broadcast.channel  # None with its interface
     summary = {
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
@@ -56,12 +57,15 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
         "trusted_keys": [key.fingerprint for key in trust.keys],
         "limits": limits_in_force(setup),
         "uplink": forwarding.broker if forwarding else None,
+        "broadcast": sends_on,
         "webhook": pushing.receiver if pushing else None,
     }
     if as_json:
         click.echo(json_line(summary))
         return
     click.echo(f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {settings.bus.channel}.")
+    if sends_on is not None:
+        click.echo(f"Sends weights on {sends_on}, which must not be the bus of {settings.bus.channel} by another name.")
     if trust.keys:
         click.echo(f"Its files are signed as required, by {' or '.join(key.fingerprint for key in trust.keys)}.")
     if setup.calibration is None:

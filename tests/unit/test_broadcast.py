@@ -1,6 +1,7 @@
 """Weights as J1939 frames on a bus of their own; on the bus that is listened to nothing is ever sent."""
 
 import ast
+import json
 import math
 import time
 from dataclasses import replace
@@ -164,6 +165,18 @@ def test_check_config_refuses_what_could_disturb(broadcast: str, words: str, tmp
     found = CliRunner().invoke(springscale, ["check-config", str(path)])
     assert isinstance(found.exception, ConfigurationError)
     assert words in str(found.exception)
+
+
+def test_check_config_says_where_weights_are_sent(tmp_path: Path) -> None:
+    path = tmp_path / "springscale.toml"
+    path.write_text(
+        'signals = "springscale:reference"\n[bus]\ninterface = "virtual"\nchannel = "x"\n[web]\nport = 0\n'
+        '[store]\ndirectory = "state"\n'
+        '[broadcast]\ninterface = "virtual"\nchannel = "y"\nsource_address = 66\n'
+    )
+    assert "Sends weights on y" in CliRunner().invoke(springscale, ["check-config", str(path)]).output
+    told = CliRunner().invoke(springscale, ["check-config", str(path), "--json"]).output
+    assert json.loads(told)["broadcast"] == "y"
 
 
 SENDING = {"send", "sendall", "sendto", "sendmsg", "send_periodic"}
