@@ -1,8 +1,9 @@
-"""The real service with a limit of its own settings: what it stores, tells the cab and writes to its log."""
+"""The real service with a limit of its own settings: what it stores, tells a phone in the cab and writes to its log."""
 
 import asyncio
 import logging
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from gateway.bus.signals import shipped_map
 from gateway.bus.sink import replay
 from gateway.config import load_settings
 from gateway.log import LOGGER
+from gateway.records import Frames
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
 
@@ -59,48 +61,99 @@ def config(tmp_path: Path) -> Path:
     return path
 
 
-def told_after(config: Path, log: Path) -> dict[str, Any]:
-    """The cab's answer, the record and the metrics of a running service that heard the log."""
+class Cab:
+    """A running service, and a phone that asks it after each log that it heard."""
+
+    def __init__(self, gateway: Gateway, channel: str, folder: Path) -> None:
+        self._gateway, self._channel, self._folder = gateway, channel, folder
+        self._n_frames = 0
+
+    def get(self, path: str = "/api/v1/cab") -> Any:
+        answer = httpx.get(f"{self._gateway.url}{path}")
+        return answer.text if path == "/metrics" else answer.json()
+
+    def after(self, frames: Frames) -> Any:
+        """What the cab is told once the service has worked through these."""
+        log = self._folder / "drive.log"
+        write_candump(frames, "can0", log)
+        self._n_frames += replay(log, "virtual", self._channel, speed="max").frames
+        assert wait_until(
+            lambda: self._gateway.source.counts().frames >= self._n_frames and self._gateway.has_caught_up
+        )
+        return self.get()
+
+
+def with_service(config: Path, play: Callable[[Cab], None]) -> None:
+    """Runs the service while ``play`` plays; what that raises fails the test."""
     settings = load_settings(config)
-    told: dict[str, Any] = {}
+    faults: list[BaseException] = []
 
     def on_started(gateway: Gateway) -> None:
         loop = asyncio.get_running_loop()
 
-        def play() -> None:
+        def run() -> None:
             try:
-                told["cab before"] = httpx.get(f"{gateway.url}/api/v1/cab").json()
-                report = replay(log, "virtual", settings.bus.channel, speed="max")
-                assert wait_until(lambda: gateway.source.counts().frames >= report.frames and gateway.has_caught_up)
-                told["cab"] = httpx.get(f"{gateway.url}/api/v1/cab").json()
-                told["record"] = httpx.get(f"{gateway.url}/api/v1/estimates").json()["items"][-1]
-                told["metrics"] = httpx.get(f"{gateway.url}/metrics").text
+                play(Cab(gateway, settings.bus.channel, config.parent))
+            except BaseException as fault:  # noqa: BLE001 - raised again below, in the test's own thread
+                faults.append(fault)
             finally:
                 loop.call_soon_threadsafe(gateway.request_stop)
 
-        threading.Thread(target=play, daemon=True).start()
+        threading.Thread(target=run, daemon=True).start()
 
     Gateway(settings, setup_of(settings), on_started=on_started).run()
-    return told
+    for fault in faults:
+        raise fault
 
 
 def test_an_overload_by_the_settings_is_told_everywhere(config: Path, caplog: pytest.LogCaptureFixture) -> None:
-    log = config.parent / "drive.log"
-    write_candump(white_noise(45.0, START_NS, seed=3), "can0", log)
     caplog.set_level(logging.INFO, logger=LOGGER.name)
-    told = told_after(config, log)
-    assert (told["cab before"]["load"], told["cab before"]["light"]) == ("never_weighed", "unknown")
-    cab = told["cab"]
-    assert (cab["light"], cab["light_about"], cab["load"]) == ("over", ["gross"], "weighed")
-    assert [(room["place"], room["kg"]) for room in cab["room"]] == [("gross", -50.0), ("rear_axle", 171.2)]
-    [reading] = cab["own_readings"]
-    assert (reading["signal"], reading["unit"]) == ("axle_weight", "kg")
-    weights = told["record"]["weights"]
-    assert (weights["gross"]["kg"], weights["gross"]["limit_kg"], weights["gross"]["is_over_limit"]) == (
-        1600.0,
-        1550.0,
-        True,
-    )
-    assert weights["rear_axle"]["limit_kg"] == 1000.0
-    assert 'springscale_overload{where="gross"} 1.0' in told["metrics"]
+
+    def play(cab: Cab) -> None:
+        before = cab.get()
+        assert (before["load"], before["light"]) == ("never_weighed", "unknown")
+        told = cab.after(white_noise(45.0, START_NS, seed=3))
+        assert (told["light"], told["light_about"], told["load"]) == ("over", ["gross"], "weighed")
+        assert [(room["place"], room["kg"]) for room in told["room"]] == [("gross", -50.0), ("rear_axle", 171.2)]
+        [reading] = told["own_readings"]
+        assert (reading["signal"], reading["unit"]) == ("axle_weight", "kg")
+        weights = cab.get("/api/v1/estimates")["items"][-1]["weights"]
+        assert {**weights["gross"], "std_kg": None} == {
+            "kg": 1600.0,
+            "std_kg": None,
+            "limit_kg": 1550.0,
+            "is_over_limit": True,
+            "lacks": None,
+            "is_unsprung_estimated": False,
+        }
+        assert weights["rear_axle"]["limit_kg"] == 1000.0
+        assert 'springscale_overload{where="gross"} 1.0' in cab.get("/metrics")
+
+    with_service(config, play)
     assert "overload begins" in caplog.text
+
+
+def test_a_stop_makes_the_load_unknown_until_it_is_weighed_again(config: Path) -> None:
+    def play(cab: Cab) -> None:
+        t_s = 0.0
+
+        def goes_on(for_s: float, speed_mps: float = 15.0) -> Any:
+            nonlocal t_s
+            start_ns, t_s = START_NS + round(t_s * 1e9), t_s + for_s
+            return cab.after(white_noise(for_s, start_ns, seed=3, speed_mps=speed_mps))
+
+        driven = goes_on(45.0)
+        assert (driven["load"], driven["stood_s"]) == ("weighed", None)
+        weighed_at = driven["t_end"]
+        assert goes_on(5.0, 0.0)["load"] == "weighed"  # a red light
+        standing = goes_on(70.0, 0.0)
+        assert standing["load"] == "standing"
+        assert standing["stood_s"] == pytest.approx(75.0, abs=1.0)
+        assert standing["room"] == driven["room"]  # as it was weighed last
+        on_the_way = goes_on(5.0)
+        assert (on_the_way["load"], on_the_way["t_end"]) == ("not_weighed_yet", weighed_at)
+        again = goes_on(45.0)
+        assert again["load"] == "weighed"
+        assert again["t_end"] > weighed_at
+
+    with_service(config, play)

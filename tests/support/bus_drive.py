@@ -27,7 +27,7 @@ def bus_drive(duration_s: float, seed: int, signals: str = "springscale:referenc
     )
 
 
-def white_noise(duration_s: float, start_ns: int, seed: int) -> Frames:
+def white_noise(duration_s: float, start_ns: int, seed: int, speed_mps: float = 15.0) -> Frames:
     """White noise on both sensors at 15 m/s: enough for a regression that always answers the same."""
     rng = np.random.default_rng(seed)
     n = round(100 * duration_s)
@@ -39,6 +39,6 @@ def white_noise(duration_s: float, start_ns: int, seed: int) -> Frames:
         {
             Signal.VERTICAL_ACCELERATION: 9.81 + 0.5 * rng.standard_normal(n),
             Signal.PITCH_RATE: 0.02 * rng.standard_normal(n),
-            Signal.SPEED: 15.0 + 0.1 * rng.standard_normal(len(gps_ns)),
+            Signal.SPEED: np.maximum(0.0, speed_mps + 0.1 * rng.standard_normal(len(gps_ns))),
         },
     )
