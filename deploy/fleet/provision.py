@@ -96,6 +96,7 @@ def _configuration(shared: str, own: dict[str, str], vehicle: dict[str, str], br
         f"username = {json.dumps(vehicle['id'])}",
         'password_file = "broker-password"',
         f"repeat_s = {REPEAT_S}",
+        "wait_for_listener = true",
     ]
     return "\n".join([*top, shared.rstrip(), "", "[vehicle]", *lines, "", "[uplink]", *uplink, ""])
 

@@ -31,6 +31,11 @@ class UplinkSection(Section):
         description="after a break, what was delivered in the last so many seconds before it is sent again: more than "
         "the broker forgets when it is killed",
     )
+    wait_for_listener: bool = Field(
+        False,
+        description="a record that the broker takes though nobody subscribes to it, as MQTT 5 lets it say, stays "
+        "here and is tried again",
+    )
     home_assistant: str | None = Field(
         None,
         min_length=1,

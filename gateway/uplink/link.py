@@ -36,6 +36,7 @@ class Answer:
 
 _TOO_LARGE: Final = 0x95  # MQTT 5, table 2-6
 _HOPELESS: Final = frozenset({_TOO_LARGE, 0x99})  # and payload format invalid
+_NOBODY: Final = 0x10  # no matching subscribers: taken, and forgotten at once
 _NOTHING: Final = 0  # no packet has this number
 
 # mosquitto answers a message over its limit with 0x95, which MQTT 5 has not among those of PUBACK, and so neither paho
@@ -176,7 +177,8 @@ class MqttLink:
     def _answer(self, mid: int, code: ReasonCode) -> None:
         if mid == self._under_way:
             self._under_way = _NOTHING
-        self._answers.append(Answer(mid, not code.is_failure, code.value in _HOPELESS, str(code)))
+        is_in_vain = self._settings.wait_for_listener and code.value == _NOBODY
+        self._answers.append(Answer(mid, not code.is_failure and not is_in_vain, code.value in _HOPELESS, str(code)))
 
 
 def _properties(packet: int, fields: Mapping[str, Any]) -> Properties:

@@ -34,6 +34,7 @@ class UplinkSettings:
     keep_alive_s: int = 60
     back_off_max_s: float = 300.0
     repeat_s: float = 0.0
+    wait_for_listener: bool = False
     home_assistant: str | None = None
 
     @property
@@ -91,6 +92,7 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
         keep_alive_s=section.keep_alive_s,
         back_off_max_s=section.back_off_max_s,
         repeat_s=section.repeat_s,
+        wait_for_listener=section.wait_for_listener,
         home_assistant=section.home_assistant,
     )
     if any(character in (section.home_assistant or "") for character in "+#\0"):

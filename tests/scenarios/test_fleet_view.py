@@ -29,6 +29,19 @@ def drive(view: FleetView, n: int) -> None:
         vehicle.drive(n)
 
 
+UNREADABLE = (
+    ("estimates", b"no JSON \0"),
+    ("estimates", b"[]"),
+    ("estimates", b"{}"),
+    ("estimates", b'{"id": "a\\u0000", "t_start": "2026-01-01T00:00:00Z", "t_end": "2026-01-01T00:05:00Z"}'),
+    ("estimates", b'{"id": "a", "t_start": "soon", "t_end": "2026-01-01T00:05:00Z", "rejected": []}'),
+    ("events", b'{"id": "event-1-a", "revision": "one"}'),
+    ("elsewhere", b"{}"),
+    ("trips", b"[" * 100_000),
+)
+"""Branch and payload of what nobody can read."""
+
+
 def queries() -> Iterator[tuple[str, str]]:
     """Title and SQL of each panel, as Grafana would send it with every vehicle chosen, over a week."""
     board = json.loads((FLEET / "grafana/dashboards/fleet.json").read_text())
@@ -95,17 +108,32 @@ def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: Fleet
     client.subscribe("springscale/#", qos=1)
     client.loop_start()
     forged = client.publish(f"springscale/{another.id}/estimates", b"{}", qos=1).mid
-    broken = client.publish(f"springscale/{one.id}/estimates", b"no JSON \0", qos=1).mid
-    assert wait_until(lambda: {forged, broken} <= set(answers))
+    broken = [client.publish(f"springscale/{one.id}/{branch}", payload, qos=1).mid for branch, payload in UNREADABLE]
+    assert wait_until(lambda: {forged, *broken} <= set(answers))
     client.disconnect()
     client.loop_stop()
-    assert (answers[forged], answers[broken], heard) == ("Not authorized", "Success", [])
-    assert wait_until(lambda: view.count("unreadable") == 1)
+    assert (answers[forged], {answers[mid] for mid in broken}, heard) == ("Not authorized", {"Success"}, [])
+    assert wait_until(lambda: view.count("unreadable") == len(UNREADABLE))
     with view.database.connect() as connection:
-        (row,) = connection.execute("DELETE FROM unreadable RETURNING topic, fault, payload").fetchall()
-    assert row[0] == f"springscale/{one.id}/estimates"
-    assert "JSONDecodeError" in str(row[1])
-    assert row[2] == b"no JSON \0"
+        rows = connection.execute("DELETE FROM unreadable RETURNING topic, payload").fetchall()
+    assert rows == [(f"springscale/{one.id}/{branch}", payload) for branch, payload in UNREADABLE]
+    drive(view, 5)
+    settled(view)
+
+
+def test_a_broker_that_lost_its_memory_gets_nothing_before_somebody_listens(view: FleetView) -> None:
+    """A new disk: no session, no subscriber yet. What it would drop stays in the vehicles."""
+    view.subscriber.stop()
+    view.broker.kill()
+    view.broker.forget()
+    view.broker.start()
+    drive(view, 10)
+    n_before = view.count("estimate")
+    for vehicle in view.vehicles:
+        assert wait_until(lambda told=vehicle.uplink: "No matching subscribers" in (told.report().last_fault or ""))
+    view.subscriber.start()
+    settled(view)
+    assert view.count("estimate") == n_before + 10 * len(view.vehicles)
 
 
 def test_a_killed_subscriber_costs_nothing(view: FleetView) -> None:

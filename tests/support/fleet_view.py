@@ -99,6 +99,10 @@ class FleetBroker:
             self._process.wait(PATIENCE_S)
             self._process = None
 
+    def forget(self) -> None:
+        """As after a new disk."""
+        (self._folder / "mosquitto.db").unlink(missing_ok=True)
+
 
 class Subscriber:
     """deploy/fleet/subscriber/subscriber.py as a process."""
