@@ -157,6 +157,14 @@ def test_rejected_batches_count_for_nothing_but_are_looked_at(driving: Bench) ->
     }
 
 
+def test_the_rest_of_a_drive_that_was_too_short_for_a_window_shows_no_fault(bench: Bench) -> None:
+    in_steps(bench, until="empty")
+    bench.drive(0, 70, Why.TOO_SHORT, Why.GAP)
+    assert bench.worker.jobs == []
+    bench.desk.is_empty("workshop")
+    assert underway(bench)["step"] == "drive"
+
+
 def test_a_fault_keeps_the_vehicle_from_being_called_empty_until_it_is_mended(bench: Bench) -> None:
     in_steps(bench, until="empty")
     bench.drive(0, 60, is_provisional=True)

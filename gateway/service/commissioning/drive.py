@@ -11,6 +11,7 @@ from gateway.calibration.file import load_calibration
 from gateway.calibration.kept import KeptBatch, Shelf, packed
 from gateway.errors import CalibrationFileError, CommissioningRefusedError
 from gateway.log import Event
+from gateway.records import Why
 from gateway.service.commissioning.book import Book
 from gateway.service.commissioning.jobs import BatchFile, Jobs
 from gateway.service.commissioning.record import LineChoice, Made, Underway, save_record
@@ -91,7 +92,9 @@ class EmptyDrive:
                 return
             if has_grown:
                 self.fit()
-            elif not self._worker.is_busy:
+            elif (
+                not self._worker.is_busy and Why.TOO_SHORT not in batch.rejected
+            ):  # where a drive ended: no fault of it
                 self._look(kept)
 
     def _take_up(self) -> None:
