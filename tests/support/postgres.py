@@ -25,16 +25,25 @@ def _binaries() -> Path | None:
 BINARIES = _binaries()
 needs_postgres = pytest.mark.skipif(BINARIES is None, reason="postgresql is not installed")
 
+OWNER = "springscale-subscriber"
+ADMINISTRATOR = {"user": "postgres", "dbname": "postgres"}
+
 
 class Postgres:
-    """Without a network; ``environment`` leads libpq to it. ``stop`` and ``start`` as an administrator would."""
+    """Without a network, with a database and its owner as docs/fleet.md has them made; ``environment`` leads there.
+
+    ``stop`` and ``start`` as an administrator would.
+    """
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._process: subprocess.Popen[bytes] | None = None
-        self.environment = {"PGHOST": str(directory), "PGUSER": "fleet", "PGDATABASE": "postgres"}
-        self._run("initdb", "--auth=trust", "--username=fleet", "--encoding=UTF8", "--no-sync", "-D", self._cluster)
+        self.environment = {"PGHOST": str(directory), "PGUSER": OWNER, "PGDATABASE": "fleet"}
+        self._run("initdb", "--auth=trust", "--username=postgres", "--encoding=UTF8", "--no-sync", "-D", self._cluster)
         self.start()
+        with self.connect(**ADMINISTRATOR) as connection:
+            connection.execute(f'CREATE ROLE "{OWNER}" LOGIN CREATEROLE')
+            connection.execute(f'CREATE DATABASE fleet OWNER "{OWNER}"')
 
     @property
     def _cluster(self) -> str:
@@ -67,11 +76,11 @@ class Postgres:
             self._process = None
 
     def connect(self, **changed: str) -> "psycopg.Connection[tuple[object, ...]]":
-        asked = {"host": str(self._directory), "user": "fleet", "dbname": "postgres", "autocommit": True, **changed}
+        asked = {"host": str(self._directory), "user": OWNER, "dbname": "fleet", "autocommit": True, **changed}
         return psycopg.connect(**asked)
 
     def _answers(self) -> bool:
-        with contextlib.suppress(psycopg.OperationalError), self.connect():
+        with contextlib.suppress(psycopg.OperationalError), self.connect(**ADMINISTRATOR):
             return True
         return False
 
