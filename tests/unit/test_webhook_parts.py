@@ -2,7 +2,10 @@
 
 import base64
 import json
+import textwrap
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import ValidationError
@@ -124,3 +127,19 @@ def test_a_vehicle_without_a_name_is_refused(secret_file: Path) -> None:
     section = WebhookSection(url="https://fleet.example/", secret_file=secret_file)
     with pytest.raises(ConfigurationError, match="set \\[vehicle\\] id"):
         webhook_settings(section, VehicleSection())
+
+
+def test_the_check_in_the_document_believes_what_is_signed_and_nothing_else() -> None:
+    page = (Path(__file__).parents[2] / "docs/webhook.md").read_text()
+    block = page[page.index("    import base64") : page.index("**Another secret**")]
+    known: dict[str, Any] = {}
+    exec(textwrap.dedent(block), known)
+    check, now_s, body = known["is_from_our_vehicle"], int(time.time()), b'{"type": "alarm"}'
+    headers = signed(secrets_of(SECRET_TEXT), "alarm-5-a-1", now_s, body)
+    assert check(headers, body, SECRET_TEXT)
+    assert not check(headers, body + b" ", SECRET_TEXT)
+    assert not check({**headers, "webhook-id": "alarm-5-a-2"}, body, SECRET_TEXT)
+    assert not check(headers, body, "whsec_" + base64.b64encode(b"x" * 32).decode())
+    assert not check(signed(secrets_of(SECRET_TEXT), "alarm-5-a-1", now_s - 400, body), body, SECRET_TEXT)
+    older = secrets_of(f"{base64.b64encode(b'x' * 32).decode()}\n{SECRET_TEXT}")
+    assert check(signed(older, "alarm-5-a-1", now_s, body), body, SECRET_TEXT)  # while it is changed
