@@ -18,7 +18,7 @@ from gateway.errors import AlarmRefusedError
 from gateway.records import Why
 from gateway.service.alarm_desk import rules_of
 from gateway.service.day_book import ledger_of
-from gateway.status import State, Status
+from gateway.status import BusStatus, SignalHealth, State, Status
 
 OVER = LIMIT_KG + 60.0
 
@@ -31,7 +31,10 @@ def bench(tmp_path: Path) -> Iterator[AlarmBench]:
 
 
 def status(state: State) -> Status:
-    return Status(version="1", state=state, uptime_s=1.0)
+    """Nothing is heard of the pitch rate; the interface was down."""
+    signals = (SignalHealth(signal="vertical_acceleration", last_age_s=0.1), SignalHealth(signal="pitch_rate"))
+    bus = BusStatus(last_fault="can0 is down")
+    return Status(version="1", state=state, uptime_s=1.0, signals=(*signals, SignalHealth(signal="door")), bus=bus)
 
 
 def test_an_alarm_is_stored_shown_and_logged(bench: AlarmBench, caplog: pytest.LogCaptureFixture) -> None:
@@ -106,8 +109,9 @@ def test_a_silent_sensor_is_told_after_a_while_and_for_sure_later(bench: AlarmBe
     assert look(500.0, State.WAITING_FOR_BUS) == [("silent", "early")]  # asleep: nobody knows
     assert look(600.0, State.SENSOR_FAULT) == [("silent", "early")]  # the time begins anew
     assert look(1200.0, State.READER_FAULT) == [("silent", "final")]
+    assert [step["detail"] for step in bench.history()[0]["steps"]] == ["pitch_rate", "can0 is down"]
     assert look(1201.0, State.ESTIMATING) == []
-    assert bench.history()[0]["sentence"] == "A sensor is silent: The bus cannot be read: see the last fault (over)"
+    assert bench.history()[0]["sentence"] == "Not heard: can0 is down (over)"
 
 
 def test_drift_is_final_at_once_and_judged_only_when_it_was_judged_anew(bench: AlarmBench) -> None:

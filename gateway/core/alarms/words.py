@@ -27,7 +27,7 @@ def _said(alarm: Alarm, figure: Figure) -> str:
         return f"{figure.found:.0f} minutes were driven without an estimate: {_detail(figure) or 'no reason is known'}"
     if cause.kind is AlarmKind.DRIFT:
         return f"{where.replace('_', ' ').capitalize()} drifts: {figure.detail}"
-    said = "A sensor is silent" if where == "silent" else "Batches are refused for a sensor's sake"
+    said = "Not heard" if where == "silent" else "Batches are refused for a sensor's sake"
     return f"{said}: {_detail(figure)}" if figure.detail else said
 
 

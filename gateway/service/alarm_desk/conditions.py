@@ -7,7 +7,8 @@ from typing import Final
 from gateway.calibration.trend import Trend
 from gateway.core.alarms import AlarmRules, Figure, Says, Verdict
 from gateway.core.alarms.alarm import DRIFTING, SILENT
-from gateway.status import SENTENCES, State, Status
+from gateway.service.status import NEEDED_SENSORS
+from gateway.status import State, Status
 
 _AT_FAULT: Final = frozenset({State.SENSOR_FAULT, State.READER_FAULT})
 _HEARD: Final = frozenset({State.WAITING_FOR_SPEED, State.COLLECTING, State.ESTIMATING, State.STALE})
@@ -35,9 +36,16 @@ class Silence:
         if silent_s < self._rules.sensor_silent_s:
             return Says(SILENT, Verdict.HOLD)
         is_sure = silent_s >= self._rules.sensor_silent_final_s
-        return Says(
-            SILENT, Verdict.FINAL if is_sure else Verdict.EARLY, Figure(detail=SENTENCES[status.state].rstrip("."))
-        )
+        verdict = Verdict.FINAL if is_sure else Verdict.EARLY
+        return Says(SILENT, verdict, Figure(detail=what_is_silent(status)))
+
+
+def what_is_silent(status: Status) -> str:
+    """Which needed sensors are not heard; of a bus that cannot be read, why."""
+    if status.state is State.READER_FAULT:
+        return status.bus.last_fault or "the bus cannot be read"
+    silent = [signal.signal for signal in status.signals if signal.is_silent and signal.signal in NEEDED_SENSORS]
+    return " and ".join(silent) or "nobody knows which"
 
 
 def drift_says(trends: Sequence[Trend]) -> Iterator[Says]:
