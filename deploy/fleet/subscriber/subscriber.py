@@ -157,7 +157,7 @@ class Link:
             client.subscribe(f"{self._settings.topic}/#", qos=1)
 
     def _on_message(self, _client: mqtt.Client, _userdata: Any, message: mqtt.MQTTMessage) -> None:
-        self._arrivals.put(Arrival(self._connection, message.mid, message.topic, message.payload))
+        self._arrivals.put(Arrival(self._connection, message.mid, message.topic, bytes(message.payload)))
 
 
 class Book:
