@@ -113,9 +113,14 @@ the options. `--json` prints one object for machines.
 | Azure Blob Storage | `az://CONTAINER/FOLDER` | `AZURE_STORAGE_ACCOUNT_NAME`, `AZURE_STORAGE_ACCOUNT_KEY` |
 
 They are read from the environment of every process, workers' included. `AWS_ENDPOINT_URL` names another server that
-speaks S3's protocol, and `AWS_ALLOW_HTTP=true` lets it do so without TLS. A store must refuse a conditional write where
-something is; these do. Tests run against folders and against S3's protocol; Google and Azure go through the same
-library and were not tried.
+speaks S3's protocol, `AZURE_ENDPOINT` one that speaks Azure's (`http://HOST/ACCOUNT`); for Google's,
+`GOOGLE_SERVICE_ACCOUNT` names a JSON file with `"gcs_base_url"`, and `"disable_oauth": true` where nobody asks for a
+key. `AWS_ALLOW_HTTP=true`, and likewise `AZURE_` and `GOOGLE_`, let them do so without TLS.
+
+A store must refuse a conditional write where something is. Tests run against folders and against S3's protocol. Azure
+was tried by hand against Microsoft's emulator (Azurite), Google against fake-gcs-server: the same bytes as in a folder,
+a second run writes nothing, and the conditional write is refused. That emulator has no upload by the XML protocol that
+obstore speaks, so a small proxy turned each into the JSON one, its condition along; at Google itself it was not tried.
 
 ### On many computers
 
