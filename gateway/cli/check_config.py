@@ -11,6 +11,7 @@ from gateway.config import load_settings
 from gateway.core.weights import Limits
 from gateway.errors import ConfigurationError, UntrustedFileError
 from gateway.records import json_line
+from gateway.service.commissioning import with_commissioned
 from gateway.service.startable import startable_faults
 from gateway.setup import Setup, setup_of
 from gateway.uplink import uplink_settings
@@ -68,8 +69,13 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
         click.echo(f"Sends weights on {sends_on}, which must not be the bus of {settings.bus.channel} by another name.")
     if trust.keys:
         click.echo(f"Its files are signed as required, by {' or '.join(key.fingerprint for key in trust.keys)}.")
-    if setup.calibration is None:
-        click.echo("No calibration is configured: batches will carry spectra and rejected = no_calibration.")
+    if (commissioned := with_commissioned(settings)) is not settings:
+        click.echo(f"What weighs is the calibration that was made on the vehicle: {commissioned.calibration}.")
+    elif setup.calibration is None:
+        click.echo(
+            "No calibration is configured: batches will carry spectra and rejected = no_calibration, until one is made "
+            "on the vehicle (springscale commission)."
+        )
     elif limits := limits_in_force(setup):
         click.echo(f"It may weigh: {', '.join(f'{name} {kg:g} kg' for name, kg in limits.items())}.")
     else:

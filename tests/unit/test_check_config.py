@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from support.commissioning import Bench, fitted, in_steps
 
 from gateway.bus.live import usable_interfaces, what_lacks
 from gateway.cli import springscale
@@ -24,6 +25,16 @@ def checked(folder: Path, **sections: str) -> Result:
 
 def test_a_sound_configuration_is_good(tmp_path: Path) -> None:
     assert checked(tmp_path).exit_code == 0
+
+
+def test_it_says_by_what_is_weighed_where_no_calibration_is_configured(tmp_path: Path) -> None:
+    assert "until one is made on the vehicle (springscale commission)" in checked(tmp_path).stdout
+    bench = Bench(tmp_path / "state")
+    in_steps(bench)
+    bench.drive(0)
+    bench.drive(1)
+    bench.worker.finish(fitted())
+    assert f"made on the vehicle: {tmp_path / 'state' / 'commissioned-'}" in checked(tmp_path).stdout
 
 
 @pytest.mark.parametrize(

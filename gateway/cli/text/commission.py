@@ -57,9 +57,13 @@ def lines_text(items: list[dict[str, Any]]) -> str:
     if not items:
         return "there is no line: `springscale commission upload FILE` brings one, or go on without"
     return "\n".join(
-        f"{n}: {item['name']} ({item['source']}){': ' + item['fault'] if item['fault'] else ''}"
+        f"{n}: {item['name']} ({item['source']}): {item['fault'] or _line_text(item['vehicle'])}"
         for n, item in enumerate(items, 1)
     )
+
+
+def _line_text(vehicle: dict[str, Any]) -> str:
+    return f"{vehicle['name']}, wheelbase {vehicle['wheelbase_m']:g} m"
 
 
 def _made_text(made: dict[str, Any]) -> str:

@@ -90,7 +90,7 @@ show(({ commissioning: told }) => {
 async function askLines() {
   ({ items: lines } = await load(`${COMMISSIONING}/lines`));
   const choices = lines.map((line, at) => {
-    const option = made("option", `${line.name} (${line.source})${line.fault ? `: ${line.fault}` : ""}`);
+    const option = made("option", `${line.name} (${line.source}): ${line.fault ?? `${line.vehicle.name}, wheelbase ${line.vehicle.wheelbase_m} m`}`);
     option.value = at;
     option.disabled = line.fault !== null;
     return option;
