@@ -102,13 +102,14 @@ def _figures(figures: dict[str, float]) -> str:
 
 def _soak(soak: dict[str, Any]) -> str:
     head = (
-        f"## A simulated week\n\n`make soak`: {soak['hours_a_day']:g} h of driving a day through the service at high "
-        "speed, nights of silence between, a client asking all the while, the database limited to 4 MB. The process "
-        f"also holds the simulator that made its drive. {_bounds(soak)}\n\n"
-        "| day | estimates | rejected | memory, MB | file handles | threads | database and log, MB |\n"
-        "|---|---|---|---|---|---|---|"
+        f"## A simulated week\n\n`make soak`: a commissioning, then {soak['hours_a_day']:g} h of driving a day through "
+        "the service at high speed, nights of silence between, a client asking all the while, the database limited to "
+        f"4 MB, the ring log to {soak['most_allowed']['record_mb']:g}. The process also holds the simulator that made "
+        f"its drive. {_bounds(soak)}\n\n"
+        "| day | estimates | rejected | memory, MB | file handles | threads | database and log, MB | recorded, MB |\n"
+        "|---|---|---|---|---|---|---|---|"
     )
-    keys = ("day", "estimates", "rejected", "memory_mb", "handles", "threads", "database_mb")
+    keys = ("day", "estimates", "rejected", "memory_mb", "handles", "threads", "database_mb", "record_mb")
     return "\n".join([head, *("| " + " | ".join(f"{day[key]:g}" for key in keys) + " |" for day in soak["days"]), ""])
 
 

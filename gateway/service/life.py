@@ -5,6 +5,7 @@ from gateway.config import Settings
 from gateway.service.commissioning import commissioned, with_commissioned
 from gateway.service.gateway import Gateway, OnStarted
 from gateway.service.reload import LoadSettings
+from gateway.web import forget_routes
 
 
 def live(
@@ -33,3 +34,5 @@ def live(
         gateway.run()
         if not gateway.is_to_start_anew:
             return
+        del gateway
+        forget_routes()

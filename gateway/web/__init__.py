@@ -4,7 +4,7 @@ Estimates come in through the board, the history through a reader, the service's
 to whoever has a token. The application is made by ``create_app``, from the door, the live board and the routes.
 """
 
-from gateway.web.app import create_app
+from gateway.web.app import create_app, forget_routes
 from gateway.web.door import (
     Scope,
     Tls,
@@ -33,6 +33,7 @@ __all__ = [
     "WebSettings",
     "boot_clock_s",
     "create_app",
+    "forget_routes",
     "refuse_open_address",
     "renew_certificate",
     "server_config",

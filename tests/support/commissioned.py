@@ -5,6 +5,7 @@ import json
 import threading
 import urllib.error
 import urllib.request
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ class Running:
         self.settings = settings
         self.gateway: Gateway | None = None
         self.n_starts = 0
+        self.ended: list[weakref.ref[Gateway]] = []  # those at work before
 
     @property
     def now(self) -> Gateway:
@@ -78,6 +80,8 @@ def serve(config: Path, meet: Callable[[Running], None]) -> None:
     failures: list[BaseException] = []
 
     def on_started(gateway: Gateway) -> None:
+        if running.gateway is not None:
+            running.ended.append(weakref.ref(running.gateway))
         running.gateway = gateway
         running.n_starts += 1
         loop = asyncio.get_running_loop()

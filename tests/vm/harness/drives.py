@@ -22,8 +22,18 @@ LOAD = Load(270.0, 1.3)
 @cache
 def loaded_drive(duration_s: float, seed: int, map_name: str = "reference") -> Frames:
     """The paper's van with 270 kg at about 50 km/h on an ISO 8608 class B road, as frames of a shipped map."""
+    return _drive(duration_s, seed, map_name, (LOAD,))
+
+
+@cache
+def empty_drive(duration_s: float, seed: int) -> Frames:
+    """The same van without a load."""
+    return _drive(duration_s, seed, "reference", ())
+
+
+def _drive(duration_s: float, seed: int, map_name: str, loads: tuple[Load, ...]) -> Frames:
     speed = constant(PAPER_SPEED_MPS, duration_s, np.random.default_rng(seed), 0.4)
-    driven = simulate_drive(PAPER_VAN, [LoadStep(0.0, (LOAD,))], iso_road("B"), speed, REFERENCE, seed, START_NS)
+    driven = simulate_drive(PAPER_VAN, [LoadStep(0.0, loads)], iso_road("B"), speed, REFERENCE, seed, START_NS)
     return Wiring(map_name).frames_of(driven.recording)
 
 
