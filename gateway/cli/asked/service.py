@@ -75,9 +75,7 @@ class Service:
         except urllib.error.HTTPError as refusal:
             raise SpringscaleError(f"{address}: {_said(refusal)}") from None
         except (OSError, ValueError, HTTPException) as fault:  # not there, not trusted, or not what it should be
-            raise SpringscaleError(
-                f"{address}: no service answers there as it should: {getattr(fault, 'reason', fault)}"
-            ) from None
+            raise SpringscaleError(f"{address}: no service answers there as it should: {_why(fault)}") from None
 
     def _opener(self) -> urllib.request.OpenerDirector:
         """Straight to the service, past any proxy; certificates are checked, and ours is shown where there is one."""
@@ -139,3 +137,10 @@ def _said(refusal: urllib.error.HTTPError) -> str:
         return f"{problem['detail']}" + (f" ({problem['reason']})" if problem.get("reason") else "")
     except (ValueError, KeyError, TypeError):
         return f"answered {refusal.code} {refusal.reason}"
+
+
+def _why(fault: Exception) -> str:
+    reason = getattr(fault, "reason", fault)
+    if isinstance(reason, ConnectionRefusedError):
+        return "nobody listens: is it running? With another calibration it begins anew, within seconds"
+    return str(reason)
