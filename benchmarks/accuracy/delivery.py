@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.accuracy.coverage_drives import stated
 from benchmarks.accuracy.delivery_days import Day as DrivenDay
-from benchmarks.accuracy.delivery_days import kept_day
+from benchmarks.accuracy.delivery_days import Said, kept_day
 from benchmarks.accuracy.vans import OnVan, of_each_van, van_of
 from gateway.core.events import Entry, EntryKind, Ledger, Rules
 from gateway.core.events.day import Day
@@ -69,6 +69,15 @@ class Carried:
 
 
 @dataclass(frozen=True, slots=True)
+class Weighed:
+    """A batch that counted: its error in percent of the rated payload, and whether its 95 % interval held the truth."""
+
+    error_pct: float
+    std_pct: float
+    is_held: bool
+
+
+@dataclass(frozen=True, slots=True)
 class JudgedDay:
     """One day, judged."""
 
@@ -76,8 +85,7 @@ class JudgedDay:
     changes: list[Change]
     trips: list[Carried]
     n_revisions: int
-    n_batches: int  # that counted
-    n_batches_held: int  # whose 95 % interval holds the payload
+    batches: list[Weighed]
 
 
 def delivery(
@@ -85,25 +93,34 @@ def delivery(
 ) -> dict[str, Any]:
     """Drive the days, tell them, judge them."""
     days = list(of_each_van(partial(judged_day, kept, seed), n_days, workers, on_day))
+    return {
+        "seed": seed,
+        "vans": [day[Said.NOTHING].van for day in days],
+        "said": {said: _told_of([day[said] for day in days]) for said in Said},
+    }
+
+
+def _told_of(days: Sequence[JudgedDay]) -> dict[str, Any]:
     changes = [one for day in days for one in day.changes]
     trips = [one for day in days for one in day.trips]
     return {
-        "seed": seed,
-        "vans": [day.van for day in days],
         "found": _found(changes),
         "kg": _errors([one for one in changes if one.is_change and one.is_told]),
         "trips": _trips(trips),
         "n_revisions": sum(day.n_revisions for day in days),
-        "batches": {"n": sum(day.n_batches for day in days), "n_held": sum(day.n_batches_held for day in days)},
+        "batches": _batches([one for day in days for one in day.batches]),
         "changes": [asdict(one) for one in changes],
     }
 
 
-def judged_day(kept: Path | None, seed: int, number: int) -> JudgedDay:
-    """One day's truth beside what was told of it."""
+def judged_day(kept: Path | None, seed: int, number: int) -> dict[Said, JudgedDay]:
+    """One day's truth beside what was told of it, by what was said beforehand."""
     driven = kept_day(kept, seed, number)
-    estimates = tuple(map(estimate_from_json, driven.records))
     rules = Rules.of(stated(van_of(seed, number)))
+    return {said: _judged(number, driven, tuple(map(estimate_from_json, driven.records[said])), rules) for said in Said}
+
+
+def _judged(number: int, driven: DrivenDay, estimates: tuple[Estimate, ...], rules: Rules) -> JudgedDay:
     ledger, last, n_revisions = Ledger(rules), dict[str, Entry](), 0
     for estimate in estimates:
         for entry in ledger.add(estimate):
@@ -115,14 +132,29 @@ def judged_day(kept: Path | None, seed: int, number: int) -> JudgedDay:
         for entry in last.values()
         if entry.kind is EntryKind.TRIP and entry.record["carried_tkm"] is not None
     ]
-    counted = [one for one in estimates if one.counted]
-    n_held = sum(_holds(one, driven.payload_kg[_leg(driven, one)]) for one in counted)
-    return JudgedDay(driven.van, changes, trips, n_revisions, len(counted), n_held)
+    weighed = [_weighed(one, driven) for one in estimates if one.counted]
+    return JudgedDay(driven.van, changes, trips, n_revisions, weighed)
 
 
-def _holds(estimate: Estimate, payload_kg: float) -> bool:
+def _weighed(estimate: Estimate, driven: DrivenDay) -> Weighed:
+    payload_kg = driven.payload_kg[_leg(driven, estimate)]
     low, high = estimate.payload.interval95
-    return low <= payload_kg <= high
+    return Weighed(
+        100.0 * (estimate.payload.number - payload_kg) / driven.rated_kg,
+        100.0 * estimate.payload.std / driven.rated_kg,
+        low <= payload_kg <= high,
+    )
+
+
+def _batches(weighed: Sequence[Weighed]) -> dict[str, Any]:
+    errors = np.array([one.error_pct for one in weighed])
+    return {
+        "n": len(weighed),
+        "mean_abs_pct": _rounded(float(np.mean(np.abs(errors)))),
+        "bias_pct": _rounded(float(np.mean(errors))),
+        "mean_std_pct": _rounded(float(np.mean([one.std_pct for one in weighed]))),
+        "n_held": sum(one.is_held for one in weighed),
+    }
 
 
 def _changes(number: int, driven: DrivenDay, day: Day, last: Mapping[str, Entry]) -> Iterator[Change]:

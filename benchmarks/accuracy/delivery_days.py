@@ -6,8 +6,9 @@ two stops nothing happens. Legs last a little over one window, some over two; th
 """
 
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +19,7 @@ from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, scattered
 from benchmarks.accuracy.vans import fresh_van
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
 from gateway.calibration.judgement.learning_curve import calibrated_on
+from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate_json import estimate_to_json
@@ -42,9 +44,22 @@ PARCEL_PARTS: Final = (0.08, 0.22)  # of the rated payload
 N_PARCELS: Final = 6
 
 
+FLOOR_PARTS: Final = (0.25, 1.0)  # of the wheelbase, where parcels lie
+SHORTEST_M: Final = 0.5
+
+
+class Said(StrEnum):
+    """What the campaign says of how long loads lie."""
+
+    NOTHING = "nothing"
+    LENGTH = "length"  # from one parcel's to the floor's
+
+
 @dataclass(frozen=True, slots=True)
 class Day:
-    """What was aboard on each leg, kg, the share it made, %, and the JSON objects of all estimates of that day."""
+    """What was aboard on each leg, kg, the share it made, %, and the JSON objects of all estimates of that day, by what
+    was said of the loads' length.
+    """
 
     van: str
     rated_kg: float
@@ -52,7 +67,7 @@ class Day:
     front_share_pct: tuple[float, ...]
     distance_m: tuple[float, ...]
     leg_start_ns: tuple[int, ...]
-    records: tuple[dict[str, Any], ...]
+    records: dict[str, list[dict[str, Any]]]
 
 
 def day_of(seed: int, number: int) -> Day:
@@ -63,15 +78,21 @@ def day_of(seed: int, number: int) -> Day:
     today = scattered(fresh.van, FROM_DAY_TO_DAY, np.random.default_rng(day_seed))
     carried = loads_of_legs(today, np.random.default_rng(plan_seed))
     signal_map = load_signal_map(SHIPPED_PREFIX + MAP_NAME)
-    flow = Flow(BatchSettings(), signal_map.traits, calibrated, ESTIMATOR, Identity(vehicle_id=f"van-{number}"))
-    start_ns, records, starts_ns, distances_m = START_NS + 6 * 3600 * NS_PER_S, [], [], []
+    identity = Identity(vehicle_id=f"van-{number}")
+    flows = {
+        said: Flow(BatchSettings(), signal_map.traits, _with(said, calibrated), ESTIMATOR, identity) for said in Said
+    }
+    records: dict[str, list[dict[str, Any]]] = {said: [] for said in Said}
+    start_ns, starts_ns, distances_m = START_NS + 6 * 3600 * NS_PER_S, [], []
     for i, (loads, leg_seed) in enumerate(zip(carried, leg_seeds, strict=True)):
         drive = _leg(i, np.random.default_rng(leg_seed))
         simulated = simulate_drive(
             today, loads, ROAD, drive, fresh.sensors, int(leg_seed.generate_state(1)[0]), start_ns
         )
         motion = Decoder(signal_map).decode(Wiring(MAP_NAME).frames_of(simulated.recording))
-        records += [{**estimate_to_json(estimate), "spectra": None} for estimate in (*flow.feed(motion), *flow.flush())]
+        for said, flow in flows.items():
+            told = (*flow.feed(motion), *flow.flush())
+            records[said] += [{**estimate_to_json(estimate), "spectra": None} for estimate in told]
         starts_ns.append(start_ns)
         distances_m.append(float(drive.travelled_m[-1]))
         start_ns += round((drive.duration_s + STOP_S) * NS_PER_S)
@@ -82,8 +103,17 @@ def day_of(seed: int, number: int) -> Day:
         front_share_pct=tuple(front_share_pct(today, loads) for loads in carried),
         distance_m=tuple(distances_m),
         leg_start_ns=tuple(starts_ns),
-        records=tuple(records),
+        records=records,
     )
+
+
+def _with(said: Said, calibrated: CalibratedVehicle) -> CalibratedVehicle:
+    """As the calibration would be, had the campaign said so: runs left out are weighed without it either way."""
+    if said is Said.NOTHING or calibrated.cross_spectrum is None:
+        return calibrated
+    begin, end = FLOOR_PARTS
+    lengths_m = (SHORTEST_M, (end - begin) * calibrated.vehicle.wheelbase_m)
+    return replace(calibrated, cross_spectrum=replace(calibrated.cross_spectrum, payload_length_m=lengths_m))
 
 
 def loads_of_legs(van: Vehicle, rng: np.random.Generator) -> list[tuple[Load, ...]]:
@@ -106,23 +136,31 @@ def kept_day(folder: Path | None, seed: int, number: int) -> Day:
     """The day as an earlier call left it in ``folder``; else driven, and left there."""
     path = None if folder is None else folder / f"day-{seed}-{number}.json"
     if path is not None and path.exists():
-        told = json.loads(path.read_text(encoding="utf-8"))
-        return Day(told["van"], told["rated_kg"], *(tuple(told[name]) for name in list(_names())[2:]))
+        told: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        return Day(**{name: as_told(told[name]) for name, as_told in _AS_TOLD.items()})
     day = day_of(seed, number)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps({name: getattr(day, name) for name in _names()}), encoding="utf-8")
+        path.write_text(json.dumps({name: getattr(day, name) for name in _AS_TOLD}), encoding="utf-8")
     return day
 
 
-def _names() -> Iterator[str]:
-    yield from Day.__dataclass_fields__
+_AS_TOLD: Final[dict[str, Callable[[Any], Any]]] = {
+    "van": str,
+    "rated_kg": float,
+    "payload_kg": tuple,
+    "front_share_pct": tuple,
+    "distance_m": tuple,
+    "leg_start_ns": tuple,
+    "records": dict,
+}
+"""How each field of a day comes out of JSON."""
 
 
 def _parcel(van: Vehicle, rng: np.random.Generator) -> Load:
     return Load(
         float(rng.uniform(*PARCEL_PARTS)) * van.rated_payload_kg,
-        float(rng.uniform(0.25, 1.0)) * van.wheelbase_m,
+        float(rng.uniform(*FLOOR_PARTS)) * van.wheelbase_m,
         left_m=float(rng.uniform(-0.2, 0.2)),
     )
 

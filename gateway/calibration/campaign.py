@@ -18,7 +18,7 @@ from gateway.core.vehicle import (
     sensor_offset_left,
 )
 from gateway.errors import CampaignError
-from gateway.stated import Kilograms, Metres, MetresLeft, Percent
+from gateway.stated import PAYLOAD_LENGTH, Kilograms, Metres, MetresLeft, PayloadLengthM, Percent
 from gateway.toml_file import checked, read_toml
 
 OnRun = Callable[[int, int], None]  # (runs done, runs in all)
@@ -85,6 +85,7 @@ class VehicleTable(_Table):
     )
     kerb_rear_axle_kg: float | None = Field(None, gt=0.0, description="the same at the rear")
     wheel_radius_m: float | None = Field(None, gt=0.0, description="kept in the calibration file, not used")
+    payload_length_m: PayloadLengthM | None = Field(None, description=PAYLOAD_LENGTH)
     front_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the front axle")
     rear_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the rear axle")
     gross_limit_kg: float | None = Field(None, gt=0.0, description="permitted gross weight")

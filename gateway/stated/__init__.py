@@ -1,5 +1,23 @@
 """What people state of a vehicle, as the web takes it and calibration uses it."""
 
-from gateway.stated.vehicle import DIVISION_KG, Kilograms, Metres, MetresLeft, Percent, VehicleAnswers
+from gateway.stated.vehicle import (
+    DIVISION_KG,
+    PAYLOAD_LENGTH,
+    Kilograms,
+    Metres,
+    MetresLeft,
+    PayloadLengthM,
+    Percent,
+    VehicleAnswers,
+)
 
-__all__ = ["DIVISION_KG", "Kilograms", "Metres", "MetresLeft", "Percent", "VehicleAnswers"]
+__all__ = [
+    "DIVISION_KG",
+    "PAYLOAD_LENGTH",
+    "Kilograms",
+    "Metres",
+    "MetresLeft",
+    "PayloadLengthM",
+    "Percent",
+    "VehicleAnswers",
+]

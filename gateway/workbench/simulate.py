@@ -23,7 +23,7 @@ from gateway.records import F64, Frames
 from gateway.sim.scenario import START_NS, SimulatedDrive, simulate_drive
 from gateway.sim.sensors import CANMOD, REFERENCE, Sensors
 from gateway.sim.vans import VANS
-from gateway.sim.vehicle import Vehicle, front_share_pct, payload_kg, payload_left_m
+from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg, payload_left_m
 from gateway.toml_file import load_toml
 from gateway.units import NS_PER_S
 from gateway.workbench.campaigns import PLANS, Carried, Plan, PlannedDrive, plan_of, share_range_pct
@@ -230,12 +230,26 @@ def _campaign_text(bench: Bench, plan: Plan, logs: Sequence[str]) -> str:
         f"unsprung_front_kg = {2.0 * vehicle.front.wheel.unsprung_kg}",
         f"unsprung_rear_kg = {2.0 * vehicle.rear.wheel.unsprung_kg}",
         f"wheel_radius_m = {vehicle.front.wheel.radius_m}",
+        *_length_lines([carried.loads for planned in plan.drives for carried in planned.carried if carried.loads]),
     ]
     for planned, log in zip(plan.drives, logs, strict=True):
         for carried in planned.carried:
             lines += ["", "[[runs]]", f'log = "{log}"', *_run_lines(vehicle, planned, carried)]
             lines += [f'split = "{plan.split}"'] if plan.split else []
     return "\n".join(lines) + "\n"
+
+
+def _length_lines(carried: Sequence[tuple[Load, ...]]) -> list[str]:
+    """How far along the floor these loads reach, as somebody would say it: to the half metre."""
+    if not carried:
+        return []
+    reaches_m = [
+        max(one.position_m + one.length_m / 2.0 for one in loads)
+        - min(one.position_m - one.length_m / 2.0 for one in loads)
+        for loads in carried
+    ]
+    shortest, longest = math.floor(2.0 * min(reaches_m)) / 2.0, math.ceil(2.0 * max(reaches_m)) / 2.0
+    return [f"payload_length_m = [{max(shortest, 0.5)}, {longest}]"]
 
 
 def _run_lines(vehicle: Vehicle, planned: PlannedDrive, carried: Carried) -> list[str]:

@@ -38,7 +38,6 @@ NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
         "damper_front_nspm": 0.03,  # wear
         "damper_rear_nspm": 0.03,
         "payload_mode_hz": 0.6,  # on the floor, on pallets, in a rack
-        "payload_gyration_m2": 0.7,  # a box half a metre long or one and a half
     }
 )
 """How far vehicle and packing really lie from their calibration, each axle by itself; chosen."""

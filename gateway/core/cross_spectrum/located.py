@@ -12,10 +12,11 @@ from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ, Sideways, s
 from gateway.core.cross_spectrum.lateral.unseen import sideways_covariance
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Curvature, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, has_roll, level, upright
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll, level, upright
 from gateway.core.cross_spectrum.packing import Packing, packings
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
+from gateway.core.cross_spectrum.spread import as_carried, spread_covariance
 from gateway.records import F64
 
 START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
@@ -26,6 +27,8 @@ FINE: Final = 1e-3
 MOST_RIVALRY: Final = 1.0
 """Of all other variance: where peaks that compete are most of what is uncertain, that is why."""
 START_POSITION_SHARES: Final = (0.25, 0.5, 0.9)  # of the wheelbase
+
+_GYRATION: Final = STEADY.index(INDEX["payload_gyration_m2"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +70,9 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
 
     With a roll rate the load is first sought as if it lay on the centre line; then roll tells where it lies, and the
     load is sought once more from there. Where the roll rate is lost, the sensor reads roll all the same: it is taken to
-    sit where calibration has it, with the load on the centre line.
+    sit where calibration has it, with the load on the centre line. How long it lies is never sought (spread).
     """
+    calibration = as_carried(calibration)
     whittle = Whittle(spectra.without_roll, calibration.ground)
     if spectra.roll is None or not has_roll(calibration.parameters):
         peak = _best(whittle, calibration)
@@ -103,6 +107,7 @@ def _told(whittle: Whittle, peak: _Peak, calibration: CrossSpectrumCalibration, 
     expected = replace(calibration, parameters=parameters)
     load_covariance = _load_covariance(found, moves, calibration)
     drifted = drift_covariance(found.covariance, moves)[-2:, -2:]
+    drifted += spread_covariance(moves[-2:, _GYRATION], point.payload_kg, calibration)
     covariance = load_covariance + drifted
     return Located(
         point=point,
