@@ -45,14 +45,13 @@ N_PARCELS: Final = 6
 
 
 FLOOR_PARTS: Final = (0.25, 1.0)  # of the wheelbase, where parcels lie
-SHORTEST_M: Final = 0.5
 
 
 class Said(StrEnum):
     """What the campaign says of how long loads lie."""
 
     NOTHING = "nothing"
-    LENGTH = "length"  # from one parcel's to the floor's
+    LENGTH = "length"  # the floor's
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +111,8 @@ def _with(said: Said, calibrated: CalibratedVehicle) -> CalibratedVehicle:
     if said is Said.NOTHING or calibrated.cross_spectrum is None:
         return calibrated
     begin, end = FLOOR_PARTS
-    lengths_m = (SHORTEST_M, (end - begin) * calibrated.vehicle.wheelbase_m)
-    return replace(calibrated, cross_spectrum=replace(calibrated.cross_spectrum, payload_length_m=lengths_m))
+    length_m = (end - begin) * calibrated.vehicle.wheelbase_m
+    return replace(calibrated, cross_spectrum=replace(calibrated.cross_spectrum, payload_length_m=length_m))
 
 
 def loads_of_legs(van: Vehicle, rng: np.random.Generator) -> list[tuple[Load, ...]]:

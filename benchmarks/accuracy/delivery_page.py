@@ -62,7 +62,7 @@ def delivery_page(found: Mapping[str, Any]) -> str:
             "",
             "These vans were calibrated with each load in one place; their parcels lie all along the floor. Weighed "
             "as the known loads they are found too light; the interval allows for it. A campaign that says how long "
-            "loads lie (`payload_length_m`, here from half a metre to the floor's length) has most of that taken out "
+            "loads lie (`payload_length_m`, here the floor's length) has most of that taken out "
             "([method](method.md#weighing-gatewaycorecross_spectrumestimatorpy)). Batches by themselves, in percent of "
             "the rated payload:",
             "",

@@ -41,8 +41,8 @@ class Vehicle:
     """What a fitter states of a vehicle. Masses and shares are of the sprung mass.
 
     sensor_position_m is behind the front axle (negative: ahead of it), empty_cg_left_m the empty vehicle's centre of
-    gravity left of the centre line, payload_length_m how far along the floor what it carries may reach (shortest,
-    longest); the ``_std`` fields say how sure these figures are. The two ranges only normalise
+    gravity left of the centre line, payload_length_m how far along the floor what it carries usually
+    reaches; the ``_std`` fields say how sure these figures are. The two ranges only normalise
     errors, equation (12); they never gate.
     """
 
@@ -64,7 +64,7 @@ class Vehicle:
     kerb_front_axle_kg: float | None = None
     kerb_rear_axle_kg: float | None = None
     wheel_radius_m: float | None = None
-    payload_length_m: tuple[float, float] | None = None
+    payload_length_m: float | None = None
     front_axle_limit_kg: float | None = None
     rear_axle_limit_kg: float | None = None
     gross_limit_kg: float | None = None

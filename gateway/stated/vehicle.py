@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 # Bounds that no road vehicle reaches, so that a fraction for percent, millimetres or tonnes are named at once
 Percent = Annotated[float, Field(ge=1.0, le=99.0)]
@@ -12,20 +12,10 @@ Metres = Annotated[float, Field(ge=-10.0, le=30.0)]
 MetresLeft = Annotated[float, Field(ge=-2.0, le=2.0)]
 
 PAYLOAD_LENGTH: Final = (
-    "how far along the floor what it carries reaches, the shortest load and the longest; absent: as short as the known "
-    "loads were, or up to the whole floor"
+    "how far along the floor what it carries usually reaches: 1.2 for a pallet, the floor's length for parcels; "
+    "absent: as the known loads, with intervals that allow for more"
 )
-
-
-def rising(both: tuple[float, float]) -> tuple[float, float]:
-    """A range as it is. Raises ValueError where it falls."""
-    if both[0] > both[1]:
-        raise ValueError("give the shorter length first: [shortest, longest]")
-    return both
-
-
-LengthM = Annotated[float, Field(ge=0.1, le=20.0)]
-PayloadLengthM = Annotated[tuple[LengthM, LengthM], AfterValidator(rising)]
+PayloadLengthM = Annotated[float, Field(ge=0.1, le=20.0)]
 
 DIVISION_KG: Final = 20.0  # of a weighbridge for trucks; a reading is rounded to it
 
@@ -67,7 +57,7 @@ class VehicleAnswers(BaseModel):
         None, description="payloads it may carry", examples=[[0.0, 800.0]]
     )
     front_share_range_pct: tuple[Percent, Percent] | None = Field(None, description="front shares it may have")
-    payload_length_m: PayloadLengthM | None = Field(None, description=PAYLOAD_LENGTH, examples=[[0.5, 2.4]])
+    payload_length_m: PayloadLengthM | None = Field(None, description=PAYLOAD_LENGTH, examples=[2.4])
     front_axle_limit_kg: WeightKg | None = Field(None, description="permitted load of the front axle")
     rear_axle_limit_kg: WeightKg | None = Field(None, description="permitted load of the rear axle")
     gross_limit_kg: WeightKg | None = Field(None, description="permitted gross weight")

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from shutil import copyfile
+from statistics import median
 from typing import Final
 
 import numpy as np
@@ -240,7 +241,7 @@ def _campaign_text(bench: Bench, plan: Plan, logs: Sequence[str]) -> str:
 
 
 def _length_lines(carried: Sequence[tuple[Load, ...]]) -> list[str]:
-    """How far along the floor these loads reach, as somebody would say it: to the half metre."""
+    """How far along the floor these loads usually reach."""
     if not carried:
         return []
     reaches_m = [
@@ -248,8 +249,7 @@ def _length_lines(carried: Sequence[tuple[Load, ...]]) -> list[str]:
         - min(one.position_m - one.length_m / 2.0 for one in loads)
         for loads in carried
     ]
-    shortest, longest = math.floor(2.0 * min(reaches_m)) / 2.0, math.ceil(2.0 * max(reaches_m)) / 2.0
-    return [f"payload_length_m = [{max(shortest, 0.5)}, {longest}]"]
+    return [f"payload_length_m = {median(reaches_m):.6g}"]
 
 
 def _run_lines(vehicle: Vehicle, planned: PlannedDrive, carried: Carried) -> list[str]:

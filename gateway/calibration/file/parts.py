@@ -177,7 +177,7 @@ class CrossSpectrumPart(Part):
     cg_left_inflation: float = Field(1.0, gt=0.0)
     sensor_left_m: float = 0.0
     sensor_left_std_m: float = Field(UNKNOWN_OFFSET_STD_M, gt=0.0)
-    payload_length_m: tuple[float, float] | None = None
+    payload_length_m: float | None = Field(None, gt=0.0)
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "CrossSpectrumPart":
@@ -228,7 +228,7 @@ class VehiclePart(Part):
     gross_limit_kg: float | None
     front_wheel_limit_kg: float | None
     rear_wheel_limit_kg: float | None
-    payload_length_m: tuple[float, float] | None = None
+    payload_length_m: float | None = Field(None, gt=0.0)
 
 
 class SeenPart(Part):

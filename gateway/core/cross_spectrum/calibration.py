@@ -25,8 +25,8 @@ class CrossSpectrumCalibration:
     likelihood ratio per degree of freedom that is still believed; the two amplitudes are root mean squares within the
     band. usual_log_amplitude: see measured.Reading. gravity_mps2 is what the accelerometer read on average; None where
     the file does not say. The two scores are the largest that are believed of a sensor that nobody touched
-    (sensor_change). The sensor sits sensor_left_m left of the centre line, and what is carried reaches payload_length_m
-    (shortest, longest) along the floor, as stated.
+    (sensor_change). As stated, the sensor sits sensor_left_m left of the centre line, and what is carried usually
+    reaches payload_length_m along the floor.
     """
 
     empty_mass_kg: float
@@ -57,7 +57,7 @@ class CrossSpectrumCalibration:
     cg_left_inflation: float = 1.0
     sensor_left_m: float = 0.0
     sensor_left_std_m: float = UNKNOWN_OFFSET_STD_M
-    payload_length_m: tuple[float, float] | None = None
+    payload_length_m: float | None = None
 
     @property
     def ground(self) -> Ground:

@@ -15,8 +15,12 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.records import F64
 
-FLOOR_PER_WHEELBASE: Final = 0.93
+FLOOR_PER_WHEELBASE: Final = 0.8
 """Load floors of vans are 0.65 (small ones) to 0.93 (large ones) of their wheelbase long, by their makers' figures."""
+PIECES_SCATTER: Final = 0.5
+"""Standard deviation of the squared radius of gyration of five like pieces, anywhere on the floor, over its mean: that
+of n evenly spread numbers' variance is ((1.8 - (n - 3) / (n - 1)) / n)^(1/2) of it.
+"""
 MOST_FEEDBACK: Final = 0.5  # beyond, proportion no longer tells; chosen, it doubles the standard deviation
 
 _GYRATION: Final = INDEX["payload_gyration_m2"]
@@ -26,9 +30,8 @@ def as_carried(calibration: CrossSpectrumCalibration) -> CrossSpectrumCalibratio
     """With loads as long as the vehicle is said to carry them; as the known loads were, where nobody said."""
     if calibration.payload_length_m is None:
         return calibration
-    shortest, longest = (_gyration_m2(length_m) for length_m in calibration.payload_length_m)
     parameters, covariance = calibration.parameters.copy(), calibration.covariance.copy()
-    parameters[_GYRATION] = log((shortest + longest) / 2.0)
+    parameters[_GYRATION] = log(_gyration_m2(calibration.payload_length_m))
     covariance[_GYRATION] = covariance[:, _GYRATION] = 0.0
     return replace(calibration, parameters=parameters, covariance=covariance)
 
@@ -36,15 +39,13 @@ def as_carried(calibration: CrossSpectrumCalibration) -> CrossSpectrumCalibratio
 def gyration_std_m2(calibration: CrossSpectrumCalibration) -> float:
     """Standard deviation of a load's squared radius of gyration about that by which it is weighed.
 
-    Evenly spread between the stated lengths'. Where nobody said, evenly between the known loads' and the whole floor's,
-    about the known ones; where these were long, down to a load in one point.
+    Where nobody said how long loads lie, half of them lie as the known ones, half are pieces anywhere on the floor.
     """
     if calibration.payload_length_m is not None:
-        shortest, longest = (_gyration_m2(length_m) for length_m in calibration.payload_length_m)
-        return (longest - shortest) / sqrt(12.0)
-    floor = _gyration_m2(FLOOR_PER_WHEELBASE * calibration.wheelbase_m)
+        return PIECES_SCATTER * _gyration_m2(calibration.payload_length_m)
     known = float(np.exp(calibration.parameters[_GYRATION]))
-    return max(floor - known, known) / sqrt(3.0)
+    pieces = _gyration_m2(FLOOR_PER_WHEELBASE * calibration.wheelbase_m)
+    return sqrt(0.5 * ((pieces - known) ** 2 + (PIECES_SCATTER * pieces) ** 2))
 
 
 def spread_covariance(moves: F64, payload_kg: float, carried: CrossSpectrumCalibration) -> F64:

@@ -25,9 +25,7 @@ class VehicleFigures(BaseModel):
     empty_cg_left_m: float
     payload_range_kg: tuple[float, float] = Field(description="only normalises errors; gates nothing")
     front_share_range_pct: tuple[float, float]
-    payload_length_m: tuple[float, float] | None = Field(
-        description="how far along the floor loads reach, the shortest and the longest; null: nobody said"
-    )
+    payload_length_m: float | None = Field(description="how far along the floor loads usually reach; null: not said")
     unsprung_front_kg: float | None
     unsprung_rear_kg: float | None
     kerb_front_axle_kg: float | None
