@@ -64,7 +64,7 @@ def test_every_disturbance_is_held_refused_or_mended() -> None:
 def test_every_plain_change_of_load_is_told_and_none_is_invented() -> None:
     found = numbers("events")
     assert len(found["vans"]) >= 20
-    told = found["found"]
+    told = found["said"]["length"]["found"]
     assert told["found_above_3_std"]["n"] == told["found_above_3_std"]["n_told"] >= 50
     assert told["stops_without_change"]["n_told"] == told["under_way"]["n_told"] == 0
     assert told["stops_without_change"]["n"] >= 30

@@ -170,3 +170,10 @@ def test_a_load_after_a_long_rest_is_told_and_the_trip_before_it_is_over():
     assert found["change_kg"] == pytest.approx(300.0)
     first, *_ = [e.record for e in told([*before, *after]).values() if e.kind == "trip"]
     assert first["is_over"]
+
+
+def test_three_standard_deviations_at_a_stop_are_told_whatever_their_probability():
+    """The prior of a quarter of the payload range makes small changes improbable that were measured well."""
+    (likely,) = events(day(300.0, 262.0))
+    assert abs(likely["change_kg"]) >= 3.0 * likely["change_std_kg"]
+    assert likely["probability"] < 0.9

@@ -21,6 +21,7 @@ from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 
 TOLD_FROM: Final = 0.9  # a change less likely than this is not told; one that was is withdrawn below one half
+PLAIN_STDS: Final = 3.0  # so far beyond its doubt, a change at a stop is told whatever its probability
 HORIZON: Final = 300  # batches that are looked at, a day of driving however long the vehicle rested between
 SETTLED: Final = 150  # what ended before the last so many stays as it was told
 
@@ -56,14 +57,21 @@ class Ledger:
     def _news(self, entry: Entry) -> Entry | None:
         before = self._known.get(entry.id)
         if entry.kind is EntryKind.EVENT:
-            probability = entry.record["probability"]
-            if probability < (EVEN if before and not before.record["is_withdrawn"] else TOLD_FROM):
+            needed = EVEN if before and not before.record["is_withdrawn"] else TOLD_FROM
+            if entry.record["probability"] < needed and not _is_plain(entry):
                 if before is None or before.record["is_withdrawn"]:
                     return None
                 entry = replace(entry, record={**entry.record, "is_withdrawn": True})
         if before is None:
             return entry.revised(1)
         return entry.revised(before.revision + 1) if is_news(before, entry) else None
+
+
+def _is_plain(entry: Entry) -> bool:
+    """A stop at which the door did not stay shut, and a change far beyond its own doubt."""
+    record = entry.record
+    could_load = any(stop["door_opened"] is not False for stop in record["stops"])
+    return could_load and bool(abs(record["change_kg"]) >= PLAIN_STDS * record["change_std_kg"])
 
 
 def as_stored(estimate: Estimate) -> Estimate:
