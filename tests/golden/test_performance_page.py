@@ -15,5 +15,6 @@ def test_the_page_is_made_from_the_figures() -> None:
 
 def test_everybody_of_the_comparison_stands_in_it() -> None:
     found = json.loads((DOCS / "performance.json").read_text(encoding="utf-8"))
-    assert {"decode", "formats", "day", "live", "service", "web", "weigh", "start", "simulator"} <= set(found)
+    parts = {"decode", "formats", "day", "live", "service", "web", "weigh", "archive", "start", "simulator"}
+    assert parts <= set(found)
     assert not [name for name, row in found["decode"]["rows"].items() if "skipped" in row]

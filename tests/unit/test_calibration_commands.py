@@ -154,6 +154,14 @@ def test_what_only_one_file_holds_is_a_difference(tmp_path: Path) -> None:
     assert {"where": "ratio_index.front_share.constant", "one": 48.0, "other": None, "n_std": None} in listed
 
 
+@pytest.mark.parametrize("part", ["cross_spectrum", "expected_errors"])
+def test_of_a_part_that_one_file_lacks_the_first_fact_stands_for_all(part: str) -> None:
+    whole = load_calibration(SHIPPED)
+    told = differences(whole, whole.model_copy(update={part: None}))
+    fitted = {f"{name}.{figure.name}" for name, figures in figures_of(whole).items() for figure in figures}
+    assert len([one for one in told if one.where not in fitted]) == 1
+
+
 @pytest.fixture
 def campaign(tmp_path: Path) -> Path:
     """One empty run whose log is ten bytes."""

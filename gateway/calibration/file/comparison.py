@@ -32,10 +32,17 @@ def differences(one: CalibrationFile, other: CalibrationFile) -> tuple[Differenc
 
 
 def _plain(one: CalibrationFile, other: CalibrationFile) -> Iterator[Difference]:
-    ours, theirs = (dict(_leaves(file.model_dump(mode="json"))) for file in (one, other))
+    """Of a part that one file lacks, such as the line that the other inherited from, the first fact stands for all."""
+    mine, its = (file.model_dump(mode="json") for file in (one, other))
+    lacked = {name for name in mine if (mine[name] is None) != (its[name] is None)}
+    ours, theirs = dict(_leaves(mine)), dict(_leaves(its))
+    told = set()
     for where in dict.fromkeys([*ours, *theirs]):
-        if ours.get(where) != theirs.get(where):
-            yield Difference(where, ours.get(where), theirs.get(where))
+        part = where.partition(".")[0]
+        if ours.get(where) == theirs.get(where) or (part in lacked and part in told):
+            continue
+        told.add(part)
+        yield Difference(where, ours.get(where), theirs.get(where))
 
 
 def _leaves(content: Any, where: str = "") -> Iterator[tuple[str, Any]]:
