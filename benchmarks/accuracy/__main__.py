@@ -14,6 +14,7 @@ from typing import Any, Final
 import click
 
 from benchmarks.accuracy import advice as on_advice
+from benchmarks.accuracy import alarm_days as on_alarm_days
 from benchmarks.accuracy import alarms as on_alarms
 from benchmarks.accuracy import coverage as on_coverage
 from benchmarks.accuracy import delivery as on_delivery
@@ -144,11 +145,16 @@ def delivery(n_days: int, seed: int, workers: int, kept: Path | None, output: Pa
 @studies.command("alarms")
 @click.option("--loads", "n_loads", type=click.IntRange(min=1), default=on_alarms.N_LOADS, show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=on_alarms.SEED, show_default=True)
+@click.option("--days", "n_days", type=click.IntRange(min=1), default=on_delivery.N_DAYS, show_default=True)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
+@click.option("--kept", type=FILE, default=None, help="directory of days driven before: read from there, left there")
 @_output
-def alarms(n_loads: int, seed: int, output: Path | None) -> None:
-    """Are the rules of the alarms right, and do alarms come and go? Made-up loads about a limit; a minute."""
+def alarms(n_loads: int, seed: int, n_days: int, workers: int, kept: Path | None, output: Path | None) -> None:
+    """Are the rules of the alarms right, and do alarms come and go? Made-up loads, then delivery days; ~25 s a day."""
     with counted("weighing loads about a limit") as on_line:
         found = on_alarms.alarms(n_loads, seed, on_line)
+    with counted("driving delivery days") as on_day:
+        found["days"] = on_alarm_days.days(n_days, on_delivery.SEED, workers=workers, kept=kept, on_day=on_day)
     _hand_out("alarm_rules", found, on_alarms.alarms_page(found), output)
 
 

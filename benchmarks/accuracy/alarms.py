@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.accuracy.alarm_days import NEAR
 from gateway.core.alarms import AlarmRules, AlarmState, AlarmWatch
 from gateway.core.fusion import PAYLOAD_OWN_STD_KG, fused, summary
 from gateway.core.vehicle import Vehicle
@@ -127,10 +128,48 @@ def alarms_page(found: Mapping[str, Any]) -> str:
             "confirmed by an hour of batches that are all off the same way. Without a gap an alarm would end as soon "
             f"as it is less probable than {100 * WITHOUT_GAP:g} %, and begin anew.",
             "",
+            *_days_section(found["days"]),
             "The rules: [alarms](alarms.md).",
             "",
         ]
     )
+
+
+_WORDS: Final = {
+    "far_over": "over it by more than {near:g} % of the rated payload",
+    "over": "over it by less",
+    "under": "under it by less",
+    "far_under": "under it by more than {near:g} %",
+}
+
+
+def _days_section(days: Mapping[str, Any]) -> list[str]:
+    limits = ", ".join(f"{100 * part:g}" for part in days["limits"])
+    return [
+        "## On delivery days",
+        "",
+        f"The {days['n_days']} simulated days of [load events](events.md): vans that are not quite as they were "
+        f"calibrated, eight stops, legs of one or two batches. Each day is held against limits of {limits} % of the "
+        "rated payload in turn; what counts is how the alarm of the gross weight stands at the end of each leg that "
+        "was weighed.",
+        "",
+        "| campaign says | the true payload is | legs | no alarm | told early | confirmed |",
+        "|---|---|---|---|---|---|",
+        *(_day_row(line) for line in days["lines"]),
+        "",
+        "What was confirmed stays so through later legs, until their load says no. Where nobody said how long loads "
+        "lie, these vans weigh too little ([load events](events.md#how-long-the-load-lies)); no rule of an alarm mends "
+        "that.",
+        "",
+    ]
+
+
+def _day_row(line: Mapping[str, Any]) -> str:
+    n, n_early, n_final = line["n"], line["n_early"], line["n_final"]
+    counts = (n - n_early - n_final, n_early, n_final)
+    shares = (f"{count} ({100 * count / max(n, 1):.0f} %)" for count in counts)
+    said = {"nothing": "nothing", "length": "how long loads lie"}[line["said"]]
+    return f"| {said} | {_WORDS[line['truth']].format(near=100 * NEAR)} | {n} | {' | '.join(shares)} |"
 
 
 def _row(line: Mapping[str, Any], n_loads: int) -> str:

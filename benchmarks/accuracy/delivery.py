@@ -137,7 +137,7 @@ def _judged(number: int, driven: DrivenDay, estimates: tuple[Estimate, ...], rul
 
 
 def _weighed(estimate: Estimate, driven: DrivenDay) -> Weighed:
-    payload_kg = driven.payload_kg[_leg(driven, estimate)]
+    payload_kg = driven.payload_kg[leg_of(driven, estimate)]
     low, high = estimate.payload.interval95
     return Weighed(
         100.0 * (estimate.payload.number - payload_kg) / driven.rated_kg,
@@ -158,7 +158,7 @@ def _batches(weighed: Sequence[Weighed]) -> dict[str, Any]:
 
 
 def _changes(number: int, driven: DrivenDay, day: Day, last: Mapping[str, Entry]) -> Iterator[Change]:
-    legs = [_leg(driven, day.estimates[weighing.at]) for weighing in day.weighings]
+    legs = [leg_of(driven, day.estimates[weighing.at]) for weighing in day.weighings]
     for i, entry in enumerate(day.events()):
         told = last.get(entry.id)
         is_told = told is not None and not told.record["is_withdrawn"]
@@ -174,7 +174,7 @@ def _changes(number: int, driven: DrivenDay, day: Day, last: Mapping[str, Entry]
         )
 
 
-def _leg(driven: DrivenDay, estimate: Estimate) -> int:
+def leg_of(driven: DrivenDay, estimate: Estimate) -> int:
     return bisect_right(driven.leg_start_ns, estimate.t_start_ns + 1_000_000_000) - 1
 
 

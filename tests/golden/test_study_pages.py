@@ -97,5 +97,8 @@ def test_alarms_are_told_of_what_is_too_heavy_and_hardly_of_what_is_not() -> Non
     lines = {line["distance"]: line for line in found["lines"]}
     assert lines[-2.0]["n_final"] == 0
     assert lines[3.0]["n_final"] >= 0.99 * found["n_loads"]
+    for line in found["days"]["lines"]:
+        assert line["truth"] != "far_under" or line["n_final"] <= 0.02 * line["n"]
+        assert line["truth"] != "far_over" or line["n_final"] >= 0.8 * line["n"]
     for line in lines.values():  # the gap keeps them from coming and going
         assert line["n_alarms"] <= line["n_alarms_without_gap"]
