@@ -140,7 +140,7 @@ class Pipeline:
             self._on_batch(found)
 
     def _count(self, found: Estimate) -> None:
-        if math.isfinite(found.roll_usable_share):
+        if math.isfinite(found.roll_usable_share) and Why.TOO_SHORT not in found.rejected:
             is_lost = found.roll_usable_share < ROLL_RATE_KNOWN_SHARE
             self.roll_rate_fault = ROLL_RATE_LOST.format(found.roll_usable_share) if is_lost else None
         if found.is_provisional:

@@ -115,7 +115,8 @@ def test_a_soft_rival_counts_for_less() -> None:
 def test_an_answer_of_two_peaks_is_wider(
     calibration: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch, behind: float, is_told: bool
 ) -> None:
-    """A peak put beside the found one, 25 kg away: as good, or far behind."""
+    """A peak put beside the found one, 25 kg away: as good, or far behind. How long the load lies is known."""
+    calibration = replace(calibration, payload_length_m=1.1)
     batch = batch_over_road(200.0, 50.0, seed=3)
     alone = weighed(batch, calibration)
     rivalry = located._rivalry

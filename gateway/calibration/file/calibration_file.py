@@ -33,14 +33,14 @@ Content = dict[str, Any]
 FIRST_VERSION: Final = 1
 
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 4
+VERSION: Final = 5
 
 
 class CalibrationFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-calibration"] = FORMAT
-    version: Literal[4] = VERSION
+    version: Literal[5] = VERSION
     migrated_from: str | None = Field(
         None, description="id of the file of an older version that this content was read from; null: written as it is"
     )
@@ -209,9 +209,16 @@ def _to_version_4(content: Content) -> None:
     content["line"] = None
 
 
+def _to_version_5(content: Content) -> None:
+    """Version 5 says how long loads usually lie. Before, nobody was asked."""
+    content["vehicle"]["payload_length_m"] = None
+    if content["cross_spectrum"] is not None:
+        content["cross_spectrum"]["payload_length_m"] = None
+
+
 # Entry v turns version v into v + 1. Entries are never edited, only added.
 MIGRATIONS: Final[Mapping[int, Callable[[Content], None]]] = MappingProxyType(
-    {1: _to_version_2, 2: _to_version_3, 3: _to_version_4}
+    {1: _to_version_2, 2: _to_version_3, 3: _to_version_4, 4: _to_version_5}
 )
 
 
