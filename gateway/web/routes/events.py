@@ -16,6 +16,7 @@ from gateway.core.events.table import COLUMNS, cells_of
 from gateway.history import Page
 from gateway.records import json_line
 from gateway.web.as_file import CSV, JSON_LINES, csv_lines, file_responses, json_lines, sent_as_file
+from gateway.web.as_parquet import PARQUET, sent_as_parquet
 from gateway.web.instant import Instant
 from gateway.web.reader import Reader
 from gateway.web.routes.estimates import Cursor
@@ -158,6 +159,9 @@ def events_router(reader: Reader) -> APIRouter:
     for kind, path in _PATHS.items():
         router.add_api_route(f"/{path}.csv", _file_of(reader, kind, "csv"), **_described("text/csv", path))
         router.add_api_route(f"/{path}.jsonl", _file_of(reader, kind, "jsonl"), **_described(JSON_LINES, path))
+        described = _described(PARQUET, path)
+        described["responses"] |= problem_responses(501)
+        router.add_api_route(f"/{path}.parquet", _file_of(reader, kind, "parquet"), **described)
     return router
 
 
@@ -190,9 +194,11 @@ def _file_of(reader: Reader, kind: EntryKind, ending: str) -> Callable[..., Any]
                 reader.entries, kind=kind, since_ns=span.since, until_ns=span.until, limit=_PAGE, cursor=cursor
             )
 
+        name = f"springscale-{_PATHS[kind]}.{ending}"
+        if ending == "parquet":
+            return await sent_as_parquet(page_behind, COLUMNS[kind], partial(cells_of, kind), name)
         is_csv = ending == "csv"
         encode = csv_lines(COLUMNS[kind], partial(cells_of, kind)) if is_csv else json_lines
-        name = f"springscale-{_PATHS[kind]}.{ending}"
         return await sent_as_file(page_behind, encode, CSV if is_csv else JSON_LINES, name)
 
     whole.__name__ = f"{_PATHS[kind]}_{ending}"
