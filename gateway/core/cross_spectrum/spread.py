@@ -13,6 +13,7 @@ import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import INDEX
+from gateway.core.cross_spectrum.unseen_load import unseen_covariance
 from gateway.records import F64
 
 FLOOR_PER_WHEELBASE: Final = 0.8
@@ -21,7 +22,6 @@ PIECES_SCATTER: Final = 0.5
 """Standard deviation of the squared radius of gyration of five like pieces, anywhere on the floor, over its mean: that
 of n evenly spread numbers' variance is ((1.8 - (n - 3) / (n - 1)) / n)^(1/2) of it.
 """
-MOST_FEEDBACK: Final = 0.5  # beyond, proportion no longer tells; chosen, it doubles the standard deviation
 
 _GYRATION: Final = INDEX["payload_gyration_m2"]
 
@@ -52,13 +52,10 @@ def spread_covariance(moves: F64, payload_kg: float, carried: CrossSpectrumCalib
     """(2, 2) of payload (kg) and front share (0..1), from a load that is longer or shorter than it was weighed as.
 
     ``moves`` (2,) is by how much the two move with the logarithm of the payload's squared radius of gyration, of which
-    the model is linear; ``carried`` is :func:`as_carried`. The load that lies so is the true one: where the answer
-    falls short of it, it is the larger.
+    the model is linear; ``carried`` is :func:`as_carried`.
     """
     moved = moves * gyration_std_m2(carried) / float(np.exp(carried.parameters[_GYRATION]))
-    feedback = min(abs(float(moved[0])) / payload_kg, MOST_FEEDBACK) if payload_kg > 0.0 else 0.0
-    widened: F64 = np.outer(moved, moved) / (1.0 - feedback) ** 2
-    return widened
+    return unseen_covariance(moved, payload_kg)
 
 
 def _gyration_m2(length_m: float) -> float:

@@ -24,14 +24,13 @@ from gateway.core.cross_spectrum.model.parameters import (
 )
 from gateway.core.cross_spectrum.model.slopes import solved_at
 from gateway.core.cross_spectrum.model.usual_roll import TRACK_PER_WHEELBASE, usual_roll
+from gateway.core.cross_spectrum.unseen_load import unseen_covariance
 from gateway.records import F64
 
 PAYLOAD_LEFT_PER_TRACK: Final = 0.95 / 3.0 / 1.96
 """Over the track's width: loads whose middle is evenly spread over its middle two thirds. A Gaussian of this standard
 deviation has the same 95 % interval; the even spread's own, 1 / (3 sqrt 3), would make it wider by a fifth.
 """
-
-MOST_FEEDBACK: Final = 0.5  # beyond, proportion no longer tells; chosen, it doubles the standard deviation
 
 
 def sideways_covariance(
@@ -54,10 +53,7 @@ def sideways_covariance(
         return weigh(spectra.showing(expected_of_driven(by, model, spectra)))
 
     moved = 0.5 * (weighed_at(cg_left_std_m) - weighed_at(-cg_left_std_m)) if payload_kg else np.zeros(2)
-    # the load that lies there is the true one: where the answer fell short of it, it is the larger
-    feedback = min(abs(float(moved[0])) / payload_kg, MOST_FEEDBACK) if payload_kg else 0.0
-    widened: F64 = np.outer(moved, moved) / (1.0 - feedback) ** 2
-    return widened
+    return unseen_covariance(moved, payload_kg)
 
 
 def _rolling(theta: F64, calibration: CrossSpectrumCalibration, width_m: float) -> F64:
