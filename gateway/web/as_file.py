@@ -14,7 +14,7 @@ from gateway.web.schemas import problem_responses
 CSV: Final = "text/csv; charset=utf-8"
 JSON_LINES: Final = "application/jsonl"
 
-Encoder = Callable[[Sequence[str]], str]
+Encoder = Callable[[Sequence[str]], str | bytes]
 PageBehind = Callable[[str | None], Awaitable[Page]]
 
 
@@ -39,17 +39,21 @@ def csv_lines(columns: Iterable[str], cells_of: Callable[[Any], Mapping[str, Any
     return encode
 
 
-async def sent_as_file(page_behind: PageBehind, encode: Encoder, media_type: str, name: str) -> Response:
-    """Everything from the first page on, each encoded as it is read."""
+async def sent_as_file(
+    page_behind: PageBehind, encode: Encoder, media_type: str, name: str, end: Callable[[], bytes] | None = None
+) -> Response:
+    """Everything from the first page on, each encoded as it is read; ``end`` is what stands behind the last."""
     first = await page_behind(None)  # before the answer begins: what goes wrong here is still a problem
 
-    async def pieces() -> AsyncIterator[str]:
+    async def pieces() -> AsyncIterator[str | bytes]:
         yield encode(first.items)
         cursor = first.next_cursor
         while cursor is not None:
             page = await page_behind(cursor)
             yield encode(page.items)
             cursor = page.next_cursor
+        if end is not None:
+            yield end()
 
     named = {"content-disposition": f'attachment; filename="{name}"'}
     return StreamingResponse(pieces(), media_type=media_type, headers=named)

@@ -1,18 +1,15 @@
-"""A history sent as a Parquet file while it is read: a row group for each page, so that memory stays bounded.
+"""A history as a Parquet file that is sent while it is read: a row group for each page, so that memory stays bounded.
 
 Its library is no part of a vehicle's install (extra ``archive``), and is loaded by the first who asks for such a file.
 """
 
 import io
 import json
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, Final
 
 from starlette.exceptions import HTTPException
-from starlette.responses import Response, StreamingResponse
-
-from gateway.web.as_file import PageBehind
 
 PARQUET: Final = "application/vnd.apache.parquet"  # as registered with IANA
 MISSING: Final = "this install writes no Parquet: pip install 'springscale[archive]', or ask for .csv or .jsonl"
@@ -23,7 +20,7 @@ _TEXT: Final = ("id", "vehicle_id", "distance_by")
 _INSTANTS: Final = ("t_start", "t_end")
 
 
-class _Table:
+class ParquetFile:
     """One file that grows by pages; what is written is drained after each."""
 
     def __init__(self, columns: Iterable[str], cells_of: Cells) -> None:
@@ -80,21 +77,3 @@ def kind_of(name: str) -> str:
         return "truth"
     bare = name.removeprefix("before_").removeprefix("after_")
     return "whole" if bare == "revision" or bare.startswith("n_") else "number"
-
-
-async def sent_as_parquet(page_behind: PageBehind, columns: Iterable[str], cells_of: Cells, name: str) -> Response:
-    """Everything from the first page on. Raises HTTPException 501 where the library is missing."""
-    table = _Table(columns, cells_of)
-    first = await page_behind(None)  # before the answer begins: what goes wrong here is still a problem
-
-    async def pieces() -> AsyncIterator[bytes]:
-        yield table.page(first.items)
-        cursor = first.next_cursor
-        while cursor is not None:
-            page = await page_behind(cursor)
-            yield table.page(page.items)
-            cursor = page.next_cursor
-        yield table.end()
-
-    named = {"content-disposition": f'attachment; filename="{name}"'}
-    return StreamingResponse(pieces(), media_type=PARQUET, headers=named)

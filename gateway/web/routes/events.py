@@ -16,7 +16,7 @@ from gateway.core.events.table import COLUMNS, cells_of
 from gateway.history import Page
 from gateway.records import json_line
 from gateway.web.as_file import CSV, JSON_LINES, csv_lines, file_responses, json_lines, sent_as_file
-from gateway.web.as_parquet import PARQUET, sent_as_parquet
+from gateway.web.as_parquet import PARQUET, ParquetFile
 from gateway.web.instant import Instant
 from gateway.web.reader import Reader
 from gateway.web.routes.estimates import Cursor
@@ -196,7 +196,8 @@ def _file_of(reader: Reader, kind: EntryKind, ending: str) -> Callable[..., Any]
 
         name = f"springscale-{_PATHS[kind]}.{ending}"
         if ending == "parquet":
-            return await sent_as_parquet(page_behind, COLUMNS[kind], partial(cells_of, kind), name)
+            file = ParquetFile(COLUMNS[kind], partial(cells_of, kind))
+            return await sent_as_file(page_behind, file.page, PARQUET, name, file.end)
         is_csv = ending == "csv"
         encode = csv_lines(COLUMNS[kind], partial(cells_of, kind)) if is_csv else json_lines
         return await sent_as_file(page_behind, encode, CSV if is_csv else JSON_LINES, name)
