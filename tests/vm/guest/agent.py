@@ -18,9 +18,13 @@ class Request(socketserver.StreamRequestHandler):
         if not line:  # a probe
             return
         asked = json.loads(line)
-        answer = (
-            run(asked["run"], asked["timeout_s"]) if "run" in asked else self.write(asked["write"], asked["n_bytes"])
-        )
+        try:
+            if "run" in asked:
+                answer = run(asked["run"], asked["timeout_s"])
+            else:
+                answer = self.write(asked["write"], asked["n_bytes"])
+        except OSError as failed:  # no such folder, no space
+            answer = {"code": 1, "out": "", "err": str(failed)}
         self.wfile.write(json.dumps(answer).encode() + b"\n")
 
     def write(self, path, n_bytes):
