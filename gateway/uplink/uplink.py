@@ -1,11 +1,9 @@
 """The uplink thread: takes letters from the outbox to the broker, and starts over when the link breaks."""
 
 import logging
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final, Protocol
 
@@ -13,16 +11,13 @@ from gateway.errors import ConfigurationError, StoreError
 from gateway.log import Event, log_event
 from gateway.status import UplinkStatus
 from gateway.uplink.back_off import BackOff
+from gateway.uplink.forwarder import FIRST_PAUSE_S, PAGE, Forwarder
 from gateway.uplink.link import Answer, LinkError, MqttLink
 from gateway.uplink.outbox import Letter, Outbox
 from gateway.uplink.settings import UplinkSettings
 
 POLL_S: Final = 0.5  # how long a new estimate may lie before it is seen
-LOOK_S: Final = 5.0  # how often the backlog is counted
 ANSWER_TIMEOUT_S: Final = 30.0  # a broker that takes longer is as good as gone
-PAGE: Final = 100
-FIRST_PAUSE_S: Final = 1.0
-STOP_WITHIN_S: Final = 1.0
 
 
 class Link(Protocol):
@@ -34,8 +29,8 @@ class Link(Protocol):
     def abandon(self) -> None: ...
 
 
-class Uplink:
-    """Runs until :meth:`stop`. At least once, in order: a later letter is never delivered before an earlier one.
+class Uplink(Forwarder[UplinkStatus]):
+    """Runs until :meth:`stop`, where it says goodbye. At least once, in order: no letter overtakes an earlier one.
 
     After a break the one letter under way may arrive a second time; it carries its id. After a kill
     those may whose delivery was not on disk yet. What fails is told in :meth:`report` and tried again.
@@ -51,32 +46,12 @@ class Uplink:
         connect: Callable[[UplinkSettings, Mapping[str, Any]], Link] = MqttLink,
         back_off: BackOff | None = None,
     ) -> None:
+        super().__init__(
+            outbox, UplinkStatus(settings.broker), back_off or BackOff(FIRST_PAUSE_S, settings.back_off_max_s)
+        )
         self._settings = settings
-        self._outbox = outbox
         self._birth = {"state": "online", **birth}
         self._connect = connect
-        self._back_off = back_off or BackOff(FIRST_PAUSE_S, settings.back_off_max_s)
-        self._report = UplinkStatus(settings.broker)
-        self._stop = threading.Event()
-        self._looked_s = -LOOK_S
-        self._thread = threading.Thread(target=self._run, name="uplink", daemon=True)
-
-    def start(self) -> None:
-        """Begin to connect and to deliver."""
-        self._thread.start()
-
-    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """Say goodbye to the broker and end; what is not delivered goes out after the next start."""
-        self._stop.set()
-        self._thread.join(timeout_s)
-
-    def is_alive(self) -> bool:
-        """True while the thread runs."""
-        return self._thread.is_alive()
-
-    def report(self) -> UplinkStatus:
-        """How it is; safe from any thread. What waits and what was pruned is of a few seconds ago, link or none."""
-        return self._report
 
     def _run(self) -> None:
         while not self._stop.is_set():
@@ -86,17 +61,6 @@ class Uplink:
                 self._note(str(fault))
                 self._outbox.rewind()
                 self._pause(self._back_off.next_s())
-
-    def _pause(self, pause_s: float) -> None:
-        """Until it is time to try again; what waits meanwhile is still counted."""
-        end_s = time.monotonic() + pause_s
-        while not self._stop.is_set():
-            with suppress(StoreError, TimeoutError, OSError):  # told where letters are asked for
-                self._look()
-            left_s = end_s - time.monotonic()
-            if left_s <= 0.0:
-                return
-            self._stop.wait(min(left_s, LOOK_S))
 
     def _one_connection(self) -> None:
         """Deliver until asked to stop, or until LinkError."""
@@ -155,15 +119,6 @@ class Uplink:
             if time.monotonic() > end_s:
                 raise LinkError(f"{self._report.broker} did not acknowledge for {ANSWER_TIMEOUT_S:g} s")
         return None
-
-    def _look(self) -> None:
-        if time.monotonic() - self._looked_s < LOOK_S:
-            return
-        self._looked_s = time.monotonic()
-        found = self._outbox.look()
-        self._report = replace(
-            self._report, n_waiting=found.n_waiting, waiting_age_s=found.waiting_age_s, n_pruned=found.n_pruned
-        )
 
     def _note(self, fault: str) -> None:
         """Keep what went wrong, and tell it where it is news; a connection that was there had no fault."""

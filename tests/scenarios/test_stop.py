@@ -15,7 +15,7 @@ from support.ports import first_answer, free_port
 from gateway.bus.live import source
 from gateway.service import pipeline
 from gateway.store import writer
-from gateway.uplink import uplink
+from gateway.uplink import forwarder
 from gateway.web.door import serving
 
 ROOT = Path(__file__).parents[2]
@@ -53,5 +53,5 @@ def test_all_parts_together_may_take_no_longer_than_systemd_waits() -> None:
     unit = (ROOT / "deploy/springscale.service").read_text()
     systemd_waits_s = re.search(r"^TimeoutStopSec=(\d+)$", unit, re.MULTILINE)
     assert systemd_waits_s is not None
-    parts_take_s = sum(part.STOP_WITHIN_S for part in (source, pipeline, uplink, writer, serving))
+    parts_take_s = sum(part.STOP_WITHIN_S for part in (source, pipeline, forwarder, writer, serving))
     assert parts_take_s < float(systemd_waits_s[1])

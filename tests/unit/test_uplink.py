@@ -171,7 +171,7 @@ def test_nothing_leaves_before_the_letter_ahead_is_answered(store: Store) -> Non
 
 
 def test_what_waits_is_counted_while_there_is_no_link(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.uplink.uplink.LOOK_S", 0.01)
+    monkeypatch.setattr("gateway.uplink.forwarder.LOOK_S", 0.01)
     fill(store, 3)
 
     def unreachable(_settings: UplinkSettings, _birth: Any) -> FakeBroker:

@@ -1,35 +1,31 @@
 """The webhook thread: takes letters from the outbox to the receiver, one at a time, and tries again."""
 
 import logging
-import threading
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
 from gateway.errors import ConfigurationError, StoreError
+from gateway.history import Delivery
 from gateway.log import Event, log_event
 from gateway.records import iso_utc
 from gateway.status import DeadLetter, WebhookStatus
 from gateway.uplink.back_off import BackOff
-from gateway.uplink.outbox import Letter, Outbox
+from gateway.uplink.forwarder import FIRST_PAUSE_S, PAGE, Forwarder
+from gateway.uplink.outbox import ESTIMATE, Letter, Outbox
 from gateway.uplink.webhook.receiver import Answer, Receiver, Verdict
 from gateway.uplink.webhook.settings import WebhookSettings
 
 POLL_S: Final = 1.0  # how long a new letter may lie before it is seen
-LOOK_S: Final = 5.0  # how often the backlog is counted
-PAGE: Final = 100
-FIRST_PAUSE_S: Final = 1.0
 TRIES: Final = 3  # of a letter that the receiver finds wrong
 SHOWN: Final = 20  # dead letters
-STOP_WITHIN_S: Final = 1.0
 DEAD_LETTER: Final = "webhook_dead_letter"  # as the store keeps it
 
 OnEvent = Callable[[str, Mapping[str, Any]], object]
 
 
-class Webhook:
+class Webhook(Forwarder[WebhookStatus]):
     """Runs until :meth:`stop`. At least once, in order: a later letter never leaves before an earlier one is done.
 
     A letter is done when the receiver took it, or when it is dead: found wrong ``TRIES`` times, or tried as often where
@@ -50,35 +46,15 @@ class Webhook:
         clock_s: Callable[[], float] = time.monotonic,
         poll_s: float = POLL_S,
     ) -> None:
+        super().__init__(
+            outbox, WebhookStatus(settings.receiver), back_off or BackOff(FIRST_PAUSE_S, settings.back_off_max_s)
+        )
         self._settings = settings
-        self._outbox = outbox
         self._on_event = on_event
-        self._back_off = back_off or BackOff(FIRST_PAUSE_S, settings.back_off_max_s)
         self._receiver = receiver or Receiver(settings)
         self._clock_s = clock_s
         self._poll_s = poll_s
-        self._report = WebhookStatus(settings.receiver)
         self._refused_since_s: float | None = None
-        self._stop = threading.Event()
-        self._looked_s = -LOOK_S
-        self._thread = threading.Thread(target=self._run, name="webhook", daemon=True)
-
-    def start(self) -> None:
-        """Begin to deliver."""
-        self._thread.start()
-
-    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """End; what is not delivered goes out after the next start."""
-        self._stop.set()
-        self._thread.join(timeout_s)
-
-    def is_alive(self) -> bool:
-        """True while the thread runs."""
-        return self._thread.is_alive()
-
-    def report(self) -> WebhookStatus:
-        """How it is; safe from any thread. What waits and what was pruned is of a few seconds ago."""
-        return self._report
 
     def _run(self) -> None:
         while not self._stop.is_set():
@@ -144,26 +120,8 @@ class Webhook:
         self._report = replace(self._report, n_dead=self._report.n_dead + 1, dead=(*self._report.dead, dead)[-SHOWN:])
         self._back_off.reset()
 
-    def _pause(self, pause_s: float) -> None:
-        """Until it is time to try again; what waits meanwhile is still counted."""
-        end_s = time.monotonic() + pause_s
-        while not self._stop.is_set():
-            with suppress(StoreError, TimeoutError, OSError):  # told where letters are asked for
-                self._look()
-            left_s = end_s - time.monotonic()
-            if left_s <= 0.0:
-                return
-            self._stop.wait(min(left_s, LOOK_S))
-
-    def _look(self) -> None:
-        if time.monotonic() - self._looked_s < LOOK_S:
-            return
-        self._looked_s = time.monotonic()
-        found = self._outbox.look()
-        n_pruned = found.n_pruned_entries + (found.n_pruned if "estimate" in self._settings.kinds else 0)
-        self._report = replace(
-            self._report, n_waiting=found.n_waiting, waiting_age_s=found.waiting_age_s, n_pruned=n_pruned
-        )
+    def _n_pruned(self, found: Delivery) -> int:
+        return found.n_pruned_entries + (found.n_pruned if ESTIMATE in self._settings.kinds else 0)
 
     def _note(self, fault: str, *, is_try: bool = False) -> None:
         """Keep what went wrong, and tell it where it is news."""
