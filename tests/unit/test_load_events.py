@@ -53,6 +53,16 @@ def test_the_probability_is_bayes_own():
     assert probability(before, after, 0.5, RULES) == pytest.approx(factor / (1 + factor), abs=0.01)
 
 
+@pytest.mark.parametrize("kg", [300.0, 900.0])
+@pytest.mark.parametrize("n_stops", [10, 40])
+def test_a_round_of_hops_too_short_to_weigh_ends_in_one_event(n_stops, kg):
+    """The door opened at every stop: the prior is 1 to the last digit, and the change beyond any chance."""
+    (found,) = events(day(0.0, *[None] * n_stops, kg, door=True))
+    assert found["probability"] == 1.0
+    assert found["change_kg"] == pytest.approx(kg)
+    assert len(found["stops"]) == n_stops + 1
+
+
 def test_later_batches_sharpen_the_same_event():
     whole = day(400.0, 330.0, batches=3)
     ledger = Ledger(RULES)

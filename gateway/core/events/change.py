@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.special import expit, logit
 
 from gateway.core.events.load import Load
 from gateway.core.fusion import Fused
@@ -29,7 +30,6 @@ PLACE_ACROSS_M: Final = 0.3
 LEAST_RANGE_KG: Final = 100.0
 _NODES: Final = np.linspace(-6.0, 6.0, 241)  # standard deviations about the difference found
 _STEP: Final = float(_NODES[1] - _NODES[0])
-_MOST_LOG: Final = 700.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,11 @@ class Rules:
 
 
 def probability(before: Load, after: Load, prior: float, rules: Rules) -> float:
-    """That the load changed between them, 0 to 1; ``prior`` is what it was before anything was weighed."""
-    odds = prior / (1.0 - prior) * math.exp(min(_log_bayes_factor(before, after, rules), _MOST_LOG))
-    return odds / (1.0 + odds)
+    """That the load changed between them, 0 to 1; ``prior`` is what it was before anything was weighed.
+
+    By logarithms of odds: after a round of short hops the prior is 1 to the last digit, and its odds are no number.
+    """
+    return float(expit(logit(prior) + _log_bayes_factor(before, after, rules)))
 
 
 def change_of(before: Load, after: Load, rules: Rules) -> Quantity:
