@@ -4,6 +4,7 @@ import json
 import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 from gateway.store.rows import EntryRow
@@ -47,14 +48,17 @@ def entries(
 
 
 def _stored(connection: sqlite3.Connection, window: EntryWindow, limit: int) -> list[tuple[int, str, str, str]]:
-    """Those on disk whose JSON is whole; none in a file from before there were any."""
+    """The first so many on disk whose JSON is whole; none in a file from before there were any.
+
+    A broken one is passed over before they are counted: a page with a gap would look like the last.
+    """
     if pragma(connection, "user_version") < FIRST_WITH_ENTRIES:
         return []
     beyond, order = ("<", "DESC") if window.newest_first else (">", "ASC")
     start = window.after_seq if window.after_seq is not None else (_LAST if window.newest_first else -_LAST)
     sql = f"""SELECT seq, id, kind, text FROM entries
         WHERE seq {beyond} ? AND seq <= ? AND t_end_ns >= ? AND t_end_ns < ? AND (? IS NULL OR kind = ?)
-        ORDER BY seq {order} LIMIT ?"""
+        ORDER BY seq {order}"""
     asked = (
         start,
         _LAST if window.upto_seq is None else window.upto_seq,
@@ -62,9 +66,8 @@ def _stored(connection: sqlite3.Connection, window: EntryWindow, limit: int) -> 
         _LAST if window.until_ns is None else window.until_ns,
         window.kind,
         window.kind,
-        limit,
     )
-    return [row for row in connection.execute(sql, asked) if _is_whole(row[-1])]
+    return list(islice((row for row in connection.execute(sql, asked) if _is_whole(row[-1])), limit))
 
 
 def _is_whole(text: str) -> bool:

@@ -1,6 +1,7 @@
 """Load events and trips in the store: last revisions only, one row of numbers with the estimates, nothing lost."""
 
 import json
+import sqlite3
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,23 @@ def test_times_choose(store):
         write(store, entry(n), t_end_ns=n * 10)
     settled(store)
     assert revisions(store, since_ns=10, until_ns=30) == [("event-1-abc", 1), ("event-2-abc", 1)]
+
+
+@pytest.mark.parametrize("newest_first", [False, True])
+def test_a_broken_entry_does_not_end_the_pages(tmp_path, newest_first):
+    with closing(Store.open(tmp_path)) as store:
+        for n in range(7):
+            write(store, entry(n))
+        assert store.flush(PATIENCE_S)
+        with closing(sqlite3.connect(tmp_path / "springscale.db")) as connection, connection:
+            connection.execute("UPDATE entries SET text = '{' || text WHERE id = 'event-3-abc'")
+        seen, cursor = [], None
+        while True:
+            page = store.reader().entries(limit=2, cursor=cursor, newest_first=newest_first)
+            seen += [json.loads(text)["id"] for text in page.items]
+            if (cursor := page.next_cursor) is None:
+                break
+        assert sorted(seen) == [f"event-{n}-abc" for n in (0, 1, 2, 4, 5, 6)]
 
 
 def test_estimates_are_linked_past_the_entries_between(tmp_path):
