@@ -59,13 +59,18 @@ class Inventory:
 
     def jobs(self) -> list[Job]:
         """Of every vehicle of which all is known: without one of its logs a job would be another. Largest first."""
+        pairs = list(zip(self.manifest.assignments, self.logs, strict=True))
+        in_part = {assignment.vehicle for assignment, group in pairs if not self._is_known(assignment, group)}
         found: list[Job] = []
-        for assignment, group in zip(self.manifest.assignments, self.logs, strict=True):
-            facts = self.facts[assignment.vehicle]
-            is_whole = str(assignment.logs) not in self.lost and all(log.key in facts for log in group)
-            if is_whole:
+        for assignment, group in pairs:
+            if assignment.vehicle not in in_part:
+                facts = self.facts[assignment.vehicle]
                 found += plan(self.dataset, assignment, group, facts, self.manifest.settings)
         return sorted(found, key=lambda job: (-job.size, job.slot))
+
+    def _is_known(self, assignment: Assignment, group: list[LogFile]) -> bool:
+        facts = self.facts[assignment.vehicle]
+        return str(assignment.logs) not in self.lost and all(log.key in facts for log in group)
 
 
 def look(manifest: Manifest, dataset: Place) -> Inventory:

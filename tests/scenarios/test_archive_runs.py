@@ -235,6 +235,32 @@ def test_a_vehicle_with_a_log_out_of_reach_is_not_weighed_without_it(
     assert done(archive).counts["done"] == 1
 
 
+def test_a_folder_out_of_reach_takes_nothing_back(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A vehicle was calibrated anew within the month; the one folder is there, the other cannot be listed."""
+    half_past = "2026-11-01T00:30:00Z"
+    write_drive(archive / "later" / "1.log", MIDNIGHT_NS + HOUR, 21.0, seed=5)
+    entries = [
+        f'id = "van-1"\nlogs = "van-1"\nuntil = {half_past}',
+        f'id = "van-1"\nlogs = "later"\nsince = {half_past}',
+    ]
+    write_manifest(archive, *entries)
+    assert done(archive).counts["done"] == 2
+    before = files_of(archive)
+
+    def unreachable(place: Place, below: str = "") -> list[Any]:
+        if place.url.endswith("/later"):
+            raise PlaceError(f"{place}: timed out")
+        return items(place, below)
+
+    items = Place.items
+    with monkeypatch.context() as breaking:
+        breaking.setattr(Place, "items", unreachable)
+        summary = done(archive)
+    assert (list(summary.lost), summary.n_jobs, summary.is_good) == ([str(archive / "later")], 0, False)
+    assert files_of(archive) == before
+    assert done(archive).counts["already"] == 2
+
+
 def test_an_archive_without_logs_is_told_with_where_they_were_looked_for(tmp_path: Path) -> None:
     write_manifest(tmp_path, "van-1")
     with pytest.raises(ConfigurationError, match=r"not one log in the folders of its vehicles, .*van-1; see logs and"):
