@@ -20,7 +20,7 @@ from gateway.calibration.file import (
 from gateway.calibration.file.check import Verdict
 from gateway.cli.asked.tare import tare_commands
 from gateway.cli.asked.ticket import ticket_commands
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.text.axle_weights import vehicle_block
 from gateway.cli.text.calibration import calibration_text
 from gateway.records import json_line
@@ -82,7 +82,7 @@ def verify(file: Path, campaign: Path | None, as_json: bool) -> None:
     sys.exit(0 if is_good else 1)
 
 
-KILOGRAMS = click.FloatRange(0.0, 100_000.0, min_open=True)
+KILOGRAMS = NumberRange(0.0, 100_000.0, min_open=True)
 
 
 @calibration.command("sprung")

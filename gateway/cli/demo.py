@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 import click
 
 from gateway.bus.sink import BusSink, replay_frames
+from gateway.cli.options import NumberRange
 from gateway.cli.text.estimate import sentence
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
 from gateway.log import set_up_log
@@ -38,7 +39,7 @@ VAN: Final = VehicleSection(
 @click.option("--once", is_flag=True, help="end after the first drives' estimates and print them")
 @click.option("--json", "as_json", is_flag=True, help="print estimates as JSON lines")
 @click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="port of the dashboard")
-@click.option("--speed", type=click.FloatRange(min=1.0), default=30.0, show_default=True, help="times real time")
+@click.option("--speed", type=NumberRange(min=1.0), default=30.0, show_default=True, help="times real time")
 def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
     """A van drives empty, stops, is loaded with 270 kg and drives on; watch the service weigh it.
 

@@ -13,6 +13,24 @@ from gateway.core.settings import BatchSettings
 
 FILE = click.Path(path_type=Path)
 
+
+class Number(click.types.FloatParamType):
+    """Any number that is one: click takes nan, within whatever range, and inf."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Raises a usage error for what was typed and is no finite number."""
+        number: float = super().convert(value, param, ctx)
+        if isinstance(value, str) and not math.isfinite(number):
+            self.fail(f"{value!r} is no number", param, ctx)
+        return number
+
+
+class NumberRange(Number, click.FloatRange):
+    """One within a range."""
+
+
+NUMBER = Number()
+
 as_json = click.option("--json", "as_json", is_flag=True, help="machine-readable output")
 trusted_keys = click.option(
     "--trusted-keys",
@@ -21,7 +39,7 @@ trusted_keys = click.option(
     help="file of public keys, one of which must have signed the configuration [default: nobody need]",
 )
 window = click.option(
-    "--window-s", type=click.FloatRange(20.0, 3600.0), default=None, help="length of a batch [default: 300]"
+    "--window-s", type=NumberRange(20.0, 3600.0), default=None, help="length of a batch [default: 300]"
 )
 one_estimator = click.option("--estimator", type=click.Choice(ESTIMATOR_NAMES), default=None, help="which estimator")
 

@@ -9,7 +9,7 @@ import click
 
 from gateway.bus.sink import ReplayProgress, Speed
 from gateway.cli import options
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.text.progress import StatusLine, counted
 from gateway.records import json_line
 from gateway.sim.vans import VANS
@@ -32,18 +32,18 @@ _BENCH = (
     click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True),
     click.option(
         "--longest-s",
-        type=click.FloatRange(min=0.0, min_open=True),
+        type=NumberRange(min=0.0, min_open=True),
         default=math.inf,
         help="drive no load longer than this [default: as the plan has it]",
     ),
     click.option(
         "--sensor-left-m",
-        type=click.FloatRange(-1.0, 1.0),
+        type=NumberRange(-1.0, 1.0),
         help="the inertial unit's place left of the centre line [default: as the map's sensors sit]",
     ),
     click.option(
         "--loads-off-m",
-        type=click.FloatRange(0.0, 1.0),
+        type=NumberRange(0.0, 1.0),
         default=0.0,
         help="let every load stand somewhere within this of the centre line [default: as the plan has it]",
     ),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from gateway.cli.options import NumberRange
 from gateway.config import load_settings
 from gateway.files.kept import become_owner_of
 from gateway.web import Scope, TokenFile
@@ -34,9 +35,7 @@ def token() -> None:
 @token.command("create")
 @click.argument("name")
 @click.option("--scope", type=click.Choice([str(scope) for scope in Scope]), default="read", show_default=True)
-@click.option(
-    "--days", type=click.FloatRange(min=0.0, min_open=True), help="how long it is good for; else until revoked"
-)
+@click.option("--days", type=NumberRange(min=0.0, min_open=True), help="how long it is good for; else until revoked")
 @_config
 def create(name: str, scope: str, days: float | None, config_path: Path) -> None:
     """Make a token called NAME and print it, this once."""

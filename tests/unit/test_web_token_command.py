@@ -40,4 +40,6 @@ def test_a_token_is_made_listed_and_revoked(config: Path) -> None:
 def test_mistakes_are_said(config: Path) -> None:
     assert run(config, "create", "fleet", "--scope", "everything").exit_code == 2
     assert run(config, "create", "fleet", "--days", "0").exit_code == 2
+    assert run(config, "create", "fleet", "--days", "nan").exit_code == 2
+    assert run(config, "create", "fleet", "--days", "inf").exit_code == 2
     assert isinstance(run(config, "revoke", "fleet").exception, ConfigurationError)

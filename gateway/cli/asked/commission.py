@@ -8,7 +8,7 @@ from typing import Any, Final
 import click
 
 from gateway.cli.asked.service import Service, asks_service
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, NUMBER, as_json
 from gateway.cli.text.commission import lines_text, progress_text, state_text, underway_text
 from gateway.cli.text.progress import StatusLine
 from gateway.errors import ConfigurationError, SpringscaleError
@@ -40,13 +40,15 @@ def commission() -> None:
 @commission.command("start")
 @click.option("--line", default=None, help="name of a line (`commission lines`), a file to upload, or `none`")
 @click.option("--name", default=None, help="what you call the vehicle [default: its id]")
-@click.option("--front-axle-kg", type=float, default=None, help="under the front axle of the empty vehicle")
-@click.option("--rear-axle-kg", type=float, default=None, help="the same at the rear")
-@click.option("--wheelbase-m", type=float, default=None, help="from axle to axle")
-@click.option("--sensor-m", type=float, default=None, help="sensor behind the front axle; negative: ahead of it")
-@click.option("--sensor-left-m", type=float, default=None, help="sensor left of the centre line; negative: right of it")
-@click.option("--track-m", type=float, default=None, help="between the middles of left and right tyres")
-@click.option("--payload-kg", type=float, default=None, help="most that it may carry [default: as its line, else 450]")
+@click.option("--front-axle-kg", type=NUMBER, default=None, help="under the front axle of the empty vehicle")
+@click.option("--rear-axle-kg", type=NUMBER, default=None, help="the same at the rear")
+@click.option("--wheelbase-m", type=NUMBER, default=None, help="from axle to axle")
+@click.option("--sensor-m", type=NUMBER, default=None, help="sensor behind the front axle; negative: ahead of it")
+@click.option(
+    "--sensor-left-m", type=NUMBER, default=None, help="sensor left of the centre line; negative: right of it"
+)
+@click.option("--track-m", type=NUMBER, default=None, help="between the middles of left and right tyres")
+@click.option("--payload-kg", type=NUMBER, default=None, help="most that it may carry [default: as its line, else 450]")
 @click.option("--empty", is_flag=True, help="you know that the vehicle is empty, and will be until this is over")
 @click.option("--note", default=None, help="kept in the history")
 @click.option("--follow/--no-follow", default=None, help="show progress until it is made [default: at a terminal]")
@@ -187,7 +189,7 @@ def _vehicle(said: dict[str, Any]) -> dict[str, Any]:
         if answer is None and is_needed:
             if not _is_at_terminal():
                 raise click.UsageError(f"say --{option.replace('_', '-')}: the vehicle needs it")
-            answer = click.prompt(question, type=float)
+            answer = click.prompt(question, type=NUMBER)
         if answer is not None:
             vehicle[key] = [0.0, answer] if key == MOST_PAYLOAD else answer
     return vehicle

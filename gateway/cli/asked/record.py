@@ -15,7 +15,7 @@ from gateway.bus.ring.to_file import record_to_file
 from gateway.bus.signals import load_signal_map
 from gateway.cli import options
 from gateway.cli.asked.service import Service, asks_service
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.text.progress import StatusLine
 from gateway.errors import SpringscaleError
 from gateway.records import json_line
@@ -82,7 +82,7 @@ def fetch(
 @click.option("--signals", required=True, help="signal map whose frames are wanted, or springscale:NAME")
 @options.interface
 @options.channel
-@click.option("--for-s", type=click.FloatRange(0.1), default=None, help="so many seconds [default: until Ctrl-C]")
+@click.option("--for-s", type=NumberRange(0.1), default=None, help="so many seconds [default: until Ctrl-C]")
 @as_json
 def from_bus(log: Path, signals: str, interface: str, channel: str, for_s: float | None, as_json: bool) -> None:
     """Record the mapped frames of a bus into LOG (gzip-compressed candump), without a service."""

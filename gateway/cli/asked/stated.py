@@ -1,5 +1,6 @@
 """A known weight as a person types it: the options of one, and several in --load."""
 
+import math
 from typing import Any, Final
 
 import click
@@ -27,9 +28,8 @@ class KnownLoad(click.ParamType[dict[str, Any]]):
             if not is_pair or (key not in _WORDS and not any(key in keys for _, keys in KINDS)):
                 known = ", ".join([*(key for _, keys in KINDS for key in keys), *sorted(_WORDS)])
                 self.fail(f"{part!r} is none of KEY=VALUE with KEY one of {known}", param, ctx)
-            try:
-                told[key] = text if key in _WORDS else float(text)
-            except ValueError:
+            told[key] = text if key in _WORDS else _number(text)
+            if told[key] is None:
                 self.fail(f"{key} = {text!r} is no number", param, ctx)
         return {"by": self._kind(told, param, ctx), **told}
 
@@ -38,3 +38,12 @@ class KnownLoad(click.ParamType[dict[str, Any]]):
         if len(kinds) != 1:
             self.fail("state one of gross_kg, front_axle_kg with rear_axle_kg, payload_kg with position_m", param, ctx)
         return kinds[0]
+
+
+def _number(text: str) -> float | None:
+    """None where it is none, or no finite one."""
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None
