@@ -14,7 +14,8 @@ import uvicorn
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event, set_log_level
-from gateway.setup import Setup, setup_of
+from gateway.service.commissioning import setup_in_use
+from gateway.setup import Setup
 from gateway.web import Tls, renew_certificate
 
 LIVE: Final = frozenset({"log.level", "web.tls_certificate", "web.tls_key"})
@@ -65,7 +66,7 @@ class Reloader:
         if self._setup is None:
             return []
         try:
-            fresh = setup_of(wanted)
+            fresh = setup_in_use(wanted)
         except SpringscaleError as fault:
             self.fault = f"{fault}; what was loaded before goes on until it is mended and the service restarted"
             log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=str(fault))

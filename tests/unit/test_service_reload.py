@@ -6,16 +6,26 @@ import ssl
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import trustme
+import uvicorn
+from support.calibrated import calibration_file
+from support.commissioning import Bench, in_steps, learned
 from support.patience import PATIENCE_S
+from support.signing import Signer
 from support.web import Gateway, Server, serving
 
+from gateway.calibration.commissioning import Result
+from gateway.calibration.file import CrossSpectrumPart
 from gateway.config import Settings, load_settings
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.errors import ConfigurationError
 from gateway.log import LOGGER, set_log_level
+from gateway.service.commissioning import commissioned, with_commissioned
 from gateway.service.notify import Notifier
 from gateway.service.reload import Reloader, changed_keys, tls_of
+from gateway.setup import setup_of
 from gateway.web import server_config
 
 PLAIN = 'signals = "springscale:reference"\n'
@@ -163,3 +173,64 @@ def test_systemd_is_told_when_a_reload_begins(tmp_path: Path) -> None:
         notifier.close()
     assert told["RELOADING"] == "1"
     assert int(told["MONOTONIC_USEC"]) > 0
+
+
+def with_half_car() -> Result:
+    """A fit as a commissioning makes it; what the half-car's parameters are is no matter here."""
+    part = CrossSpectrumPart(
+        empty_mass_kg=1240.0,
+        empty_front_share_pct=50.0,
+        wheelbase_m=2.8,
+        band_hz=(1.0, 14.0),
+        n_segment=256,
+        names=PARAMETERS,
+        parameters=np.zeros(len(PARAMETERS)),
+        covariance=np.eye(len(PARAMETERS)),
+        payload_inflation=1.0,
+        front_share_inflation=1.0,
+        misfit_limit=3.0,
+        acceleration_rms_mps2=0.5,
+        pitch_rate_rms_radps=0.05,
+        payload_seen_kg=(0.0, 0.0),
+        front_share_seen_pct=(50.0, 50.0),
+        speed_seen_mps=(12.0, 15.0),
+    )
+    file = calibration_file().model_copy(update={"cross_spectrum": part})
+    return Result(learned=learned(15.0), calibration=file.to_json(), calibration_id=file.id)
+
+
+def test_a_reload_believes_the_calibration_made_on_the_vehicle_as_the_start_does(tmp_path: Path) -> None:
+    """It asked for a signature that nobody could give, and warned of it until the restart."""
+    bench = Bench(tmp_path)
+    in_steps(bench)
+    for n in range(2):
+        bench.drive(n)
+    bench.worker.finish(with_half_car())
+    settings = Settings(
+        signals="springscale:reference",
+        store={"directory": bench.directory},
+        trust={"public_keys": [Signer("fitter").public_line]},
+        commissioning={"is_unsigned_believed": True},
+    )
+    chosen, setup, fault = commissioned(settings)
+    assert setup.calibration is not None
+    assert fault is None
+    reload = Reloader(chosen, lambda: with_commissioned(settings), uvicorn.Config("no:app"), setup)
+    assert reload()
+    assert reload.fault is None
+
+
+def test_a_reload_asks_for_the_signature_of_every_other_calibration(tmp_path: Path) -> None:
+    path = tmp_path / "vehicle.json"
+    path.write_text(calibration_file().to_json())
+    named = {"signals": "springscale:reference", "calibration": path, "estimator": "ratio_index"}
+    before = Settings(**named, store={"directory": tmp_path})
+    after = Settings(
+        **named,
+        store={"directory": tmp_path},
+        trust={"public_keys": [Signer("fitter").public_line]},
+        commissioning={"is_unsigned_believed": True},
+    )
+    reload = Reloader(before, lambda: with_commissioned(after), uvicorn.Config("no:app"), setup_of(before))
+    assert not reload()
+    assert "vehicle.json" in str(reload.fault)

@@ -10,7 +10,7 @@ from gateway.service.commissioning.desk import Commissioning, Drives
 from gateway.service.commissioning.drive import Vehicle
 from gateway.service.commissioning.jobs import Jobs
 from gateway.service.commissioning.lines import Lines
-from gateway.service.commissioning.start import commissioned, why_not_allowed, with_commissioned
+from gateway.service.commissioning.start import commissioned, setup_in_use, why_not_allowed, with_commissioned
 from gateway.service.commissioning.worker import Worker
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "Vehicle",
     "Worker",
     "commissioned",
+    "setup_in_use",
     "why_not_allowed",
     "with_commissioned",
 ]

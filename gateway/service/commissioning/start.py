@@ -50,12 +50,18 @@ def commissioned(settings: Settings) -> tuple[Settings, Setup, str | None]:
     if chosen is settings:
         return settings, *setup_or_last_good(settings)
     try:
-        return chosen, setup_of(chosen, read=_reading(chosen)), None
+        return chosen, setup_in_use(chosen), None
     except ConfigurationError as broken:
         log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=str(broken))
         setup, fault = setup_or_last_good(settings)
         what = f"the calibration made on the vehicle cannot be used ({broken}): make another, or undo it"
         return settings, setup, f"{what}; {fault}" if fault else what
+
+
+def setup_in_use(settings: Settings) -> Setup:
+    """The setup with the calibration in use; one that was made here is believed unsigned. Raises as ``setup_of``."""
+    chosen = with_commissioned(settings)
+    return setup_of(settings) if chosen is settings else setup_of(chosen, read=_reading(chosen))
 
 
 def _reading(settings: Settings) -> Read:
