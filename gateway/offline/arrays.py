@@ -14,6 +14,7 @@ from gateway.offline.estimates import AS_THE_SERVICE
 from gateway.records import F64, Motion, Signal
 from gateway.units import NS_PER_S
 
+MOST_S: Final = 9e9  # to the year 2255; a little later nanoseconds no longer fit into 64 bits
 _NOBODY: Final = Identity()
 
 
@@ -59,5 +60,7 @@ def _motion(t_s: F64, columns: Mapping[Signal, F64]) -> Motion:
         raise ArraysError(f"times and sensors must be of one length and one dimension; their shapes are {shapes}")
     if not np.isfinite(times_s).all():
         raise ArraysError("a time is not a number")
+    if (off := np.abs(times_s) > MOST_S).any():
+        raise ArraysError(f"a time is {times_s[off][0]:g} s, past the year 2255: give seconds, not milliseconds")
     t_ns = np.round(times_s * NS_PER_S).astype(np.int64)
     return Motion(tuple(columns), t_ns, np.column_stack(sensed))

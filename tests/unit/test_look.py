@@ -108,6 +108,17 @@ def test_a_box_on_its_side_is_mapped_by_gravity_and_braking(box: Path, tmp_path:
     assert "signals" not in {path.name for path in tmp_path.iterdir()}
 
 
+def test_a_lean_along_and_across_counts_both_where_they_read_alike(tmp_path: Path) -> None:
+    (tmp_path / "box.dbc").write_text(DBC)
+    t_ns, reads = T0_NS + np.arange(N) * 10_000_000, (2.0, 2.0, 9.4)
+    write_candump(
+        packed(512, 8, t_ns, *[(12 * i, 12, np.full(N, 100.0 * x)) for i, x in enumerate(reads)]),
+        "can0",
+        tmp_path / "a.log",
+    )
+    assert seen(tmp_path / "a.log")["tilt_deg"] == pytest.approx(16.7, abs=0.05)  # atan(2 sqrt 2 / 9.4)
+
+
 def test_who_speaks_how_often_and_how_long(box: Path) -> None:
     heard = {one["id"]: one for one in seen(box)["identifiers"]}
     assert {name: (one["lengths"], one["message"]) for name, one in heard.items()} == {

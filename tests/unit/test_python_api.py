@@ -82,6 +82,8 @@ def test_a_row_of_a_table_has_every_column(motion: Motion, calibration: gateway.
         (np.arange(3.0), np.zeros(2), r"shapes are \(3,\), \(3,\), \(3,\), \(2,\)"),
         (np.zeros((3, 1)), np.zeros(3), "one dimension"),
         (np.array([0.0, np.nan, 1.0]), np.zeros(3), "not a number"),
+        (1e3 * (1.79e9 + np.arange(3.0)), np.zeros(3), r"a time is 1.79e\+12 s, past the year 2255: give seconds"),
+        (np.array([0.0, -1e10, 1.0]), np.zeros(3), r"a time is -1e\+10 s"),
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(

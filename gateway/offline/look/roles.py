@@ -73,7 +73,7 @@ def _reads_gravity(reading: Reading) -> bool:
 
 def tilt_deg(readings: Iterable[Reading], up: Found) -> float:
     """How far the axis that is up leans, by what its message's other axes read; 0 where they are not told."""
-    beside = {r.usual for r in readings if _is_beside(r, up.reading) and math.isfinite(r.usual)}
+    beside = [r.usual for r in readings if _is_beside(r, up.reading) and math.isfinite(r.usual)]
     return math.degrees(math.atan2(math.hypot(*beside), abs(up.reading.usual)))
 
 
