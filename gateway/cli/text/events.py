@@ -16,9 +16,9 @@ def entry_sentence(entry: Entry) -> str:
 def _event(told: Mapping[str, Any]) -> str:
     change, half = told["change_kg"], _half(told["change_interval95_kg"])
     what = f"{abs(change):.0f} kg {'loaded' if change >= 0.0 else 'unloaded'} (± {half:.0f} kg)"
-    if told["is_withdrawn"]:
-        what = "withdrawn, nothing was loaded or unloaded after all"
     sure = "" if told["probability"] >= SURE else f", {told['probability']:.0%} sure"
+    if told["is_withdrawn"]:
+        what, sure = "withdrawn, nothing was loaded or unloaded after all", ""
     after = told["after"]
     where = _place(told["place"])
     return f"{_span(told)}  {what}{sure}; {after['payload_kg']:.0f} kg aboard then{where}"

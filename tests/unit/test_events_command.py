@@ -1,0 +1,83 @@
+"""springscale events: from logs what the service would have told of the same frames, under the same tare."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from support.bus_drive import white_noise
+from support.calibrated import calibration_file
+
+from gateway.bus.logs import write_candump
+from gateway.calibration.tare_file import FILE_NAME, TareEntry, TareHistory
+from gateway.cli import springscale
+from gateway.cli.text.events import entry_sentence
+from gateway.core.events import Entry, EntryKind
+from gateway.units import NS_PER_S
+
+T0_NS = 1_790_000_000 * NS_PER_S
+HOUR_NS = 3600 * NS_PER_S
+
+
+@pytest.fixture
+def drives(tmp_path: Path) -> tuple[str, str]:
+    """Two of one batch each, an hour apart, and the service's configuration; the calibration always answers 200 kg."""
+    (tmp_path / "vehicle.json").write_text(calibration_file().to_json())
+    (tmp_path / "springscale.toml").write_text(
+        'signals = "springscale:reference"\ncalibration = "vehicle.json"\nestimator = "ratio_index"\n'
+        '[batch]\nwindow_s = 20.0\n[store]\ndirectory = "state"\n[vehicle]\nid = "van-17"\n'
+    )
+    logs = tmp_path / "1.log", tmp_path / "2.log"
+    for n, log in enumerate(logs):
+        write_candump(white_noise(21.0, T0_NS + n * HOUR_NS, seed=n), "can0", log)
+    return str(logs[0]), str(logs[1])
+
+
+def said(folder: Path, *arguments: str) -> str:
+    found = CliRunner().invoke(springscale, ["events", *arguments, "--config", str(folder / "springscale.toml")])
+    assert found.exit_code == 0, found.output
+    return found.stdout
+
+
+def told(folder: Path, *logs: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in said(folder, *logs, "--json").splitlines()]
+
+
+def tare_in_use(folder: Path, payload_kg: float) -> None:
+    entry = TareEntry(
+        id="", at="2026-09-21T00:00:00.000000Z", by="yard", note=None, vehicle_id="van-17", estimator="ratio_index",
+        calibration_id=calibration_file().id, payload_kg=payload_kg, payload_std_kg=3.0, front_share_pct=0.0,
+        front_share_std_pct=0.1, n_batches=1, batch_ids=("1-a",), t_start="2026-09-21T00:00:00.000000Z",
+        t_end="2026-09-21T00:05:00.000000Z",
+    )  # fmt: skip
+    history = TareHistory(entries=(entry.model_copy(update={"id": entry.content_id()}),))
+    (folder / "state").mkdir()
+    (folder / "state" / FILE_NAME).write_text(history.model_dump_json())
+
+
+def test_each_drive_is_a_trip_with_what_was_aboard(tmp_path: Path, drives: tuple[str, str]) -> None:
+    first, second = told(tmp_path, *drives)
+    assert [one["id"].partition("-")[0] for one in (first, second)] == ["trip", "trip"]
+    assert (first["vehicle_id"], first["payload_kg"], first["is_over"]) == ("van-17", 200.0, True)
+    assert (second["payload_kg"], second["is_over"]) == (200.0, False)
+    assert first["distance_m"] == pytest.approx(21.0 * 15.0, abs=10.0)
+    lines = said(tmp_path, *drives).splitlines()
+    assert lines[0].startswith("2026-09-21 14:13 to 14:13  drove 0.3 km with 200 kg (± ")
+    assert lines[1].endswith(", still going")
+
+
+def test_loads_are_less_the_tare_that_the_service_has_in_use(tmp_path: Path, drives: tuple[str, str]) -> None:
+    tare_in_use(tmp_path, 12.0)
+    assert [one["payload_kg"] for one in told(tmp_path, *drives)] == [188.0, 188.0]
+
+
+def test_a_withdrawn_event_does_not_say_how_sure_it_was() -> None:
+    load = {"payload_kg": 300.0}
+    record = {
+        "t_start": "2026-09-21T14:13:20Z", "t_end": "2026-09-21T14:20:00Z", "change_kg": 31.0, "place": None,
+        "change_interval95_kg": [1.0, 61.0], "probability": 0.43, "is_withdrawn": True, "before": load, "after": load,
+    }  # fmt: skip
+    assert entry_sentence(Entry(EntryKind.EVENT, "event-1-a", T0_NS, record)) == (
+        "2026-09-21 14:13 to 14:20  withdrawn, nothing was loaded or unloaded after all; 300 kg aboard then"
+    )
