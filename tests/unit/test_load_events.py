@@ -149,6 +149,18 @@ def test_a_tare_is_no_change_of_load():
     assert found["change_kg"] == pytest.approx(200.0)
 
 
+def test_a_refused_batch_takes_no_tare_back():
+    first, second, refused = day(300.0, 500.0, None)
+    zero = Quantity(60.0, 3.0), Quantity(0.5, 0.05)
+    tared = [
+        replace(one, tare=Correction("t", *zero, raw_payload=one.payload, raw_front_share=one.front_share))
+        for one in (first, second)
+    ]
+    (before,), (after,) = events(tared), events([*tared, refused])
+    assert before["after"]["payload_kg"] == 440.0
+    assert after == before
+
+
 def test_another_calibration_is_compared_with_none():
     first, second = day(300.0, 100.0)
     assert not events([first, replace(second, calibration_id="sha256:2")])

@@ -37,11 +37,11 @@ class Day:
     def found(self) -> Loads:
         return loads_of(self.weighings, self.links, self.rules)
 
-    @property
+    @cached_property
     def zero(self) -> Quantity:
-        """What the newest batch has taken off for its tare; nothing without one."""
-        tare = self.estimates[-1].tare
-        return Quantity(0.0, 0.0) if tare is None else tare.payload
+        """What the newest batch that counted has taken off for its tare; one that was refused takes nothing off."""
+        counted = next((one for one in reversed(self.estimates) if one.counted), None)
+        return Quantity(0.0, 0.0) if counted is None or counted.tare is None else counted.tare.payload
 
     def payload_of(self, load: Load) -> Quantity:
         """As it is told: less the zero that is in use now."""
