@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 from support.patience import PATIENCE_S, until
-from support.web import Gateway, Server, serving
+from support.web import Client, Gateway, Server, serving
 
 from gateway.web.door import connection, turns
 
@@ -237,3 +237,19 @@ def test_one_address_waits_for_its_own_answers_and_no_other(tmp_path: Path, monk
             writer.transport.abort()
 
     run(tmp_path, scenario)
+
+
+def test_whatever_reads_the_history_waits_for_its_turn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Events, trips and alarms, as pages and as files, did not: one client could have taken every thread with them."""
+    monkeypatch.setattr(turns, "WAIT_S", 0.0)
+    monkeypatch.setattr(turns, "ANSWERS_PER_CLIENT", 0)
+    with Gateway(tmp_path) as gateway:
+        client = Client(gateway.app)
+        described = client.get("/openapi.json").json()["paths"]
+        asks = {
+            path: {one["name"] for one in its.get("get", {}).get("parameters", ())} for path, its in described.items()
+        }
+        history = [path for path, names in asks.items() if names & {"since", "cursor", "starttime"}]
+        assert len(history) >= 12
+        answered = {path: client.get(path).status_code for path in history}
+    assert answered == dict.fromkeys(history, 503)

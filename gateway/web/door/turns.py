@@ -14,7 +14,15 @@ STREAMS_PER_CLIENT: Final = 32
 WAIT_S: Final = 5.0  # for a turn
 PIECE_BYTES: Final = 16_384
 
-_HISTORY: Final = ("/api/v1/estimates", "/api/v1/export", "/api/v1/record", "/rfms/")
+_HISTORY: Final = (
+    "/api/v1/estimates",
+    "/api/v1/events",
+    "/api/v1/trips",
+    "/api/v1/alarms",
+    "/api/v1/export",
+    "/api/v1/record",
+    "/rfms/",
+)
 _STREAM: Final = "/api/v1/stream"
 _LOOK_S: Final = 0.05
 
@@ -33,7 +41,8 @@ class Turns:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         path = scope.get("path", "")
         is_stream = path == _STREAM
-        if scope["type"] != "http" or not (is_stream or path.startswith(_HISTORY)):
+        is_asked = scope["type"] == "http" and scope["method"] == "GET"
+        if not (is_asked and (is_stream or path.startswith(_HISTORY))):
             await self._app(scope, receive, send)
             return
         mine = (_client_of(scope), is_stream)
