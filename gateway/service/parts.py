@@ -24,7 +24,7 @@ from gateway.setup import Setup
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings, uplink_settings
 from gateway.uplink.webhook import Webhook, WebhookSettings, webhook_settings
-from gateway.web import Board
+from gateway.web import Board, Scales
 
 SECONDS_PER_DAY = 86_400.0
 BYTES_PER_MB = 1_000_000
@@ -90,7 +90,7 @@ def store_of(wanted: StoreSection, undelivered_to: tuple[str, ...]) -> Store:
 
 def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
     """It shows what was known before; a disk that refuses even to be read is no reason not to start."""
-    board = Board(stale_after_s=stale_after_s)
+    board = Board(stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None))
     try:
         board.restore(**asdict(store.reader().latest()))
     except (StoreError, ValueError, KeyError) as fault:  # the last two: another version's record

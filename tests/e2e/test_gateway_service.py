@@ -171,6 +171,7 @@ def test_the_process_tells_systemd_and_stops_with_exit_code_zero(config: Path, t
             latest = first_answer(f"http://127.0.0.1:{port}/api/v1/estimates/latest").json()
             assert latest["rejected"] == ["no_estimate_yet"]
             assert latest["payload_kg"] is None
+            assert latest["weights"]["gross"]["lacks"] == "estimate"  # the vehicle is calibrated
             assert first_answer(f"http://127.0.0.1:{port}/health/live").status_code == 200
             process.send_signal(signal.SIGTERM)
             _, errors = process.communicate(timeout=PATIENCE_S)

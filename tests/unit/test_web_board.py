@@ -2,11 +2,12 @@
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from support.estimates import WINDOW_NS, make_estimate, make_record
 
-from gateway.estimate import Quantity
+from gateway.estimate import Lack, Quantity, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
 from gateway.web import Board
@@ -29,7 +30,7 @@ def board(clock: Clock) -> Board:
     return Board(stale_after_s=900.0, clock=clock)
 
 
-def latest(board: Board) -> dict[str, object]:
+def latest(board: Board) -> dict[str, Any]:
     told = json.loads(board.latest()[1])
     assert isinstance(told, dict)
     return told
@@ -43,6 +44,20 @@ def test_before_any_estimate_all_is_null_and_says_why(board: Board) -> None:
     assert told["last_rejection"] is None
     assert {told[name] for name in ("id", "payload_kg", "front_share_pct", "t_end", "payload_interval95_kg")} == {None}
     assert set(make_record(0)) <= set(told)
+
+
+def test_before_any_estimate_a_calibrated_vehicle_is_told_to_lack_only_that(clock: Clock) -> None:
+    gross = Weight(limit_kg=2000.0, lacks=Lack.ESTIMATE)
+    board = Board(stale_after_s=900.0, clock=clock, unweighed=Weights(gross=gross))
+    board.publish(make_estimate(1, Why.GAP))
+    assert latest(board)["weights"]["gross"] == {
+        "kg": None,
+        "std_kg": None,
+        "limit_kg": 2000.0,
+        "is_over_limit": False,
+        "lacks": "estimate",
+        "is_unsprung_estimated": False,
+    }
 
 
 def test_the_estimate_is_shown_as_it_is_with_its_age(board: Board, clock: Clock) -> None:

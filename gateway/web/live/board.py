@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from gateway.estimate import UNKNOWN, Estimate, Quantity
+from gateway.estimate import UNKNOWN, Estimate, Quantity, Weights
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.records import Why, json_line
 from gateway.web.live.fanout import Fanout, StreamEvent
@@ -17,11 +17,12 @@ RECENT: Final = 100
 ESTIMATE: Final = "estimate"
 REJECTION: Final = "rejection"
 PROVISIONAL: Final = "provisional"
+_NOT_CALIBRATED: Final = Weights()
 
 
-def _nothing_yet() -> dict[str, Any]:
-    """The JSON of the estimate before the first: its names, all null, and the reason."""
-    blank = estimate_to_json(Estimate(0, 0, "", rejected=(Why.NO_ESTIMATE_YET,)))
+def _nothing_yet(weights: Weights) -> dict[str, Any]:
+    """The JSON of the estimate before the first: its names, all null, the reason, and what weights lack."""
+    blank = estimate_to_json(Estimate(0, 0, "", rejected=(Why.NO_ESTIMATE_YET,), weights=weights))
     return {**dict.fromkeys(blank), **{name: blank[name] for name in ("shares", "diagnostics", "weights", "rejected")}}
 
 
@@ -72,8 +73,10 @@ class _Answer:
     received_s: float | None
 
     @classmethod
-    def of(cls, estimate: Estimate | None, rejection: Estimate | None, received_s: float | None) -> "_Answer":
-        record = _nothing_yet() if estimate is None else estimate_to_json(estimate)
+    def of(
+        cls, estimate: Estimate | None, rejection: Estimate | None, received_s: float | None, none_yet: dict[str, Any]
+    ) -> "_Answer":
+        record = none_yet if estimate is None else estimate_to_json(estimate)
         short = None if rejection is None else estimate_to_json(replace(rejection, spectra=None))
         tag = f"{record['id'] or 'none'}.{'none' if short is None else short['id']}"
         if estimate is not None and estimate.is_provisional:
@@ -90,15 +93,22 @@ class Board:
     have been unloaded there.
 
     Estimates are kept as their JSON tells them, rounded: what follows from them is the same before and
-    after a restart.
+    after a restart. ``unweighed`` are the weights before the first: what may be known of them, and what they lack.
     """
 
-    def __init__(self, *, stale_after_s: float = 900.0, clock: Callable[[], float] = boot_clock_s) -> None:
+    def __init__(
+        self,
+        *,
+        stale_after_s: float = 900.0,
+        clock: Callable[[], float] = boot_clock_s,
+        unweighed: Weights = _NOT_CALIBRATED,
+    ) -> None:
         self._stale_after_s = stale_after_s
         self._clock = clock
         self._lock = threading.Lock()
         self._rejection: Estimate | None = None
-        self._answer = _Answer.of(None, None, None)
+        self._none_yet = _nothing_yet(unweighed)
+        self._answer = _Answer.of(None, None, None, self._none_yet)
         self._heard: Estimate | None = None  # the last full batch, answered or not
         self._recent: deque[Estimate] = deque(maxlen=RECENT)  # good estimates, oldest first
         self._drive_has_estimate = False
@@ -132,7 +142,7 @@ class Board:
             full = [one for one in (answer, refusal) if one is not None]
             self._heard = max(full, key=lambda one: one.t_end_ns, default=None)
             received_s = None if age_s is None or answer is None else self._clock() - age_s
-            self._answer = _Answer.of(answer, refusal, received_s)
+            self._answer = _Answer.of(answer, refusal, received_s, self._none_yet)
 
     def close(self) -> None:
         """End every stream; those who come later get none."""
@@ -184,9 +194,10 @@ class Board:
             self._heard = estimate
         if kind == REJECTION:
             self._rejection = estimate
-            self._answer = _Answer.of(self._answer.estimate, estimate, self._answer.received_s)
+            shown = self._answer
+            self._answer = _Answer.of(shown.estimate, estimate, shown.received_s, self._none_yet)
         elif kind == ESTIMATE or not (self._drive_has_estimate or estimate.rejected):
             if kind == ESTIMATE:
                 self._drive_has_estimate = True
                 self._recent.append(estimate)
-            self._answer = _Answer.of(estimate, self._rejection, now_s)
+            self._answer = _Answer.of(estimate, self._rejection, now_s, self._none_yet)
