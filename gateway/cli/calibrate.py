@@ -28,7 +28,7 @@ from gateway.records import json_line
 
 @click.command("calibrate")
 @click.argument("campaign", type=FILE)
-@click.option("--output", type=FILE, default=None, help="calibration file to write; needed but for --plan")
+@click.option("--output", type=FILE, default=None, help="calibration file to write; not needed with --plan or --check")
 @click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]")
 @click.option("--runs", "numbers", type=RunNumbers(), default=None, help="these runs only, counted from 1: 1,5,10")
 @click.option(

@@ -46,7 +46,9 @@ def test_what_was_recorded_is_weighed_as_it_was_live(tmp_path: Path, log: Path) 
         assert wait_until(lambda: not written.status().n_frames_held)
         listed = service.told("record", "list")
         assert [item["n_frames"] for item in listed["items"]] == [service.gateway.pipeline.n_frames]
-        assert " bytes  2026-09-21T14:13:20Z to " in service.ask("record", "list").output
+        said = service.ask("record", "list").output
+        assert " bytes  2026-09-21T14:13:20Z to " in said
+        assert "\n1 file, " in said
         assert service.told("record", "fetch", "--output", str(first))["items"] == listed["items"]
         status = first_answer(f"{service.gateway.url}/api/v1/status").json()
         assert status["record"]["n_frames_written"] == service.gateway.pipeline.n_frames

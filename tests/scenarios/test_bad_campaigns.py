@@ -89,6 +89,8 @@ def test_a_sound_campaign_passes_without_a_word(folder: Path) -> None:
     lines = calibrate(altered(folder, "one", [1, 10]), "--check").stdout.splitlines()
     assert [line.split("; ")[0].split(": ")[1] for line in lines[:2]] == ["sound"] * 2
     assert lines[2].startswith("2 of 2 runs can be used: 0 to 420 kg")
+    alone = calibrate(altered(folder, "alone", [1]), "--check").stdout.splitlines()
+    assert alone[-1].endswith(": 0 kg, 50.0 % in front")
 
 
 def test_what_would_tell_where_loads_lie_to_the_side_is_noted_where_it_is_missing(folder: Path) -> None:

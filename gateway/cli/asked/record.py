@@ -19,6 +19,7 @@ from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.text.progress import StatusLine
 from gateway.errors import SpringscaleError
 from gateway.records import json_line
+from gateway.words import counted
 
 PATH: Final = "/api/v1/record"
 PIECE_BYTES: Final = 65_536
@@ -160,7 +161,7 @@ def _list_text(items: list[dict[str, Any]]) -> str:
         return "nothing is recorded: is [record] enabled, and has a block's time passed?"
     lines = [f"{item['name']}  {item['n_bytes']:>11} bytes  {_span_text([item])}" for item in items]
     n_bytes = sum(item["n_bytes"] for item in items)
-    return "\n".join([*lines, f"{len(items)} files, {n_bytes / 1e6:.1f} MB"])
+    return "\n".join([*lines, f"{counted(len(items), 'file')}, {n_bytes / 1e6:.1f} MB"])
 
 
 def _span_text(items: list[dict[str, Any]]) -> str:

@@ -33,7 +33,13 @@ def _trip(told: Mapping[str, Any]) -> str:
 
 
 def _span(told: Mapping[str, Any]) -> str:
-    return f"{told['t_start'][:10]} {told['t_start'][11:16]} to {told['t_end'][11:16]}"
+    """The day is said again where it is another one at the end."""
+    (day, begun), (last_day, ended) = (_minute(told[name]) for name in ("t_start", "t_end"))
+    return f"{day} {begun} to {ended if last_day == day else f'{last_day} {ended}'}"
+
+
+def _minute(t: str) -> tuple[str, str]:
+    return t[:10], t[11:16]
 
 
 def _half(interval: tuple[float, float]) -> float:

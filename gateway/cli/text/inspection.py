@@ -1,6 +1,6 @@
 """Verdicts on known-load drives, as people and programs read them."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from gateway.calibration.inspection import Finding, Inspection, RunVerdict, SplitRun
 
@@ -22,10 +22,14 @@ def _in_all(inspection: Inspection) -> str:
     if not runs:
         return counted
     payloads_kg, shares_pct = [run.payload_kg for run in runs], [run.front_share_pct for run in runs]
-    return (
-        f"{counted}: {min(payloads_kg):g} to {max(payloads_kg):g} kg, "
-        f"{min(shares_pct):.1f} to {max(shares_pct):.1f} % in front"
-    )
+    loads, shares = _from_to(payloads_kg, "g"), _from_to(shares_pct, ".1f")
+    return f"{counted}: {loads} kg, {shares} % in front"
+
+
+def _from_to(numbers: Sequence[float], form: str) -> str:
+    """Least and greatest; one number where they read alike."""
+    least, greatest = format(min(numbers), form), format(max(numbers), form)
+    return least if least == greatest else f"{least} to {greatest}"
 
 
 def _run_line(one: SplitRun, verdict: RunVerdict) -> str:
