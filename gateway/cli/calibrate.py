@@ -22,6 +22,7 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError, CampaignError, ConfigurationError
+from gateway.files.whole import write_whole
 from gateway.offline import inspect
 from gateway.records import json_line
 
@@ -185,9 +186,9 @@ def _require_places(output: Path | None, report: Path | None) -> None:
 
 def _write(output: Path, file: CalibrationFile) -> None:
     try:
-        output.write_text(file.to_json(), encoding="utf-8")
+        write_whole(output, file.to_json())
     except OSError as fault:
-        raise ConfigurationError(f"{output}: cannot be written: {fault.strerror}") from None
+        raise ConfigurationError(f"{output}: cannot be written: {fault.strerror or fault}") from None
 
 
 def _inspect(campaign: Campaign, numbers: Sequence[int] | None, settings: BatchSettings) -> Inspection:

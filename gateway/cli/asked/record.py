@@ -18,6 +18,7 @@ from gateway.cli.asked.service import Service, asks_service
 from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.text.progress import StatusLine
 from gateway.errors import SpringscaleError
+from gateway.files.whole import written_whole
 from gateway.records import json_line
 from gateway.words import counted
 
@@ -123,15 +124,11 @@ def _until_told(stop: threading.Event) -> Iterator[None]:
 @contextlib.contextmanager
 def _written_whole(output: Path) -> Iterator[BinaryIO]:
     """A file that has its name only once it is whole. Raises SpringscaleError where the disk refuses."""
-    part = output.with_name(output.name + ".part")
     try:
-        with part.open("wb") as file:
+        with written_whole(output) as file:
             yield file
-        part.replace(output)
     except OSError as fault:
         raise SpringscaleError(f"{output}: cannot be written: {fault.strerror or fault}") from None
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _pieces(service: Service, name: str, n_bytes: int) -> Iterator[bytes]:

@@ -1,0 +1,35 @@
+"""A file that a person asked for: it has its name once it is whole, and what was there before stays until then."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+
+@contextmanager
+def written_whole(output: Path) -> Iterator[BinaryIO]:
+    """To write ``output`` by; links are followed, a pipe or a terminal is written as it comes. Raises OSError."""
+    place = output.resolve()
+    if place.exists() and not place.is_file():
+        with place.open("wb") as file:
+            yield file
+        return
+    part = place.with_name(place.name + ".part")
+    try:
+        with part.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        if place.exists():
+            shutil.copymode(place, part)
+        part.replace(place)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_whole(output: Path, text: str) -> None:
+    """All of it at once."""
+    with written_whole(output) as file:
+        file.write(text.encode("utf-8"))
