@@ -29,9 +29,12 @@ def main() -> None:
     """Gather the pages, then build them: any warning is an error. An argument names another output folder."""
     gather()
     output = sys.argv[1] if len(sys.argv) > 1 else str(ROOT / "build/site")
-    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", output]
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", output]  # --quiet counts no warning
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}  # docs/adr/docs-site.md
-    sys.exit(subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode)
+    built = subprocess.run(command, cwd=ROOT, env=environment, check=False, capture_output=True, text=True)
+    if built.returncode:
+        sys.stderr.write(built.stderr)
+    sys.exit(built.returncode)
 
 
 def gather() -> None:

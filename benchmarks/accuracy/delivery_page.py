@@ -78,7 +78,8 @@ def delivery_page(found: Mapping[str, Any]) -> str:
             f"{trips['true_tkm']:.1f} true; {_share(trips['n_held'], trips['n'])} within their 95 % intervals; the "
             f"distance, by the receiver's speed, {trips['mean_abs_distance_pct']:.1f} % off in the mean.",
             "",
-            "What an event is and how its probability is found: [method](method.md#load-events-and-trips).",
+            "What an event is and how its probability is found: "
+            "[method](method.md#load-events-and-trips-gatewaycoreevents).",
             "",
         ]
     )

@@ -29,6 +29,23 @@ def test_every_page_is_there(site: Path) -> None:
     assert (site / "index.html").is_file()
 
 
+def test_a_link_to_a_heading_that_is_not_there_fails_the_site(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    gather = make_site.gather
+
+    def with_a_dead_link() -> None:
+        gather()
+        (make_site.PAGES / "errors.md").write_text("[gone](index.md#no-such-heading)")
+
+    monkeypatch.setattr(make_site, "gather", with_a_dead_link)
+    monkeypatch.setattr(sys, "argv", ["make_site.py", str(tmp_path)])
+    with pytest.raises(SystemExit) as end:
+        make_site.main()
+    assert end.value.code == 1
+    assert "no-such-heading" in capfd.readouterr().err
+
+
 def test_nothing_is_loaded_from_elsewhere(site: Path) -> None:
     named = [
         (file.name, found)
