@@ -33,7 +33,8 @@ of Parquet files that DuckDB, polars and pandas read:
     springscale reprocess ARCHIVE --output DATASET
 
 ARCHIVE is a manifest, or a folder with an `archive.toml` or `archive.parquet` in it. Both may lie on this computer or
-in an object store. This wants `pip install 'springscale[archive]'` (pyarrow and obstore), which no vehicle needs.
+in an object store. This wants `pip install '.[archive]'` in a checkout ([elsewhere](deployment.md#install)): pyarrow
+and obstore, which no vehicle needs.
 """
 
 MANIFEST: Final = """\
@@ -124,7 +125,7 @@ obstore speaks, so a small proxy turned each into the JSON one, its condition al
 
 ### On many computers
 
-    pip install 'springscale[cluster]'                                   # everywhere, the same version
+    pip install '.[cluster]'                                             # everywhere, of the same checkout
     dask scheduler                                                       # on one of them
     dask worker tcp://SCHEDULER:8786 --nthreads 1 --nworkers auto        # on each
     springscale reprocess s3://fleet/archive --output s3://fleet/estimates --scheduler tcp://SCHEDULER:8786
@@ -156,6 +157,7 @@ DATASET: Final = """\
     DATASET/estimates/vehicle=van-17/month=2026-03/JOB.parquet    one row a batch
     DATASET/receipts/vehicle=van-17/month=2026-03/JOB.json        the table of the same name is whole
     DATASET/failed/vehicle=van-17/month=2026-03/NAME.json         what gave nothing, and why
+    DATASET/logs/vehicle=van-17.json                              each log's hash and the instant of its first frame
 
 A job is the drives of one vehicle in one month, in order. JOB is the hash of everything that its rows follow from: the
 logs' own hashes, signal map, calibration, tares, settings, and the code that weighs. The same inputs make the same name
