@@ -1,6 +1,7 @@
 """TOML files that people write: read, checked against a model, every fault named with its file and key."""
 
 import tomllib
+from math import isnan
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -69,8 +70,14 @@ def checked(
 
 
 def describe_faults(where: Path | str, fault: ValidationError) -> str:
-    """One line a fault: file, key, what is wrong and what stands there."""
-    return "\n".join(f"{where}: {_key(e['loc'])}: {_what(dict(e))}" for e in fault.errors(include_url=False))
+    """One line a fault: file, key, what is wrong and what stands there.
+
+    A list is not told to be too short for want of what is told to be wrong in it.
+    """
+    faults = fault.errors(include_url=False)
+    within = {each["loc"][:n] for each in faults for n in range(len(each["loc"]))}
+    told = (each for each in faults if each["type"] != "too_short" or each["loc"] not in within)
+    return "\n".join(f"{where}: {_key(each['loc'])}: {_what(dict(each))}" for each in told)
 
 
 def _key(location: tuple[int | str, ...]) -> str:
@@ -96,6 +103,8 @@ def _beyond(fault: dict[str, Any]) -> str:
     """ "1240 is above 30: millimetres?" """
     said, name = _BEYOND[fault["type"]]
     number, bound = fault["input"], fault["ctx"][name]
+    if isinstance(number, float) and isnan(number):
+        return f"{number} is no number"
     key = next((part for part in reversed(fault["loc"]) if isinstance(part, str)), "")
     unit = _taken_for(key, number, bound) if isinstance(number, int | float) else None
     return f"{number} {said} {bound:g}" + (f": {unit}?" if unit else "")

@@ -17,6 +17,7 @@ from gateway.core.vehicle import (
     left_share_pct,
     sensor_offset_left,
 )
+from gateway.core.weights import unsprung_kg
 from gateway.errors import CampaignError
 from gateway.stated import PAYLOAD_LENGTH, Kilograms, Metres, MetresLeft, PayloadLengthM, Percent
 from gateway.toml_file import checked, read_toml
@@ -28,7 +29,7 @@ LEAST_PAYLOAD_SHARE: Final = 0.004
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class VehicleTable(_Table):
@@ -215,6 +216,13 @@ def _range_faults(vehicle: Vehicle) -> Iterator[str]:
     most_kg = vehicle.payload_range_kg[1]
     if _is_in_tonnes(most_kg, vehicle):
         yield f"payload_range_kg: {most_kg:g} kg is no load of a vehicle of {vehicle.empty_mass_kg:g} kg; tonnes?"
+    for end, unsprung in zip(("front", "rear"), unsprung_kg(vehicle), strict=True):
+        if unsprung <= 0.0:
+            yield (
+                f"kerb_{end}_axle_kg: is {-unsprung:g} kg less than what empty_mass_kg and empty_front_share_pct put "
+                "on this axle: scales show axle and wheels besides; `springscale calibration sprung` makes these "
+                "figures from axle weights"
+            )
 
 
 def _faults(campaign: Campaign, run: RunTable) -> Iterator[str]:

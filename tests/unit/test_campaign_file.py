@@ -128,6 +128,12 @@ FAULTS = [
         campaign_text('signals = "s"', {"track_width_m": "0.6"}, LOADED_RUN | {"payload_left_m": "-1.8"}),
         "runs[1].payload_left_m: 270 kg at -1.8 m would put -4 % of the weight on the left wheels",
     ),
+    (campaign_text(vehicle={"gross_limit_kg": "inf"}), "vehicle.gross_limit_kg: Input should be a finite number"),
+    (campaign_text('signals = "s"', None, EMPTY_RUN | {"end_s": "inf"}), "runs[1].end_s: Input should be a finite"),
+    (
+        campaign_text(vehicle={"kerb_rear_axle_kg": "600.0"}),
+        "vehicle.kerb_rear_axle_kg: is 20 kg less than what empty_mass_kg and empty_front_share_pct put on this axle",
+    ),
     ('signals = "s"\n[vehicle]\n' + lines(VEHICLE), "runs: missing"),
     ('signals = "s"\nruns = []\n[vehicle]\n' + lines(VEHICLE), "runs: "),
     ("signals = \n", "line 1"),
@@ -142,6 +148,10 @@ def test_each_fault_is_named(tmp_path: Path, text: str, said: str) -> None:
 def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
     faults = fault_of(tmp_path, campaign_text('signals = ""', {"wheelbase_m": "-1.0"}, EMPTY_RUN, {"log": '"a.log"'}))
     assert len(faults.splitlines()) == 3
+
+
+def test_a_fault_in_the_only_run_is_not_told_as_a_want_of_runs(tmp_path: Path) -> None:
+    assert fault_of(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN | {"end_s": "-1.0"})).count("\n") == 0
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:

@@ -37,6 +37,7 @@ class Written(BaseModel):
         ({"speed_mps": 80.0}, "speed_mps: 80.0 is not below 60: km/h?"),
         ({"speed_mps": 0}, "speed_mps: 0 is not above 0"),
         ({"port": 70000}, "port: 70000 is above 65535"),
+        ({"speed_mps": float("nan")}, "speed_mps: nan is no number"),
         ({"bounds_m": [{"length_m": 2800}, {"length_m": 1}]}, "bounds_m[1].length_m: 2800 is above 20: millimetres?"),
     ],
 )
