@@ -27,8 +27,10 @@ FORMULA: Final = re.compile(r"^\$\$(?P<block>.+?)\$\$$|\$(?P<inline>[^$\n]+)\$",
 
 def main() -> None:
     """Gather the pages, then build them: any warning is an error. An argument names another output folder."""
-    gather()
     output = sys.argv[1] if len(sys.argv) > 1 else str(ROOT / "build/site")
+    if output.startswith("-"):
+        sys.exit(f"{output}: no option is known here, and no folder is called so")
+    gather()
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", output]  # --quiet counts no warning
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}  # docs/adr/docs-site.md
     built = subprocess.run(command, cwd=ROOT, env=environment, check=False, capture_output=True, text=True)
