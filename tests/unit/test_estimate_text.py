@@ -5,7 +5,7 @@ from dataclasses import replace
 from support.estimates import make_estimate
 
 from gateway.cli.text.estimate import sentence
-from gateway.estimate import Estimate, Quantity, Weight, Weights
+from gateway.estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
 
@@ -20,6 +20,14 @@ def test_a_line_says_when_how_much_and_how_sure() -> None:
     assert line(ANSWER) == (
         "1970-01-01T00:00:00Z  payload   100.0 kg ±  12.0 (95 %)   front share 50.50 % ± 0.40 (95 %)    50.4 km/h"
     )
+
+
+def test_what_the_calibration_does_not_hold_is_said_to_be_unknown() -> None:
+    """Loads all at one place calibrate the ratio index for payload alone."""
+    assert line(replace(ANSWER, front_share=UNKNOWN)) == (
+        "1970-01-01T00:00:00Z  payload   100.0 kg ±  12.0 (95 %)   front share unknown    50.4 km/h"
+    )
+    assert "payload unknown   front share 50.50 % ± 0.40 (95 %)" in line(replace(ANSWER, payload=UNKNOWN))
 
 
 def test_where_the_load_lies_sideways_is_said_where_something_tells() -> None:

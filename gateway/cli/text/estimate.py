@@ -11,12 +11,19 @@ def sentence(record: Mapping[str, Any]) -> str:
     when = f"{record['t_start'][:19]}Z"
     if record["rejected"]:
         return f"{when}  no estimate: {', '.join(record['rejected'])}"
-    return (
-        f"{when}  payload {record['payload_kg']:7.1f} kg ± {_half(record['payload_interval95_kg']):5.1f} (95 %)   "
-        f"front share {record['front_share_pct']:5.2f} % ± {_half(record['front_share_interval95_pct']):4.2f} (95 %)   "
-        f"{_aside(record)}{record['mean_speed_mps'] / si_factor('speed', 'km/h'):5.1f} km/h"
-        f"{_too_much(record)}"
-    )
+    payload = _told(record, "payload", "kg", "7.1f", "5.1f")
+    front_share = _told(record, "front_share", "pct", "5.2f", "4.2f")
+    speed_kmh = record["mean_speed_mps"] / si_factor("speed", "km/h")
+    return f"{when}  {payload}   {front_share}   {_aside(record)}{speed_kmh:5.1f} km/h{_too_much(record)}"
+
+
+def _told(record: Mapping[str, Any], name: str, unit: str, form: str, half_form: str) -> str:
+    """A quantity and half its interval; a calibration may hold one of the two alone."""
+    words, number = name.replace("_", " "), record[f"{name}_{unit}"]
+    if number is None:
+        return f"{words} unknown"
+    half = _half(record[f"{name}_interval95_{unit}"])
+    return f"{words} {number:{form}} {'%' if unit == 'pct' else unit} ± {half:{half_form}} (95 %)"
 
 
 def _aside(record: Mapping[str, Any]) -> str:
