@@ -11,6 +11,7 @@ true of loads that calibration has not seen.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
+from math import isfinite, nan
 from statistics import fmean
 from typing import Final
 
@@ -27,6 +28,7 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import names_of, upright
 from gateway.core.cross_spectrum.search import Found
 from gateway.core.vehicle import Vehicle
+from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
 
 LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
@@ -79,6 +81,11 @@ def fit_cross_spectrum(
         return inherited.on(untested, is_tested=False) if inherited else untested
 
     calibration = taught(known, _from_priors(known, prior, shifts, step))
+    if not isfinite(calibration.misfit_limit):
+        raise CalibrationImpossibleError(
+            "hardly two stretches were driven at one speed, so that nothing tells whether the half-car fits: drive at "
+            "an even speed"
+        )
     untested = calibration if inherited else replace(calibration, warnings=(*calibration.warnings, UNTESTED))
     if not can_leave_out:
         return CrossSpectrumFit(untested, {})
@@ -152,7 +159,7 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         covariance=found.covariance,
         payload_inflation=UNTESTED_INFLATION,
         front_share_inflation=UNTESTED_INFLATION,
-        misfit_limit=MISFIT_MARGIN * float(np.nanmax(misfits)),
+        misfit_limit=MISFIT_MARGIN * max((one for one in misfits if isfinite(one)), default=nan),
         acceleration_rms_mps2=float(np.median([k.spectra.acceleration_rms_mps2 for k in known])),
         pitch_rate_rms_radps=float(np.median([k.spectra.pitch_rate_rms_radps for k in known])),
         payload_seen_kg=(min(payloads), max(payloads)),

@@ -112,8 +112,7 @@ class _Labelled:
 
     def _is_strained(self) -> bool:
         """True where no half-car explains some run with its label."""
-        misfits = [k.whittle.misfit(k.at(self.fitted.x)) for k in self.known]
-        return float(np.nanmax(misfits)) > STRAINED_MISFIT
+        return any(k.whittle.misfit(k.at(self.fitted.x)) > STRAINED_MISFIT for k in self.known)
 
     def doubted(self) -> tuple[int, Point] | None:
         """The run whose load the others contradict most, and what they weigh it at; None where they contradict none."""
