@@ -55,7 +55,7 @@ def weights_of(
     rear = _Axle(known, share=1.0 - known.share, sign=-1.0, roll_share=1.0 - roll_share, unsprung=below.rear)
     gross_kg = known.sprung_kg + below.front.number + below.rear.number
     return Weights(
-        gross=known.weight(gross_kg, [1.0], below.both.std, vehicle.gross_limit_kg),
+        gross=known.weight(gross_kg, [1.0], below.both.std, vehicle.gross_limit_kg, is_estimated=below.is_estimated),
         front_axle=front.whole(vehicle.front_axle_limit_kg),
         rear_axle=rear.whole(vehicle.rear_axle_limit_kg),
         front_left=front.wheel(1.0, vehicle.front_wheel_limit_kg),
@@ -79,12 +79,17 @@ class _Known:
         self._has_answer = math.isfinite(self.sprung_kg) and math.isfinite(self.share)
         self._is_sideways = sideways.is_known
 
-    def weight(self, kg: float, slopes: Sequence[float], unsprung_std_kg: float, limit_kg: float | None) -> Weight:
-        """``slopes`` by what was estimated, in the order of Errors: as many as this weight follows from."""
+    def weight(
+        self, kg: float, slopes: Sequence[float], unsprung_std_kg: float, limit_kg: float | None, *, is_estimated: bool
+    ) -> Weight:
+        """``slopes`` by what was estimated, in the order of Errors: as many as this weight follows from.
+
+        ``is_estimated`` is of the unsprung mass: errors of two axles may cancel in it, and yet it was not stated.
+        """
         if math.isnan(kg):
             return Weight(limit_kg=limit_kg, lacks=self._lack(is_wheel=len(slopes) > _BY_AXLES))
         std_kg = math.hypot(self._errors.std(slopes), unsprung_std_kg)
-        return Weight(kg, std_kg, limit_kg, None, is_unsprung_estimated=unsprung_std_kg > 0.0)
+        return Weight(kg, std_kg, limit_kg, None, is_unsprung_estimated=is_estimated)
 
     def _lack(self, *, is_wheel: bool) -> Lack:
         """Why a weight is unknown, the first cause first."""
@@ -112,7 +117,8 @@ class _Axle:
         """Both wheels."""
         sprung_kg = self.known.sprung_kg
         kg = self.share * sprung_kg + self.unsprung.number
-        return self.known.weight(kg, [self.share, self.sign * sprung_kg], self.unsprung.std, limit_kg)
+        slopes = [self.share, self.sign * sprung_kg]
+        return self.known.weight(kg, slopes, self.unsprung.std, limit_kg, is_estimated=self.unsprung.std > 0.0)
 
     def wheel(self, side: float, limit_kg: float | None) -> Weight:
         """``side`` is 1 to the left, -1 to the right."""
@@ -128,4 +134,5 @@ class _Axle:
             ],
             0.5 * self.unsprung.std,
             limit_kg,
+            is_estimated=self.unsprung.std > 0.0,
         )

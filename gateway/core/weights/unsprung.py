@@ -23,6 +23,11 @@ class Unsprung:
         variance = one**2 + other**2 + 2.0 * self.correlation * one * other
         return Quantity(self.front.number + self.rear.number, math.sqrt(max(0.0, variance)))
 
+    @property
+    def is_estimated(self) -> bool:
+        """True where either axle's was not stated."""
+        return self.front.std > 0.0 or self.rear.std > 0.0
+
     def unless_stated(self, vehicle: Vehicle) -> "Unsprung":
         """What the fitter of ``vehicle`` stated, and these where nothing was."""
         front_kg, rear_kg = unsprung_kg(vehicle)
