@@ -16,7 +16,7 @@ from gateway.core.cross_spectrum.model.matrix import SpectralMatrix
 from gateway.core.cross_spectrum.model.parameters import INDEX, Ground, names_of, upright
 from gateway.records import F64
 
-GROUND = Ground.of(WIDE_VAN)
+GROUND = Ground.of(WIDE_VAN, with_roll=True)
 READING = Reading(WIDE_VAN.wheelbase_m, (1.1, 14.0), 256, with_roll=True)
 LOADED = (150.0, 0.49, 0.03)
 STEPS = (1.0, 1e-4, 1e-4)  # of payload in kg, front share, lateral place in m

@@ -8,6 +8,7 @@ from support.calibrated import first_version, second_version
 
 from gateway.calibration.file import load_calibration
 from gateway.calibration.file.calibration_file import FIRST_VERSION, MIGRATIONS, VERSION, content_id, migrated
+from gateway.core.cross_spectrum.model.parameters import LEAST_SLACK, LEAST_SLACK_ON_CENTRE_LINE
 from gateway.core.vehicle import MEASURED_OFFSET_STD_M, UNKNOWN_OFFSET_STD_M
 
 SHIPPED = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
@@ -91,3 +92,18 @@ def test_the_shipped_calibration_is_of_this_version_and_loads_as_it_is() -> None
     assert (shipped.id, shipped.migrated_from) == (content["id"], None)
     assert shipped.for_core().cross_spectrum is not None
     assert shipped.for_core().ratio_index is not None
+
+
+def test_what_was_fitted_with_more_slack_keeps_it(tmp_path: Path) -> None:
+    content = json.loads(SHIPPED.read_text())
+    fitted_anew = load_calibration(SHIPPED).for_core().cross_spectrum
+    assert fitted_anew is not None
+    assert fitted_anew.ground.least_slack == LEAST_SLACK_ON_CENTRE_LINE
+    content["version"] = 5
+    del content["cross_spectrum"]["least_slack"]
+    content["id"] = content_id(content)
+    path = tmp_path / "van.json"
+    path.write_text(json.dumps(content))
+    fitted_then = load_calibration(path).for_core().cross_spectrum
+    assert fitted_then is not None
+    assert fitted_then.ground.least_slack == LEAST_SLACK

@@ -33,14 +33,14 @@ Content = dict[str, Any]
 FIRST_VERSION: Final = 1
 
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 5
+VERSION: Final = 6
 
 
 class CalibrationFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-calibration"] = FORMAT
-    version: Literal[5] = VERSION
+    version: Literal[6] = VERSION
     migrated_from: str | None = Field(
         None, description="id of the file of an older version that this content was read from; null: written as it is"
     )
@@ -216,9 +216,15 @@ def _to_version_5(content: Content) -> None:
         content["cross_spectrum"]["payload_length_m"] = None
 
 
+def _to_version_6(content: Content) -> None:
+    """Version 6 says how much slack the model has at least. Before, it was one percent with a roll rate too."""
+    if content["cross_spectrum"] is not None:
+        content["cross_spectrum"]["least_slack"] = 0.01
+
+
 # Entry v turns version v into v + 1. Entries are never edited, only added.
 MIGRATIONS: Final[Mapping[int, Callable[[Content], None]]] = MappingProxyType(
-    {1: _to_version_2, 2: _to_version_3, 3: _to_version_4, 4: _to_version_5}
+    {1: _to_version_2, 2: _to_version_3, 3: _to_version_4, 4: _to_version_5, 5: _to_version_6}
 )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import LEAST_SLACK, PARAMETERS, ROLL_PARAMETERS
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import TERMS, RegressionModel
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
@@ -178,6 +178,7 @@ class CrossSpectrumPart(Part):
     sensor_left_m: float = 0.0
     sensor_left_std_m: float = Field(UNKNOWN_OFFSET_STD_M, gt=0.0)
     payload_length_m: float | None = Field(None, gt=0.0)
+    least_slack: float = Field(LEAST_SLACK, gt=0.0)
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "CrossSpectrumPart":

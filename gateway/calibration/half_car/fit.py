@@ -172,5 +172,6 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         sensor_left_m=vehicle.sensor_offset_left_m,
         sensor_left_std_m=vehicle.sensor_offset_left_std_m,
         payload_length_m=vehicle.payload_length_m,
+        least_slack=known[0].whittle.ground.least_slack,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),
     )

@@ -78,7 +78,7 @@ class KnownSpectra:
         return self._vehicle.empty_mass_kg / self.total_kg
 
     def _whittle(self, spectra: CrossSpectra) -> Whittle:
-        return Whittle(spectra, Ground.of(self._vehicle), EVIDENCE_WEIGHT)
+        return Whittle(spectra, Ground.of(self._vehicle, with_roll=self.spectra.roll is not None), EVIDENCE_WEIGHT)
 
 
 def known_spectra(

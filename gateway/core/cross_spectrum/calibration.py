@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.measured import Reading
-from gateway.core.cross_spectrum.model.parameters import INDEX, Ground, mount_of
+from gateway.core.cross_spectrum.model.parameters import INDEX, LEAST_SLACK, Ground, mount_of
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
 from gateway.core.weights import Unsprung
 from gateway.estimate import Quantity
@@ -26,7 +26,7 @@ class CrossSpectrumCalibration:
     band. usual_log_amplitude: see measured.Reading. gravity_mps2 is what the accelerometer read on average; None where
     the file does not say. The two scores are the largest that are believed of a sensor that nobody touched
     (sensor_change). As stated, the sensor sits sensor_left_m left of the centre line, and what is carried usually
-    reaches payload_length_m along the floor.
+    reaches payload_length_m along the floor. least_slack: see parameters.Ground.
     """
 
     empty_mass_kg: float
@@ -58,12 +58,13 @@ class CrossSpectrumCalibration:
     sensor_left_m: float = 0.0
     sensor_left_std_m: float = UNKNOWN_OFFSET_STD_M
     payload_length_m: float | None = None
+    least_slack: float = LEAST_SLACK
 
     @property
     def ground(self) -> Ground:
         """The vehicle as stated, in the core's terms."""
         share = self.empty_front_share_pct / 100.0
-        return Ground(self.empty_mass_kg, share, self.wheelbase_m, self.track_width_m)
+        return Ground(self.empty_mass_kg, share, self.wheelbase_m, self.track_width_m, self.least_slack)
 
     @property
     def unsprung(self) -> Unsprung:

@@ -9,7 +9,6 @@ Three things make groups differ that carry the same load:
 """
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.special import k1
@@ -30,8 +29,6 @@ from gateway.core.cross_spectrum.model.parameters import (
 from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_response
 from gateway.records import C128, F64
 
-SLACK_FLOOR: Final = 0.01
-
 Paths = tuple[C128, ...]
 """Responses (p, ..., m) of p sensors by front and rear axle, both tracks alike; then one against the other."""
 
@@ -41,12 +38,14 @@ class SpectralModel:
     """Vehicles theta (..., n) with their loads, solved but not yet driven at any speed.
 
     ``paths`` (p, ..., 3, m) are to a unit of road under one axle, at three amplitudes of movement; slack (p, ..., m) is
-    a share of each sensor's power, noise (p, ..., 1) a density in the square of the sensor's unit per hertz.
+    a share of each sensor's power, least_slack and what parameters add; noise (p, ..., 1) is a density in the square of
+    the sensor's unit per hertz.
     tracks_apart_m and twist_level are None for a vehicle that does not roll.
     """
 
     paths: Paths
     slack: F64
+    least_slack: float
     noise: F64
     track_offset_m: F64
     delay_scale: F64
@@ -82,7 +81,8 @@ def spectral_model(
     with_roll = has_roll(theta)
     return SpectralModel(
         paths=responses(theta, load, ground, freq_hz, n_sensors),
-        slack=np.stack([_slack(theta, knots, freq_hz) for knots in SLACK_KNOTS[:n_sensors]]),
+        slack=ground.least_slack + np.stack([_slack(theta, knots, freq_hz) for knots in SLACK_KNOTS[:n_sensors]]),
+        least_slack=ground.least_slack,
         noise=np.stack([value_of(theta, name) for name in NOISES[:n_sensors]]),
         track_offset_m=value_of(theta, "track_offset_m"),
         delay_scale=value_of(theta, "delay_scale"),
@@ -145,6 +145,6 @@ def _twist(model: SpectralModel, spectra: CrossSpectra) -> F64 | None:
 
 
 def _slack(theta: F64, knots: range, freq_hz: F64) -> F64:
-    """Slack (..., m) of one sensor: log-linear between its knots, above a floor."""
-    slack: F64 = SLACK_FLOOR + np.exp(theta[..., knots.start : knots.stop] @ slack_weights(freq_hz))
+    """Slack (..., m) of one sensor above the least: log-linear between its knots."""
+    slack: F64 = np.exp(theta[..., knots.start : knots.stop] @ slack_weights(freq_hz))
     return slack

@@ -90,19 +90,34 @@ _OF_ROAD_AND_SENSORS: Final = ("slack_", "noise_", "track", "twist_", "delay_sca
 VEHICLE_PARAMETERS: Final = frozenset(i for name, i in INDEX.items() if not name.startswith(_OF_ROAD_AND_SENSORS))
 
 
+LEAST_SLACK: Final = 0.01
+"""Of each sensor's power, what comes by no modelled path at least: roll and loose parts. Chosen."""
+
+LEAST_SLACK_ON_CENTRE_LINE: Final = 0.002
+"""The same once roll is taken out: known loads cohere by more than LEAST_SLACK allows (benchmarks/accuracy/trials.md).
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """What is known of the vehicle without calibration."""
+    """What is known of the vehicle without calibration, and least_slack, how well it is believed to be modelled."""
 
     empty_mass_kg: float
     empty_front_share: float
     wheelbase_m: float
     track_width_m: float | None = None
+    least_slack: float = LEAST_SLACK
 
     @classmethod
-    def of(cls, vehicle: Vehicle) -> "Ground":
-        """Of a vehicle as its fitter states it."""
-        return cls(vehicle.empty_mass_kg, vehicle.empty_front_share, vehicle.wheelbase_m, vehicle.track_width_m)
+    def of(cls, vehicle: Vehicle, *, with_roll: bool = False) -> "Ground":
+        """Of a vehicle as its fitter states it; ``with_roll`` where its sensors are read as on the centre line."""
+        return cls(
+            vehicle.empty_mass_kg,
+            vehicle.empty_front_share,
+            vehicle.wheelbase_m,
+            vehicle.track_width_m,
+            LEAST_SLACK_ON_CENTRE_LINE if with_roll else LEAST_SLACK,
+        )
 
     @property
     def half_weight_kn(self) -> float:

@@ -8,7 +8,6 @@ from scipy.special import k0, k1
 
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.driven import (
-    SLACK_FLOOR,
     Driven,
     Paths,
     SpectralModel,
@@ -127,7 +126,7 @@ def _by_other(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectr
 def _by_slack(sensor: int, knot: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
     changed = SpectralMatrix.zeros(len(model.slack), by.phase.shape)
     if sensor < len(model.slack):
-        share = (model.slack[sensor] - SLACK_FLOOR) * slack_weights(spectra.freq_hz)[knot]
+        share = (model.slack[sensor] - model.least_slack) * slack_weights(spectra.freq_hz)[knot]
         own = power(by.paths[0][sensor]) + power(by.paths[1][sensor])
         if by.twist is not None:
             own = own + by.twist * (power(by.paths[2][sensor]) + power(by.paths[3][sensor]))
