@@ -5,7 +5,7 @@ import threading
 from contextlib import contextmanager
 
 import can
-from support.patience import wait_until
+from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus.live import Around, around_of
 from gateway.bus.live import around as around_module
@@ -66,6 +66,25 @@ def test_one_look_at_a_time_and_one_a_minute(monkeypatch):
     around.stop()
     assert (len(n_opened), around.heard) == (1, ())
     around.look()  # stopped
+    assert len(n_opened) == 1
+
+
+def test_a_sensor_that_comes_and_goes_begins_no_second_look_beside_the_first():
+    n_opened = []
+    is_over = threading.Event()
+
+    def slow():
+        n_opened.append(1)
+        is_over.wait(PATIENCE_S)
+        raise OSError(errno.ENETDOWN, "Network is down")
+
+    around = Around(slow)
+    around.look()
+    assert wait_until(lambda: n_opened)
+    around.forget()
+    around.look()
+    is_over.set()
+    around.stop()
     assert len(n_opened) == 1
 
 

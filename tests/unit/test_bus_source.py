@@ -182,7 +182,7 @@ def test_a_silent_bus_is_no_fault(listen):
 
 def test_a_silent_bus_that_talks_of_other_things_is_told_apart(listen, monkeypatch):
     packets = iter(range(1000, 10**9, 10))
-    monkeypatch.setattr(source_module, "interface_statistics", lambda channel: {"rx_packets": next(packets)})
+    monkeypatch.setattr(source_module, "packets_received", lambda channel: next(packets))
     source, _ = listen(Burst(frames(1)), silence_s=0.02)
     wait_for(lambda: source.reason and "none has a mapped identifier" in source.reason)
     assert source.state is SourceState.BUS_SILENT

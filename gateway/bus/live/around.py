@@ -44,7 +44,9 @@ class Around:
 
     def look(self) -> None:
         """Begin to look around, unless a look is under way or was just taken."""
-        if self._open is None or time.monotonic() - self._begun_s < EVERY_S or self._stopping.is_set():
+        is_looking = self._thread is not None and self._thread.is_alive()
+        is_early = time.monotonic() - self._begun_s < EVERY_S
+        if self._open is None or is_looking or is_early or self._stopping.is_set():
             return
         self._begun_s = time.monotonic()
         self._thread = threading.Thread(target=self._run, args=(self._open,), name="can-around", daemon=True)

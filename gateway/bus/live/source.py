@@ -20,7 +20,7 @@ import can
 from gateway.bus.live.inbox import Inbox
 from gateway.bus.live.python_can import open_python_can, require_known_interface
 from gateway.bus.live.receiver import BUS_OFF, Burst, Receiver
-from gateway.bus.live.socketcan import interface_statistics, open_socketcan
+from gateway.bus.live.socketcan import open_socketcan, packets_received
 from gateway.bus.signals import SignalMap
 from gateway.log import Event, log_event
 
@@ -62,7 +62,7 @@ _EVENTS: Final[Mapping[SourceState, Event]] = {  # that it stops is the service'
 
 @dataclass(frozen=True, slots=True)
 class SourceCounts:
-    """What came and what was lost since the start. ``interface`` holds the system's own receive counters."""
+    """What came and what was lost since the start."""
 
     frames: int
     dropped_inbox: int
@@ -72,7 +72,6 @@ class SourceCounts:
     remote_frames: int
     reconnects: int
     stamped_at_receipt: int
-    interface: Mapping[str, int]
 
 
 class LiveSource:
@@ -105,7 +104,7 @@ class LiveSource:
             else (lambda: open_python_can(interface, channel, signal_map.filters, width, options or {}))
         )
         self.inbox = Inbox(inbox_frames, width, waits_for_room=interface == "virtual")
-        self._statistics = interface_statistics if is_socketcan else _no_statistics
+        self._packets_received = packets_received if is_socketcan else _none_told
         self._tally: Counter[str] = Counter()
         self._error_classes: Counter[str] = Counter()
         self._dropped_before = 0  # by receivers already closed
@@ -158,7 +157,6 @@ class LiveSource:
             remote_frames=self._tally["remote_frames"],
             reconnects=self._tally["reconnects"],
             stamped_at_receipt=self._tally["stamped_at_receipt"],
-            interface=self._statistics(self._channel),
         )
 
     def _run(self) -> None:
@@ -231,7 +229,7 @@ class LiveSource:
 
     def _silence(self) -> str:
         """Why nothing comes: the bus sleeps, or it talks of other things (frames seen since the silence began)."""
-        n_seen = self._statistics(self._channel).get("rx_packets", 0)
+        n_seen = self._packets_received(self._channel)
         if self._state is not SourceState.BUS_SILENT:
             self._seen_at_silence = n_seen
         if n_seen > self._seen_at_silence:
@@ -244,5 +242,5 @@ class LiveSource:
         return reason.format(channel=self._channel)
 
 
-def _no_statistics(channel: str) -> dict[str, int]:
-    return {}
+def _none_told(channel: str) -> int:
+    return 0
