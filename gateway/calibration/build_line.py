@@ -16,11 +16,13 @@ def build_line(
     runs: Mapping[str, Sequence[KnownRun]],
     on_sibling: Callable[[], None] = lambda: None,
 ) -> LineFile:
-    """The line of ``files``. With the ``runs`` of two or more of them, by id, each is left out in turn.
+    """The line of ``files``, each once however often it is named.
 
+    With the ``runs`` of two or more of them, by id, each is left out in turn: no twin must tell what it is asked.
     ``on_sibling`` is called after each that was. Raises LineError where the files make no line, or what is given of
     runs is too little to leave one out.
     """
+    files = list({one.id: one for one in files}.values())
     line = line_of_files(files)
     warnings: tuple[str, ...] = (NOT_LEFT_OUT,)
     expected = None

@@ -94,6 +94,13 @@ def test_the_order_of_files_does_not_change_the_line(sisters: list[Path], tmp_pa
     assert (tmp_path / "one").read_bytes() == (tmp_path / "other").read_bytes()
 
 
+def test_a_file_that_is_named_twice_is_one_vehicle(sisters: list[Path], tmp_path: Path) -> None:
+    for name, files in (("one", sisters), ("other", [*sisters, sisters[0]])):
+        built = run("line", "build", *files, "--output", tmp_path / name)
+        assert f"{name}: 3 vehicles" in built.stdout
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "other").read_bytes()
+
+
 def test_what_is_no_line_is_refused_with_what_to_do(sisters: list[Path], tmp_path: Path) -> None:
     ratio_index = tmp_path / "ratio_index.json"
     ratio_index.write_text(calibration_file().to_json())
