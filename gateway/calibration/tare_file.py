@@ -3,13 +3,13 @@
 It lies beside the database, apart from the calibration file, which no tare changes.
 """
 
-import hashlib
 import json
 from pathlib import Path
 from typing import Final, Literal
 
 from pydantic import Field, ValidationError
 
+from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.file.parts import Part
 from gateway.core.tare import Tare, Weighed, Zero
 from gateway.errors import ConfigurationError
@@ -58,9 +58,7 @@ class TareEntry(Part):
 
     def content_id(self) -> str:
         """What ``id`` has to be."""
-        content = self.model_dump(mode="json", exclude={"id", "ended"})
-        text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
+        return content_id(self.model_dump(mode="json", exclude={"id", "ended"}))
 
 
 class TareHistory(Part):

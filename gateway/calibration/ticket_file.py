@@ -1,12 +1,11 @@
 """tickets.json: known weights that the vehicle's own calibration learns from, and the fits made with them."""
 
-import hashlib
-import json
 from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
 from gateway.calibration.commissioning.job import Planned
+from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.file.parts import Part
 from gateway.stated_weight import StatedWeight
 
@@ -47,9 +46,7 @@ class Ticket(Part):
 
     def content_id(self) -> str:
         """What ``id`` has to be."""
-        content = self.model_dump(mode="json", exclude={"id", "withdrawn"})
-        text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
+        return content_id(self.model_dump(mode="json", exclude={"id", "withdrawn"}))
 
 
 class TicketFit(Part):

@@ -1,11 +1,10 @@
 """verifications.json: known loads that were weighed without learning from them, with their errors and a verdict."""
 
-import hashlib
-import json
 from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
+from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.file.parts import Part
 from gateway.calibration.known_weight import KnownWeight
 from gateway.core.vehicle import Vehicle
@@ -71,9 +70,7 @@ class Verification(Part):
 
     def content_id(self) -> str:
         """What ``id`` has to be."""
-        content = self.model_dump(mode="json", exclude={"id"})
-        text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
+        return content_id(self.model_dump(mode="json", exclude={"id"}))
 
 
 class VerificationHistory(Part):

@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gateway.errors import CommissioningRefusedError, ConfigurationError
+from gateway.calibration.file import load_calibration
+from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError
 from gateway.files.kept import KeptFiles
 from gateway.log import Event, log_event, tell_event
 from gateway.records import iso_utc
-from gateway.service.commissioning.record import FILE_NAME, Record, Underway, load_record, save_record
+from gateway.service.commissioning.record import FILE_NAME, MADE, Record, Underway, load_record, save_record
 
 OnEvent = Callable[[str, Mapping[str, Any]], object]
 
@@ -49,12 +50,23 @@ class Book:
         except OSError as fault:
             raise CommissioningRefusedError("not_stored", f"{name} cannot be written: {fault}") from None
 
+    def write_calibration(self, text: str, calibration_id: str) -> str:
+        """A calibration that was made here -> the name of its file, which was read as the next start will read it.
+
+        Raises CommissioningRefusedError, and CalibrationFileError where it is not what was fitted.
+        """
+        name = f"{MADE}{calibration_id.removeprefix('sha256:')[:16]}.json"
+        self.write(name, text.encode())
+        if load_calibration(self.directory / name).id != calibration_id:
+            raise CalibrationFileError(f"{name}: is not what was fitted")
+        return name
+
     def forget_others(self) -> None:
         """Remove calibrations and copies of lines that nothing here names any more. Raises OSError."""
         named = {one.file_name for one in self.record.made} | {one.line.copy_name for one in self.record.made}
         if self.record.underway is not None and self.record.underway.line is not None:
             named.add(self.record.underway.line.copy_name)
-        for path in (*self.directory.glob("commissioned-*.json"), *self.directory.glob("line-*.json")):
+        for path in (*self.directory.glob(f"{MADE}*.json"), *self.directory.glob("line-*.json")):
             if path.name not in named:
                 path.unlink()
 

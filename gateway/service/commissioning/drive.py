@@ -7,20 +7,18 @@ from typing import Any, Final
 
 from gateway.calibration.campaign import VehicleTable
 from gateway.calibration.commissioning import Job, Result, vehicle_table
-from gateway.calibration.file import load_calibration
 from gateway.calibration.kept import KeptBatch, Shelf, packed
 from gateway.errors import CalibrationFileError, CommissioningRefusedError
 from gateway.log import Event
 from gateway.records import Why
 from gateway.service.commissioning.book import Book
 from gateway.service.commissioning.jobs import BatchFile, Jobs
-from gateway.service.commissioning.record import LineChoice, Made, Underway, save_record
+from gateway.service.commissioning.record import MADE, LineChoice, Made, Underway, save_record
 from gateway.service.commissioning.steps import Looked
 from gateway.service.commissioning.worker import Worker
 from gateway.stated import VehicleAnswers
 
 OWNER: Final = "commissioning"  # of the batches that the shelf must not give away
-MADE: Final = "commissioned-"  # the names of calibrations begin so
 LEAST_BATCHES: Final = 2  # one may be an odd one; whoever asks for the fit may have it of one
 LOOKED_AT: Final = "looked-at.batch"
 
@@ -193,10 +191,7 @@ class EmptyDrive:
             change = {"learned": result.learned, "fault": fault, "is_fit_asked": False}
             self._book.keep(underway.model_copy(update=change))
             return
-        name = f"{MADE}{result.calibration_id.removeprefix('sha256:')[:16]}.json"
-        self._book.write(name, result.calibration.encode())
-        if load_calibration(self._book.directory / name).id != result.calibration_id:  # read as the next start will
-            raise CalibrationFileError(f"{name}: is not what was fitted")
+        name = self._book.write_calibration(result.calibration, result.calibration_id)
         line = underway.line or LineChoice(name="")
         made = Made(
             id=result.calibration_id,

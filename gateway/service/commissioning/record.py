@@ -15,6 +15,7 @@ from gateway.stated import VehicleAnswers
 from gateway.toml_file import describe_faults
 
 FILE_NAME: Final = "commissioning.json"
+MADE: Final = "commissioned-"  # the names of calibrations begin so
 MOST_MADE: Final = 20  # calibrations; the oldest beyond are forgotten, and their files removed
 
 Source = Literal["package", "administrator", "uploaded"]

@@ -5,13 +5,11 @@ from contextlib import suppress
 from typing import Any
 
 from gateway.calibration.commissioning import Job, Result
-from gateway.calibration.file import load_calibration
 from gateway.calibration.kept import Shelf
 from gateway.calibration.ticket_file import Ticket, TicketFit, TicketHistory
 from gateway.core.vehicle import front_share_pct
 from gateway.errors import CalibrationFileError, CommissioningRefusedError
 from gateway.service.commissioning import Book, Jobs, Worker
-from gateway.service.commissioning.drive import MADE
 from gateway.service.commissioning.jobs import EMPTY, BatchFile
 from gateway.service.commissioning.record import Ended, Made
 from gateway.service.tare_desk import SERVICE
@@ -109,10 +107,7 @@ class Refit:
         self, base: Made, tickets: tuple[Ticket, ...], result: Result, calibration: str, calibration_id: str
     ) -> None:
         """Keep it, to be used from the next drive on."""
-        name = f"{MADE}{calibration_id.removeprefix('sha256:')[:16]}.json"
-        self._book.write(name, calibration.encode())
-        if load_calibration(self._book.directory / name).id != calibration_id:  # read as the next start will
-            raise CalibrationFileError(f"{name}: is not what was fitted")
+        name = self._book.write_calibration(calibration, calibration_id)
         made = Made(
             id=calibration_id,
             file_name=name,
