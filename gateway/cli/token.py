@@ -34,7 +34,13 @@ def token() -> None:
 
 @token.command("create")
 @click.argument("name")
-@click.option("--scope", type=click.Choice([str(scope) for scope in Scope]), default="read", show_default=True)
+@click.option(
+    "--scope",
+    type=click.Choice([str(scope) for scope in Scope]),
+    default="read",
+    show_default=True,
+    help="read: may ask; operate: may also change something",
+)
 @click.option("--days", type=NumberRange(min=0.0, min_open=True), help="how long it is good for; else until revoked")
 @_config
 def create(name: str, scope: str, days: float | None, config_path: Path) -> None:
