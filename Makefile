@@ -67,11 +67,12 @@ bench: .venv/.development deb
 	$(BIN)/python -m benchmarks.speed --output docs/performance.json
 	$(BIN)/python docs/make_performance.py
 
-# Fifty vehicles into a broker and a database that are killed meanwhile; wants Debian's mosquitto and postgresql. Some
-# minutes; writes docs/fleet_test.json and its place in docs/fleet.md.
+# Fifty vehicles, or `make fleet-test VEHICLES=500`, into a broker and a database that are killed meanwhile; wants
+# Debian's mosquitto and postgresql. Some minutes; writes docs/fleet_test.json and its place in docs/fleet.md.
+VEHICLES := 50
 fleet-test: .venv/.development
 	rm -f build/fleet-test.json
-	$(BIN)/python -m pytest tests/fleet
+	SPRINGSCALE_FLEET=$(VEHICLES) $(BIN)/python -m pytest tests/fleet
 	test ! -e build/fleet-test.json || $(BIN)/python docs/make_fleet.py build/fleet-test.json
 
 # The installed package on a real vcan0 under real systemd, in a small virtual machine: wants root, /dev/net/tun and the

@@ -1,11 +1,11 @@
 """Writes what `make fleet-test` counted into docs/fleet.md; with --check only tells whether it stands there.
 
-The counts are those of docs/fleet_test.json; `python docs/make_fleet.py build/fleet-test.json` takes new ones.
+The counts are those of docs/fleet_test.json, the last run with each number of vehicles;
+`python docs/make_fleet.py build/fleet-test.json` takes new ones.
 """
 
 import json
 import re
-import shutil
 import sys
 from pathlib import Path
 from typing import Any, Final
@@ -24,11 +24,26 @@ def fleet_page() -> str:
     return PART.sub(lambda found: found[1] + told + found[2], PAGE.read_text(encoding="utf-8"))
 
 
-def table(counts: dict[str, Any]) -> str:
-    """What was done and what came of it."""
+def table(runs: list[dict[str, Any]]) -> str:
+    """What was done and what came of it, a column for each number of vehicles."""
     times = {1: "once", 2: "twice", 3: "three times"}
-    blows = ", ".join(f"{blow} {times[n]}" for blow, n in counts["blows"].items())
-    rows = {
+    first = runs[0]
+    blows = ", ".join(f"{blow} {times[n]}" for blow, n in first["blows"].items())
+    columns = [rows(counts) for counts in runs]
+    head = "".join(f" {counts['vehicles']} vehicles |" for counts in runs)
+    lines = "".join(f"| {name} |{''.join(f' {column[name]} |' for column in columns)}\n" for name in columns[0])
+    return (
+        f"`make fleet-test`, last run on {first['machine']} with {first['database']}: vehicles simulated with the\n"
+        "product's own store, outbox and uplink, over TLS, a hundred in each process.\n"
+        f"Killed meanwhile: {blows}.\n\n"
+        f"| |{head}\n|---|{'---|' * len(runs)}\n{lines}"
+    )
+
+
+def rows(counts: dict[str, Any]) -> dict[str, Any]:
+    """One run's figures by what they are."""
+    return {
+        "Seconds": counts["seconds"],
         "Estimates written by the vehicles, rows of them": f"{counts['estimates']}, {counts['estimate_rows']}",
         "Load events, trips and alarms, rows of them": f"{counts['entries']}, {counts['entry_rows']}",
         "Lost": counts["estimates"] + counts["entries"] - counts["estimate_rows"] - counts["entry_rows"],
@@ -39,19 +54,19 @@ def table(counts: dict[str, Any]) -> str:
         "A record in the database, indexes included": f"{counts['bytes_of_an_estimate']} bytes",
         "Connections that the vehicles made": counts["connections_of_vehicles"],
     }
-    lines = "".join(f"| {name} | {number} |\n" for name, number in rows.items())
-    return (
-        f"`make fleet-test`, last run on {counts['machine']} with {counts['database']}: {counts['vehicles']}\n"
-        "vehicles, simulated with the product's own store, outbox and uplink, over TLS, in\n"
-        f"{counts['seconds']} s. Killed meanwhile: {blows}.\n\n"
-        f"| | |\n|---|---|\n{lines}"
-    )
+
+
+def take(counts: dict[str, Any]) -> None:
+    """Keep them in place of the last run with as many vehicles."""
+    others = [run for run in json.loads(COUNTS.read_text(encoding="utf-8")) if run["vehicles"] != counts["vehicles"]]
+    runs = sorted([*others, counts], key=lambda run: int(run["vehicles"]))
+    COUNTS.write_text(json.dumps(runs, indent=1) + "\n", encoding="utf-8")
 
 
 def main() -> None:
     """Take new counts where a file is named; write the page, or compare it."""
     for named in (argument for argument in sys.argv[1:] if not argument.startswith("--")):
-        shutil.copyfile(named, COUNTS)
+        take(json.loads(Path(named).read_text(encoding="utf-8")))
     keep_up_to_date(PAGE, fleet_page(), COUNTS.name)
 
 

@@ -1,17 +1,34 @@
 """docs/fleet.md shows what `make fleet-test` counted, and those counts are good."""
 
 import json
+from pathlib import Path
+from typing import Any
 
 import make_fleet
+import pytest
 
 
 def test_the_page_shows_the_counts() -> None:
     assert make_fleet.fleet_page() == make_fleet.PAGE.read_text(encoding="utf-8"), "run `make docs`"
 
 
-def test_nothing_was_lost_and_nothing_doubled() -> None:
-    counts = json.loads(make_fleet.COUNTS.read_text(encoding="utf-8"))
+RUNS = json.loads(make_fleet.COUNTS.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("counts", RUNS, ids=lambda counts: str(counts["vehicles"]))
+def test_nothing_was_lost_and_nothing_doubled(counts: dict[str, Any]) -> None:
     assert counts["vehicles"] >= 50
     assert counts["estimate_rows"] == counts["estimates"] > 0
     assert counts["entry_rows"] == counts["entries"] > 0
     assert (counts["ids_doubled"], counts["records_missing"], counts["unreadable"]) == (0, 0, 0)
+
+
+def test_a_run_takes_the_place_of_the_last_with_as_many_vehicles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(make_fleet, "COUNTS", tmp_path / "fleet_test.json")
+    make_fleet.COUNTS.write_text(json.dumps(RUNS[:1]))
+    for n, seconds in ((500, 9.0), (RUNS[0]["vehicles"], 7.0), (500, 8.0)):
+        make_fleet.take({**RUNS[0], "vehicles": n, "seconds": seconds})
+    told = [(run["vehicles"], run["seconds"]) for run in json.loads(make_fleet.COUNTS.read_text())]
+    assert told == [(RUNS[0]["vehicles"], 7.0), (500, 8.0)]

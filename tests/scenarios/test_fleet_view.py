@@ -24,11 +24,6 @@ def view(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetView]:
         yield running
 
 
-def drive(view: FleetView, n: int) -> None:
-    for vehicle in view.vehicles:
-        vehicle.drive(n)
-
-
 UNREADABLE = (
     ("estimates", b"no JSON \0"),
     ("estimates", b"[]"),
@@ -62,17 +57,17 @@ def settled(view: FleetView) -> None:
 
 
 def test_every_record_of_every_vehicle_is_one_row(view: FleetView) -> None:
-    drive(view, 20)
+    view.vehicles.drive(20)
     settled(view)
 
 
 def test_a_killed_broker_costs_nothing(view: FleetView) -> None:
     """Killed with the subscriber away: what it took since it last saved is forgotten, and the vehicles say it again."""
     view.subscriber.stop()
-    drive(view, 30)
+    view.vehicles.drive(30)
     assert wait_until(lambda: sum(vehicle.uplink.report().n_delivered for vehicle in view.vehicles) > 150)
     view.broker.kill()
-    drive(view, 10)
+    view.vehicles.drive(10)
     view.broker.start()
     view.subscriber.start()
     settled(view)
@@ -117,7 +112,7 @@ def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: Fleet
     with view.database.connect() as connection:
         rows = connection.execute("DELETE FROM unreadable RETURNING topic, payload").fetchall()
     assert rows == [(f"springscale/{one.id}/{branch}", payload) for branch, payload in UNREADABLE]
-    drive(view, 5)
+    view.vehicles.drive(5)
     settled(view)
 
 
@@ -127,7 +122,7 @@ def test_a_broker_that_lost_its_memory_gets_nothing_before_somebody_listens(view
     view.broker.kill()
     view.broker.forget()
     view.broker.start()
-    drive(view, 10)
+    view.vehicles.drive(10)
     n_before = view.count("estimate")
     for vehicle in view.vehicles:
         assert wait_until(lambda told=vehicle.uplink: "No matching subscribers" in (told.report().last_fault or ""))
@@ -137,17 +132,17 @@ def test_a_broker_that_lost_its_memory_gets_nothing_before_somebody_listens(view
 
 
 def test_a_killed_subscriber_costs_nothing(view: FleetView) -> None:
-    drive(view, 20)
+    view.vehicles.drive(20)
     view.subscriber.kill()
-    drive(view, 20)
+    view.vehicles.drive(20)
     view.subscriber.start()
     settled(view)
 
 
 def test_a_database_that_is_away_costs_nothing(view: FleetView) -> None:
-    drive(view, 20)
+    view.vehicles.drive(20)
     view.database.stop()
-    drive(view, 20)
+    view.vehicles.drive(20)
     assert wait_until(lambda: "database away" in view.subscriber.said)
     view.database.start()
     settled(view)
@@ -174,5 +169,5 @@ def test_who_is_taken_from_the_table_is_refused(view: FleetView) -> None:
     refused.connect("127.0.0.1", view.broker.port)
     assert wait_until(lambda: refused.loop(0.1) is not None and bool(told))
     assert told == ["Not authorized"]
-    drive(view, 5)
+    view.vehicles.drive(5)
     assert wait_until(lambda: view.count(f"estimate WHERE vehicle_id <> '{gone.id}'") == view.n_estimates)
