@@ -111,7 +111,6 @@ class Gateway:
         )
         self.uplink = uplink_of(forwarding.broker, setup, self.store, with_places=with_places)
         self.webhook = webhook_of(forwarding.webhook, self.store, with_places=with_places)
-        self._senders = [part for part in (self.uplink, self.webhook) if part is not None]
         self.tare = TareDesk(
             settings.store.directory,
             subject,
@@ -124,7 +123,7 @@ class Gateway:
             settings.store.directory, settings.verification, subject, self.store, self.tare.zeros, tickets
         )
         self.broadcaster = broadcaster_of(settings.broadcast, self.board)
-        parts = (self.keeper, self.proving, self.ring_log, self.broadcaster)
+        parts = (self.keeper, self.proving, self.ring_log, self.broadcaster, self.uplink, self.webhook)
         self._beside = tuple(part for part in parts if part is not None)
         self.status = StatusReport(
             settings,
@@ -206,12 +205,12 @@ class Gateway:
             part.start()
         self.source.start()
         self.pipeline.start()
-        for sender in self._senders:
-            sender.start()
         self.store.write_event("started", {"interface": self._settings.bus.interface})
         serving = asyncio.create_task(self._serve_web())
-        supervising = asyncio.create_task(self._supervise(serving))
-        await supervising
+        try:
+            await self._supervise(serving)
+        except Exception as failure:  # noqa: BLE001 - whatever ends the watching, what was accepted reaches the disk
+            self._failure = f"the supervisor died: {failure!r}"
         self._stop_parts()
         self._server.should_exit = True
         await serving
@@ -272,7 +271,7 @@ class Gateway:
             return f"the pipeline died: {self.pipeline.failure!r}"
         if not self.store.is_alive():
             return "the database writer died"
-        for part in (*self._senders, self.broadcaster):
+        for part in (self.uplink, self.webhook, self.broadcaster):
             if part is not None and not part.is_alive():
                 return f"the {part.NAME} died"
         if serving.done():
@@ -291,8 +290,6 @@ class Gateway:
         self.pipeline.stop()
         for part in self._beside:
             part.stop()
-        for sender in self._senders:
-            sender.stop()
         self.board.close()
         self.store.write_event("stopped", {"failure": self._failure})
         n_lost = self.store.close()

@@ -3,6 +3,8 @@
 import logging
 import queue
 import threading
+import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -66,12 +68,12 @@ class BatchKeeper:
 
     def keep(self, batch: Batch, found: Estimate, rows: Motion) -> None:
         """Take a batch over, from the pipeline's thread; one too many is lost and counted."""
-        if (batch.is_provisional or batch.rejected) and not self.listener.wants_all:
+        if not (_counts(batch) or self.listener.wants_all):
             return
         try:
             self._waiting.put_nowait(_Handed(found.id, batch, rows))
         except queue.Full:
-            if not (batch.is_provisional or batch.rejected):
+            if _counts(batch):
                 self._lose(f"{MOST_WAITING} batches wait for the disk already")
 
     def flush(self) -> None:
@@ -79,12 +81,16 @@ class BatchKeeper:
         self._waiting.join()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """Keep what waits, then end."""
-        try:
+        """Keep what waits, then end; what is not kept in time is lost and counted."""
+        end_s = time.monotonic() + timeout_s
+        with suppress(queue.Full):
             self._waiting.put(None, timeout=timeout_s)
-        except queue.Full:
-            return
-        self._thread.join(timeout_s)
+        self._thread.join(max(0.0, end_s - time.monotonic()))
+        with suppress(queue.Empty):
+            while True:
+                handed = self._waiting.get_nowait()
+                if handed is not None and _counts(handed.batch):
+                    self._lose("the disk was too slow for the stop")
 
     def _run(self) -> None:
         while True:
@@ -93,13 +99,15 @@ class BatchKeeper:
                 if handed is None:
                     return
                 self._put(handed)
+            except Exception as failure:  # noqa: BLE001 - what one batch meets must not keep the next from being kept
+                self._lose(repr(failure))
             finally:
                 self._waiting.task_done()
 
     def _put(self, handed: _Handed) -> None:
         signal_map = self._signal_map
         kept = kept_batch_of(handed.batch_id, signal_map.id, handed.batch, handed.rows, signal_map.traits)
-        if not (kept.batch.is_provisional or kept.batch.rejected):
+        if _counts(kept.batch):
             try:
                 self.shelf.add(kept)
             except OSError as refusal:
@@ -114,3 +122,8 @@ class BatchKeeper:
         if self.fault is None:  # once until it works again
             log_event(Event.BATCH_NOT_KEPT, level=logging.WARNING, fault=why)
         self.fault = f"batches cannot be kept for calibrations to come: {why}; weighing goes on"
+
+
+def _counts(batch: Batch) -> bool:
+    """Whether an estimator could use it: provisional and rejected ones are for the listener alone."""
+    return not (batch.is_provisional or batch.rejected)

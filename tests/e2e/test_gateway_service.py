@@ -246,6 +246,25 @@ def test_a_dead_pipeline_ends_the_service_with_its_reason(config: Path, monkeypa
         Gateway(settings, setup_of(settings), on_started=on_started).run()
 
 
+def test_a_service_whose_watching_fails_stops_its_parts_and_says_why(
+    config: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It left by a traceback, and what was accepted but not on disk yet was lost."""
+    gateways: list[Gateway] = []
+
+    def broken(_self: object, *_watched: object) -> None:
+        if gateways:
+            raise ArithmeticError("the watch broke")
+
+    monkeypatch.setattr("gateway.service.gateway.AlarmDesk.watch", broken)
+    settings = load_settings(config)
+    with pytest.raises(GatewayFailedError, match="the watch broke"):
+        Gateway(settings, setup_of(settings), on_started=gateways.append).run()
+    (gateway,) = gateways
+    assert not gateway.store.is_alive()
+    assert not gateway.pipeline.is_alive()
+
+
 def test_a_database_that_cannot_even_be_read_at_the_start_does_not_keep_the_service_from_running(
     config: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,5 +1,6 @@
 """Batches kept for calibrations to come: bit for bit what they were, bounded, whole whenever the power fails."""
 
+import threading
 from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from support.bus_drive import bus_drive
 from support.known_load_logs import write_known_loads
 from support.log import names
+from support.patience import PATIENCE_S
 from support.power import KilledError, kill_at
 
 from gateway.bus.signals import Decoder, load_signal_map
@@ -254,3 +256,51 @@ def test_the_pipeline_never_waits_for_the_keeper(tmp_path: Path) -> None:
     assert len(list(flow.feed(driven(20.0 * (MOST_WAITING + 2) + 5.0)))) == MOST_WAITING + 2
     assert keeper.n_lost == 2
     assert keeper.fault is not None
+
+
+def test_a_batch_that_nobody_can_read_ends_no_keeping(tmp_path: Path) -> None:
+    """The keeper's thread died of it, and nobody was told."""
+
+    class Deaf:
+        wants_all = True
+
+        def hear(self, kept: KeptBatch) -> None:
+            raise ArithmeticError("cannot read this one")
+
+    keeper = BatchKeeper(Shelf(tmp_path, ShelfLimits()), MAP)
+    keeper.listener = Deaf()
+    keeper.start()
+    flow = Flow(SETTINGS, MAP.traits, None, "cross_spectrum", Identity("van-17"))
+    flow.on_batch = keeper.keep
+    for _ in flow.feed(driven(65.0)):
+        keeper.flush()
+    assert len(keeper.shelf.entries()) == 3
+    assert "cannot read this one" in str(keeper.fault)
+    keeper.stop()
+
+
+def test_a_disk_that_hangs_holds_the_stop_no_longer_than_it_may_and_what_is_lost_is_counted(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    keeper = BatchKeeper(Shelf(tmp_path, ShelfLimits()), MAP)
+    hangs, is_let_go = threading.Event(), threading.Event()
+
+    class Hanging:
+        wants_all = True
+
+        def hear(self, kept: KeptBatch) -> None:
+            hangs.set()
+            is_let_go.wait(PATIENCE_S)
+
+    keeper.listener = Hanging()
+    keeper.start()
+    flow = Flow(SETTINGS, MAP.traits, None, "cross_spectrum", Identity("van-17"))
+    flow.on_batch = keeper.keep
+    estimates = flow.feed(driven(20.0 * 4 + 5.0))
+    next(estimates)
+    assert hangs.wait(PATIENCE_S)
+    assert len(list(estimates)) == 3
+    keeper.stop(0.05)
+    assert keeper.n_lost == 3
+    assert names(caplog).count(Event.BATCH_NOT_KEPT) == 1
+    is_let_go.set()

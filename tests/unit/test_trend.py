@@ -12,12 +12,16 @@ from hypothesis import strategies as st
 from scipy.stats import theilslopes
 from support.calibrated import calibration_file
 from support.epochs import drive_of, stored
-from support.patience import PATIENCE_S
+from support.log import names
+from support.patience import PATIENCE_S, wait_until
 
 from gateway.calibration.trend import TrendHistory, Week, found_pct, monday_of, theil_sen, trends_of
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
+from gateway.history import Page
+from gateway.log import Event
 from gateway.records import Why
+from gateway.service.proving import trend_keeper
 from gateway.service.proving.trend_keeper import TrendKeeper
 from gateway.service.tare_desk import Subject
 from gateway.units import NS_PER_S
@@ -160,6 +164,25 @@ def test_a_file_that_cannot_be_believed_is_set_aside_and_made_anew(tmp_path: Pat
     assert keeper.fault is None
     assert json.loads(keeper.told())["parameters"][0]["points"][0]["n"] == 1
     store.close()
+
+
+def test_what_no_version_wrote_ends_no_following(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The thread died of it in silence, and no drift was ever told."""
+    monkeypatch.setattr(trend_keeper, "FIRST_S", 0.0)
+    monkeypatch.setattr(trend_keeper, "EVERY_S", 0.01)
+    asked: list[object] = []
+
+    def ask(**question: object) -> Page:
+        asked.append(question)
+        return Page(("[]",), ("a-1",), (None,), None, "a-1")
+
+    keeper = TrendKeeper(tmp_path, Subject(CALIBRATED, "cross_spectrum", "van-17"), ask, lambda: [])
+    keeper.start()
+    assert wait_until(lambda: len(asked) >= 2)
+    keeper.stop()
+    assert Event.TREND_NOT_KEPT in names(caplog)
 
 
 @given(points=st.lists(st.tuples(st.integers(0, 40), st.integers(-5, 5)), min_size=3, max_size=40))

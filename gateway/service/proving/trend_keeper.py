@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Final
 
 from gateway.calibration.trend import FILE_NAME, Trend, TrendHistory, trends_of
-from gateway.errors import StoreError
 from gateway.estimate_json import estimate_from_json
 from gateway.log import Event, log_event
 from gateway.records import json_line
@@ -91,11 +90,5 @@ class TrendKeeper:
             wait_s = EVERY_S
             try:
                 self.catch_up()
-            except (
-                StoreError,
-                TimeoutError,
-                OSError,
-                ValueError,
-                KeyError,
-            ) as fault:  # the last two: another version's
-                log_event(Event.TREND_NOT_KEPT, level=logging.WARNING, fault=str(fault))
+            except Exception as fault:  # noqa: BLE001 - store, disk, another version's records: none may end the thread
+                log_event(Event.TREND_NOT_KEPT, level=logging.WARNING, fault=str(fault) or repr(fault))
