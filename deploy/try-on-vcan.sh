@@ -19,7 +19,7 @@ END
 springscale run --config "$work/springscale.toml" &
 service=$!
 until curl --silent --output /dev/null http://127.0.0.1:8000/health/live; do sleep 0.2; done
-echo "dashboard: http://127.0.0.1:8000 - two minutes of driving, an estimate after each"
+echo "dashboard: http://127.0.0.1:8000 - eight minutes, empty and then with 300 kg; an estimate after each minute of driving"
 zcat "$work"/bench/01_*/can.log.gz | canplayer vcan0=can0
 curl --silent http://127.0.0.1:8000/api/v1/estimates/latest
 echo

@@ -122,7 +122,7 @@ def test_the_command_records_shows_and_exports(gateway: Gateway, tmp_path: Path)
         made = run(server.url, "record", "--load", load, "--note", "yard")
         assert made.exit_code == 0, made.exception
         assert "by local (yard): passed" in made.output
-        assert "100.0 kg known, 112.0 ± " in made.output
+        assert "payload 100.0 kg known, 112.0 ± " in made.output
         assert "front axle +6.0 kg, +0.90 %" in made.output
         shown = run(server.url, "show")
         assert shown.output.splitlines()[0] == "asked for: at most 5 % of the gross weight, 1 load(s)"

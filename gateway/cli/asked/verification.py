@@ -90,4 +90,4 @@ def _load_text(load: dict[str, Any]) -> str:
         for name, axle in (("front", load["front_axle"]), ("rear", load["rear_axle"]))
         if axle
     ]
-    return "; ".join([f"{load['known_payload_kg']:.1f} kg known, {weighed} weighed: {error}", *axles])
+    return "; ".join([f"payload {load['known_payload_kg']:.1f} kg known, {weighed} weighed: {error}", *axles])
