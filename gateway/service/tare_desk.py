@@ -13,7 +13,7 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow
 from gateway.core.tare import Refusal, Weighed, Zero, zero_of
 from gateway.errors import ConfigurationError, TareRefusedError
-from gateway.files.kept import KeptFiles
+from gateway.files.broken import BrokenFile
 from gateway.log import Event, log_event, tell_event
 from gateway.records import iso_utc, json_line
 
@@ -71,7 +71,7 @@ class TareDesk:
         self._clock_ns = clock_ns
         self._lock = threading.Lock()
         self.fault: str | None = None
-        self._has_broken_file = False
+        self._broken = BrokenFile(self._path)
         self._history = self._believed()
         self._drop_others()
         self._use()
@@ -130,20 +130,10 @@ class TareDesk:
             return load_tares(self._path)
         except ConfigurationError as fault:
             broken = str(fault)
-        self._has_broken_file = True
-        try:
-            aside = f"is set aside as {self._set_broken_aside()}"
-        except OSError as refusal:
-            aside = f"cannot be set aside: {refusal}"
+        aside = self._broken.set_aside()
         self.fault = f"{self._path} cannot be believed: the factory zero is in use (it {aside})"
         self._tell(Event.TARE_SET_ASIDE, {"fault": broken, "set_aside": aside}, level=logging.ERROR)
         return TareHistory()
-
-    def _set_broken_aside(self) -> str:
-        """The new name. Raises OSError."""
-        aside = KeptFiles(self._path.parent).set_aside(self._path.name)
-        self._has_broken_file = False
-        return aside
 
     def _active(self) -> TareEntry | None:
         return self._history.active(self._subject.calibration_id, self._subject.estimator)
@@ -195,8 +185,7 @@ class TareDesk:
     def _keep(self, history: TareHistory) -> None:
         """On disk, then in use. Raises TareRefusedError where the disk refuses; then nothing has changed."""
         try:
-            if self._has_broken_file:  # it is never written over
-                self._set_broken_aside()
+            self._broken.make_way()
             save_tares(self._path, history)
         except OSError as fault:
             raise TareRefusedError(

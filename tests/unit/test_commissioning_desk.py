@@ -366,7 +366,7 @@ def test_a_full_disk_while_driving_is_told_and_the_next_window_counts(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
-        patch.setattr("gateway.service.commissioning.drive.save_record", full)
+        patch.setattr("gateway.service.commissioning.book.save_record", full)
         driving.drive(0)
     assert driving.desk.fault is not None
     assert Event.COMMISSIONING_NOT_KEPT in names(caplog)
@@ -381,6 +381,26 @@ def test_a_book_that_cannot_be_believed_is_set_aside(tmp_path: Path, caplog: pyt
     assert bench.desk.fault is not None
     assert Event.COMMISSIONING_SET_ASIDE in names(caplog)
     assert list(tmp_path.glob(f"{FILE_NAME}.broken-*"))
+
+
+def test_a_book_that_cannot_be_set_aside_is_not_written_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the tare's file never was: a folder that was read-only at the start may be writable when somebody begins."""
+
+    def refuse(_self: KeptFiles, _name: str) -> str:
+        raise OSError(30, "Read-only file system")
+
+    (tmp_path / FILE_NAME).write_text("{what was made here")
+    with monkeypatch.context() as patch:
+        patch.setattr(KeptFiles, "set_aside", refuse)
+        bench = Bench(tmp_path)
+        assert "cannot be set aside" in str(bench.desk.fault)
+        with pytest.raises(CommissioningRefusedError, match="Read-only"):
+            bench.desk.begin("workshop", None)
+        assert (tmp_path / FILE_NAME).read_text() == "{what was made here"
+    bench.desk.begin("workshop", None)
+    (aside,) = tmp_path.glob(f"{FILE_NAME}.broken-*")
+    assert aside.read_text() == "{what was made here"
+    assert told(Bench(tmp_path))["underway"] is not None
 
 
 def test_only_so_many_are_remembered(driving: Bench) -> None:

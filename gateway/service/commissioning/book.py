@@ -8,6 +8,7 @@ from typing import Any
 
 from gateway.calibration.file import load_calibration
 from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError
+from gateway.files.broken import BrokenFile
 from gateway.files.kept import KeptFiles
 from gateway.log import Event, log_event, tell_event
 from gateway.records import iso_utc
@@ -26,6 +27,7 @@ class Book:
         self.fault: str | None = None
         self._on_event = on_event
         self._clock_ns = clock_ns
+        self._broken = BrokenFile(directory / FILE_NAME)
         self.record = self._believed()
 
     def keep(self, underway: Underway | None) -> None:
@@ -35,6 +37,7 @@ class Book:
     def save(self, record: Record) -> None:
         """On disk, then in use. Raises CommissioningRefusedError where the disk refuses; then nothing has changed."""
         try:
+            self._broken.make_way()
             save_record(self.directory, record)
         except OSError as fault:
             raise CommissioningRefusedError(
@@ -88,10 +91,7 @@ class Book:
             return load_record(self.directory)
         except ConfigurationError as broken:
             fault = str(broken)
-        try:
-            aside = f"is set aside as {KeptFiles(self.directory).set_aside(FILE_NAME)}"
-        except OSError as refusal:
-            aside = f"cannot be set aside: {refusal}"
+        aside = self._broken.set_aside()
         self.fault = f"{fault} (it {aside}): calibrations made on the vehicle are not in use"
         self.tell(Event.COMMISSIONING_SET_ASIDE, {"fault": fault, "set_aside": aside}, level=logging.ERROR)
         return Record()

@@ -13,7 +13,7 @@ from gateway.log import Event
 from gateway.records import Why
 from gateway.service.commissioning.book import Book
 from gateway.service.commissioning.jobs import BatchFile, Jobs
-from gateway.service.commissioning.record import MADE, LineChoice, Made, Underway, save_record
+from gateway.service.commissioning.record import MADE, LineChoice, Made, Underway
 from gateway.service.commissioning.steps import Looked
 from gateway.service.commissioning.worker import Worker
 from gateway.stated import VehicleAnswers
@@ -85,7 +85,7 @@ class EmptyDrive:
             is_of_drive = underway.empty is not None and underway.empty.covers(batch.drive_start_ns, batch.t_start_ns)
             try:
                 has_grown = is_of_drive and self._remember(underway, kept)
-            except OSError as refusal:
+            except (OSError, CommissioningRefusedError) as refusal:
                 self._book.cannot_store(refusal)
                 return
             if has_grown:
@@ -114,7 +114,7 @@ class EmptyDrive:
             self._book.cannot_store(refusal)
 
     def _remember(self, underway: Underway, kept: KeptBatch) -> bool:
-        """Add a batch to the drive; True where one counted. Raises OSError."""
+        """Add a batch to the drive; True where one counted. Raises OSError, CommissioningRefusedError."""
         batch, before = kept.batch, underway.open_batch
         change: dict[str, Any] = {"open_batch": None}
         if batch.is_provisional and not batch.rejected:
@@ -126,8 +126,7 @@ class EmptyDrive:
             change["batches"] = (*underway.batches, kept.id)
         now = underway.model_copy(update=change)
         if now != underway:
-            save_record(self._book.directory, self._book.record.model_copy(update={"underway": now}))
-            self._book.record = self._book.record.model_copy(update={"underway": now})
+            self._book.keep(now)
             self._shelf.hold(OWNER, [*now.batches, *([now.open_batch] if now.open_batch else [])])
         if before is not None and before != now.open_batch:
             self._shelf.remove(before)

@@ -7,6 +7,7 @@ from typing import Generic, TypeVar
 from pydantic import ValidationError
 
 from gateway.calibration.file.parts import Part
+from gateway.files.broken import BrokenFile
 from gateway.files.kept import KeptFiles
 from gateway.log import Event, log_event
 
@@ -20,14 +21,13 @@ class HistoryFile(Generic[H]):
         """Reads the file; ``empty`` is the history where there is none, and of its kind."""
         self._path = path
         self._files = KeptFiles(path.parent)
+        self._broken = BrokenFile(path)
         self.fault: str | None = None
-        self._is_broken = False
         self.history = self._believed(empty)
 
     def keep(self, history: H) -> None:
         """Put it in place of the one before, on disk when this returns. Raises OSError; then nothing has changed."""
-        if self._is_broken:  # it is never written over
-            self._set_aside()
+        self._broken.make_way()
         text = history.model_dump_json(indent=1)
         self._files.write(self._path.name, (text + "\n").encode())
         self.history = history
@@ -40,16 +40,7 @@ class HistoryFile(Generic[H]):
             return empty
         except (OSError, ValidationError) as broken:
             fault = str(broken)
-        self._is_broken = True
-        try:
-            aside = f"is set aside as {self._set_aside()}"
-        except OSError as refusal:
-            aside = f"cannot be set aside: {refusal}"
+        aside = self._broken.set_aside()
         self.fault = f"{self._path} cannot be believed, its history begins anew (it {aside})"
         log_event(Event.HISTORY_SET_ASIDE, level=logging.ERROR, file=str(self._path), fault=fault, set_aside=aside)
         return empty
-
-    def _set_aside(self) -> str:
-        name = self._files.set_aside(self._path.name)
-        self._is_broken = False
-        return name
