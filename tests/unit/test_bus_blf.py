@@ -103,6 +103,14 @@ def test_without_a_start_stamps_are_relative(read):
     assert frames.t_ns[1] == 1_000_000
 
 
+@pytest.mark.parametrize("year", [1, 1601, 2263, 9999])
+def test_a_start_beyond_all_time_refuses_every_stamp(year, read):
+    """A damaged year ended in numpy's OverflowError."""
+    frames, report = read(lambda content: content[:40] + year.to_bytes(2, "little") + content[42:])
+    assert len(frames) == 0
+    assert {reason: n.count for reason, n in report.rejects.items()} == {LogReject.BAD_TIME: N}
+
+
 @pytest.mark.parametrize("content", [b"", b"LOGG", b"no such thing" * 100])
 def test_what_is_no_blf_is_refused(content, read):
     with pytest.raises(LogUnreadableError, match=r"a\.blf: cannot be read as \.blf: it does not begin as one"):

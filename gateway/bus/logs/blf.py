@@ -112,13 +112,17 @@ def _header(path: Path, file: BinaryIO) -> np.void:
 
 
 def _start_ns(header: np.void) -> int:
-    """The measurement's start; 0, and stamps are relative, where none is written."""
+    """The measurement's start; 0, and stamps are relative, where none is written.
+
+    Behind an impossible one no stamp is sound.
+    """
     year, month, _, day, hour, minute, second, milli = map(int, header["start"])
     try:
         start = datetime(year, month, day, hour, minute, second, tzinfo=UTC)
     except ValueError:
         return 0
-    return int(start.timestamp()) * NS_PER_S + milli * 1_000_000
+    start_ns, last_ns = int(start.timestamp()) * NS_PER_S + milli * 1_000_000, LAST_SECOND * NS_PER_S
+    return start_ns if abs(start_ns) <= last_ns else last_ns
 
 
 def _contents(file: BinaryIO, header: np.void, report: LogReport) -> Iterator[bytes | None]:
