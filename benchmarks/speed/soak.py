@@ -124,7 +124,9 @@ def commission(service: Service, receiver: ParkedFirst) -> None:
 
 def watch(service: Service, week: EndlessDrive, state: Path, days: list[dict[str, float]]) -> None:
     """Ask for the latest estimate all the time; note the footprint at every day's end."""
-    while not (week.is_over and service.now.has_caught_up):
+    is_over = False
+    while not is_over:
+        is_over = week.is_over and service.now.has_caught_up  # once more after it: the last day ends with the week
         service.ask("/api/v1/estimates/latest")
         if week.days_done > len(days):
             counts = service.now.status().batches
