@@ -120,7 +120,9 @@ def _take_little(most_memory_mb: float) -> None:
     """Priority and memory; a service manager that forbids the first has seen to the processor itself."""
     with contextlib.suppress(OSError):
         os.nice(LOWEST)
-    most = round(most_memory_mb * BYTES_PER_MB)
+    most, (_, allowed) = round(most_memory_mb * BYTES_PER_MB), resource.getrlimit(resource.RLIMIT_AS)
+    if allowed != resource.RLIM_INFINITY:
+        most = min(most, allowed)  # to ask for more is an error
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
 
