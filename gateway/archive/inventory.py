@@ -146,7 +146,7 @@ def forecast(inventory: Inventory, n_workers: int) -> Forecast:
         n_new_logs=sum(len(logs) for _, logs in inventory.unknown()),
         n_jobs=len(jobs),
         n_done=sum(job.slot in done for job in jobs),
-        n_failed=sum(job.slot in failed for job in jobs),
+        n_failed=sum(job.slot in failed - done for job in jobs),
         size_to_do=size_to_do,
         rate=rate or (rate_of_one_log(inventory) if size_to_do else None),
         n_workers=n_workers,

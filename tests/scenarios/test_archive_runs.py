@@ -16,7 +16,7 @@ from gateway.archive.jobs import Job
 from gateway.archive.manifest import load_manifest
 from gateway.archive.processes import WorkerKilledError
 from gateway.archive.reprocess import Summary, reprocess
-from gateway.archive.run import Outcome, Status, run
+from gateway.archive.run import Outcome, Status, fail, run
 from gateway.errors import ConfigurationError, ReaderMissingError
 
 HOUR = 3600 * S
@@ -159,6 +159,14 @@ def test_a_job_that_kills_its_workers_is_told_as_failed(archive: Path) -> None:
     assert done(archive).counts["failed_before"] == 1
     assert done(archive, retry_failed=True).counts["done"] == 1
     assert failures(archive / "dataset") == []  # a receipt has taken its place
+
+
+def test_a_job_of_which_one_run_failed_and_another_did_not_is_done(archive: Path) -> None:
+    done(archive)
+    inventory = look(load_manifest(str(archive)), dataset_of(archive))
+    fail(inventory.jobs()[0], "told by a run that went on meanwhile")
+    ahead = forecast(inventory, 1)
+    assert (ahead.n_jobs, ahead.n_done, ahead.n_failed) == (2, 2, 0)
 
 
 def test_a_library_that_is_missing_ends_the_run_and_blames_no_log(
