@@ -55,13 +55,17 @@ def estimate_of(share: Quantity, correlation: float = -0.6) -> Estimate:
 @given(std=st.floats(0.01, 5.0), own=st.floats(0.05, 3.0), correlation=st.floats(-0.99, 0.99))
 def test_the_interval_widens_by_what_is_stated(std: float, own: float, correlation: float) -> None:
     vehicle = replace(VAN, empty_front_share_std_pct=std)
-    before = estimate_of(Quantity.normal(49.0, own), correlation)
+    before = replace(
+        estimate_of(Quantity.normal(49.0, own), correlation), front_share_cg_left_correlation=0.5 * correlation
+    )
     shown = told(before, vehicle)
     by_stated = std * VAN.empty_mass_kg / (VAN.empty_mass_kg + 310.0)
     assert shown.front_share.std == pytest.approx(np.hypot(own, by_stated))
     assert np.diff(shown.front_share.interval95)[0] == pytest.approx(2 * 1.959964 * shown.front_share.std)
     covariance = [one.correlation * one.payload.std * one.front_share.std for one in (before, shown)]
     assert covariance[1] == pytest.approx(covariance[0])
+    beside = [one.front_share_cg_left_correlation * one.front_share.std for one in (before, shown)]
+    assert beside[1] == pytest.approx(beside[0])
     assert (shown.payload, shown.front_share.number) == (before.payload, 49.0)
     back = measured(shown.payload, shown.front_share, shown.correlation, vehicle)
     assert back == (pytest.approx(own, rel=1e-3), pytest.approx(correlation, rel=1e-3))

@@ -144,7 +144,10 @@ def test_driving_for_long_without_an_estimate_is_told_after_the_time_and_for_sur
     watch = watching(no_estimate_s=1800.0)
     slow = [refused(n, Why.TOO_SLOW) for n in range(20)]
     assert told(watch, *slow[:5]) == []
-    assert told(watch, slow[5]) == [("no_estimate", "early")]
+    (alarm,) = watch.weigh(slow[5], VAN)
+    figure = alarm.steps[-1].figure
+    assert (alarm.cause.name, alarm.state) == ("no_estimate", AlarmState.EARLY)
+    assert (figure.found, figure.limit, figure.unit) == (30.0, 30.0, "min")
     assert told(watch, *slow[6:12]) == [("no_estimate", "final")]
     assert told(watch, *slow[12:], of_load(20, 300.0)) == [("no_estimate", "cleared")]
 
