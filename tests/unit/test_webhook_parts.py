@@ -64,6 +64,8 @@ def test_what_a_status_means(status: int, verdict: Verdict) -> None:
     [
         (None, 0.0), ("17", 17.0), ("999999", MOST_PAUSE_S), ("-3", 0.0), ("soon", 0.0),
         ("Thu, 01 Jan 1970 00:17:10 GMT", 30.0), ("Thu, 01 Jan 1970 00:00:10 GMT", 0.0),
+        ("Thu, 01 Jan 99999999999 00:00:00 GMT", 0.0),  # ended the thread, and with it the service
+        ("1 Jan 2020 01:01:01 +99999999999999", 0.0),
     ],
 )  # fmt: skip
 def test_retry_after_is_seconds_or_a_date(header: str | None, seconds: float) -> None:

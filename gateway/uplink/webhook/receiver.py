@@ -115,7 +115,7 @@ def _seconds(retry_after: str | None, now_s: float) -> float:
     else:
         try:
             wait_s = parsedate_to_datetime(retry_after).timestamp() - now_s
-        except ValueError:
+        except (ValueError, OverflowError):  # a year or a zone that no machine number holds
             return 0.0
     return min(max(wait_s, 0.0), MOST_PAUSE_S)
 
