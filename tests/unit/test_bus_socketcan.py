@@ -1,5 +1,6 @@
 """The SocketCAN receiver over a loopback socket: the same datagrams, the same kernel stamps, no CAN hardware."""
 
+import errno
 import socket
 import struct
 import time
@@ -62,6 +63,30 @@ def test_frames_come_in_order_with_kernel_stamps(wire):
     assert (np.diff(burst.frames.t_ns) >= 0).all()
     assert before_ns <= burst.frames.t_ns[0] <= burst.frames.t_ns[-1] <= time.time_ns()
     assert (burst.stamped_at_receipt, burst.error_frames, burst.remote_frames) == (0, 0, 0)
+
+
+def test_what_came_before_the_interface_went_down_is_given_first(wire):
+    """The kernel tells of it once, in the middle of a burst: the frames that were read by then were lost."""
+    send, _, receiving = wire
+
+    class GoesDown:
+        n_read = 0
+
+        def fileno(self):
+            return receiving.fileno()
+
+        def recvmsg(self, *how):
+            self.n_read += 1
+            if self.n_read == 3:
+                raise OSError(errno.ENETDOWN, "Network is down")
+            return receiving.recvmsg(*how)
+
+    for i in range(3):
+        send(classic(0x100 + i, b""))
+    receiver = SocketCanReceiver(GoesDown(), 8)
+    assert receiver.receive(PATIENCE_S).frames.can_id.tolist() == [0x100, 0x101]
+    with pytest.raises(OSError, match="Network is down"):
+        receiver.receive(PATIENCE_S)
 
 
 def test_bytes_beyond_the_length_are_zero(wire):

@@ -51,14 +51,31 @@ class PythonCanReceiver:
     def __init__(self, bus: can.BusABC, width: int) -> None:
         self._bus = bus
         self._width = width
+        self._fault: Exception | None = None
 
     def receive(self, timeout_s: float) -> Burst:
-        """What has come, waiting up to ``timeout_s`` for a first message. Raises can.CanError or OSError."""
+        """What has come, waiting up to ``timeout_s`` for a first message. Raises can.CanError or OSError.
+
+        What came before a fault is given first.
+        """
         messages: list[can.Message] = []
-        message = self._bus.recv(timeout_s)
-        while message is not None:
-            messages.append(message)
-            message = self._bus.recv(0.0) if len(messages) < BURST_FRAMES else None
+        try:
+            while self._fault is None and len(messages) < BURST_FRAMES:
+                message = self._bus.recv(0.0 if messages else timeout_s)
+                if message is None:
+                    break
+                messages.append(message)
+        except (OSError, can.CanError) as fault:
+            self._fault = fault
+        except (
+            ValueError,
+            LookupError,
+        ) as fault:  # python-can's parsers raise what noise makes int() or an index raise
+            self._fault = can.CanOperationError(
+                f"what the adapter sends cannot be read ({fault}): check its cable and its speed ([bus] options)"
+            )
+        if self._fault is not None and not messages:
+            raise self._fault
         return self._burst(messages)
 
     def _burst(self, messages: Sequence[can.Message]) -> Burst:

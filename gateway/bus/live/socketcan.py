@@ -49,6 +49,7 @@ class SocketCanReceiver:
         self._socket = sock
         self._width = width
         self._n_dropped = 0
+        self._fault: OSError | None = None
         self._readable = select.poll()
         self._readable.register(sock, select.POLLIN)
 
@@ -58,7 +59,12 @@ class SocketCanReceiver:
         return self._n_dropped
 
     def receive(self, timeout_s: float) -> Burst:
-        """One burst; empty where nothing came within ``timeout_s``. Raises OSError (ENETDOWN, ENODEV, ...)."""
+        """One burst; empty where nothing came within ``timeout_s``. Raises OSError (ENETDOWN, ENODEV, ...).
+
+        What came before a fault is given first.
+        """
+        if self._fault is not None:
+            raise self._fault
         if not self._readable.poll(timeout_s * 1000.0):
             return Burst(empty_frames(self._width))
         time.sleep(GATHER_S)
@@ -77,6 +83,11 @@ class SocketCanReceiver:
             try:
                 datagram, ancillary, _flags, _address = receive(_FD.itemsize, _ANCILLARY_BYTES, socket.MSG_DONTWAIT)
             except BlockingIOError:
+                break
+            except OSError as fault:
+                if not datagrams:
+                    raise
+                self._fault = fault  # the kernel tells it once
                 break
             datagrams.append(datagram)
             stamp = b""
