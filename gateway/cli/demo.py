@@ -60,6 +60,8 @@ def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
             Gateway(settings, setup_of(settings), on_started=driver.start, known_loads=driver.known_loads).run()
         finally:
             driver.end()
+        if driver.fault is not None:
+            raise driver.fault
         if once:
             _print_estimates(Path(folder), as_json)
 
@@ -74,6 +76,7 @@ class _Driver:
         self._thread: threading.Thread | None = None
         self._n_sent = 0
         self._known_loads: tuple[KnownLoad, ...] = ()
+        self.fault: Exception | None = None  # what ended the driving
 
     def known_loads(self) -> tuple[KnownLoad, ...]:
         """What was truly aboard so far, for the dashboard to compare with; from any thread."""
@@ -100,6 +103,8 @@ class _Driver:
                 for seed in takewhile(self._goes_on, count(1)):
                     self._drive_once(seed, sink)
                 self._wait_until_taken(gateway)
+        except Exception as fault:  # noqa: BLE001 - raised again where the service has ended
+            self.fault = fault
         finally:
             if not self._stop.is_set():
                 loop.call_soon_threadsafe(gateway.request_stop)
