@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time
 from functools import lru_cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from posixpath import normpath
 from typing import Annotated, Any, Final
 
 from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -260,17 +261,34 @@ def _entries(content: bytes, where: Path) -> list[dict[str, Any]]:
 
 
 def _require_distinct(entries: Sequence[VehicleEntry], where: Path) -> None:
-    """No instant of a vehicle, and none of a folder, belongs to two entries."""
+    """No instant of a vehicle, and none of a folder or what lies in it, belongs to two entries."""
     by_key: dict[str, list[tuple[int, VehicleEntry]]] = {}
     for i, entry in enumerate(entries, 1):
-        for key in {f"vehicle {entry.name}", f"folder {(entry.logs or entry.name).strip('/')}"}:
-            for j, other in by_key.get(key, []):
-                if entry.covers(other):
-                    raise ConfigurationError(
-                        f"{where}: vehicles[{i}]: {key} is in vehicles[{j}] too, at the same time; "
-                        "part them by since and until"
-                    )
+        for key in (f"vehicle {entry.name}", f"folder {_folder(entry)}"):
+            _require_apart(i, entry, by_key.get(key, []), f"{where}: vehicles[{i}]: {key} is in")
             by_key.setdefault(key, []).append((i, entry))
+    for i, entry in enumerate(entries, 1):
+        for around in _around(_folder(entry)):
+            others = by_key.get(f"folder {around}", [])
+            _require_apart(i, entry, others, f"{where}: vehicles[{i}]: folder {_folder(entry)} lies in that of")
+
+
+def _require_apart(i: int, entry: VehicleEntry, others: Sequence[tuple[int, VehicleEntry]], what: str) -> None:
+    for j, other in others:
+        if j != i and entry.covers(other):
+            raise ConfigurationError(f"{what} vehicles[{j}] too, at the same time; part them by since and until")
+
+
+def _folder(entry: VehicleEntry) -> str:
+    """However it is written."""
+    named = entry.logs or entry.name
+    return named.rstrip("/") if "://" in named else normpath(named)
+
+
+def _around(folder: str) -> list[str]:
+    """Folders in which it lies."""
+    parents = [str(parent) for parent in PurePosixPath(folder).parents]
+    return [] if "://" in folder or folder == ".." else parents
 
 
 def _ns(instant: datetime) -> int:

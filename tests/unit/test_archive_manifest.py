@@ -136,6 +136,18 @@ def test_a_pinned_key_must_have_signed_the_manifest_itself(tmp_path: Path) -> No
             'signals = "springscale:reference"\nvehicles = [{id = "a"}, {id = "b", logs = "a"}]',
             r"vehicles\[2\]: folder a is in vehicles\[1\] too",
         ),
+        (
+            'signals = "springscale:reference"\nvehicles = [{id = "a"}, {id = "b", logs = "./a//"}]',
+            r"vehicles\[2\]: folder a is in vehicles\[1\] too",
+        ),
+        (
+            'signals = "springscale:reference"\nvehicles = [{id = "c", logs = "a/c"}, {id = "a"}]',
+            r"vehicles\[1\]: folder a/c lies in that of vehicles\[2\] too, at the same time; part them by since",
+        ),
+        (
+            'signals = "springscale:reference"\nvehicles = [{id = "a"}, {id = "b", logs = "."}]',
+            r"vehicles\[1\]: folder a lies in that of vehicles\[2\] too",
+        ),
         ('signals = "none.toml"\nvehicles = [{id = "a"}]', r"none\.toml: no such file"),
         (
             'signals = "springscale:reference"\nvehicles = [{id = "a", calibration = "none.json"}]',
