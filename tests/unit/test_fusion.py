@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.core.fusion import LoadEpoch, fused, summary
+from gateway.core.fusion import LoadEpoch, found_of, fused, summary
 from gateway.estimate import Estimate, Quantity
 from gateway.records import Why
 
@@ -51,6 +51,15 @@ def drifted(payload_kg: float) -> Estimate:
 def test_what_a_vehicle_has_changed_does_not_average_out() -> None:
     assert summary(epoch_of(*[drifted(270.0)] * 100)).payload.std > 10.0 * math.sqrt(0.75)
     assert summary(epoch_of(drifted(270.0))).payload.std == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(("own_kg", "own_var"), [(None, 50.0), (8.0, 64.0), (0.01, 25.0), (20.0, 100.0)])
+def test_what_is_a_batchs_own_is_a_quarter_of_its_variance_at_least_and_all_of_it_at_most(
+    own_kg: float | None, own_var: float
+) -> None:
+    one = replace(batch(270.0), diagnostics={} if own_kg is None else {"payload_own_std_kg": own_kg})
+    found = found_of(one, one.payload, "payload_own_std_kg")
+    assert (found.own_var, found.shared_var) == pytest.approx((own_var, 100.0 - own_var))
 
 
 def test_what_a_vehicle_has_changed_hides_no_change_of_load() -> None:
