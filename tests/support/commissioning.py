@@ -61,6 +61,10 @@ class FakeWorker:
         """As if the process had found this."""
         job, self.job = self.job, None
         assert job is not None
+        self.tell(job, result)
+
+    def tell(self, job: Job, result: Result) -> None:
+        """As if this had come of any job, only now."""
         self._on_result(job, result)
 
 

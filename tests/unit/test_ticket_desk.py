@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from support.calibrated import calibration_file
+from support.commissioning import fitted
 from support.tickets import PLANNED, TicketBench
 
 from gateway.calibration.commissioning import Result
@@ -122,6 +123,28 @@ def test_a_stop_in_the_middle_of_a_fit_begins_it_again(desk: TicketBench) -> Non
     assert [len(job.drives) for job in desk.worker.jobs] == [2]
     desk.finish(2.0)
     assert desk.active_id == calibration_id(2.0)
+
+
+def test_what_came_of_an_earlier_fit_is_not_taken_for_that_of_the_next(desk: TicketBench) -> None:
+    """It ended while a second ticket was handed in: it was kept as if it knew both, and theirs was thrown away."""
+    desk.add(1)
+    earlier = desk.worker.jobs[-1]
+    desk.add(2)
+    desk.worker.tell(earlier, fitted(payload_kg=2.0))
+    assert desk.active_id == BASE
+    desk.finish(3.0)
+    assert desk.active_id == calibration_id(3.0)
+    assert len(desk.told()["history"]) == 2
+
+
+def test_a_ticket_handed_in_while_the_service_stops_is_fitted_after_the_next_start(desk: TicketBench) -> None:
+    """The process would have gone on without anybody, in the folder of the next one."""
+    n_before = len(desk.worker.jobs)
+    desk.desk.stop()
+    desk.add(1)
+    assert len(desk.worker.jobs) == n_before
+    desk.restart()
+    assert [len(job.drives) for job in desk.worker.jobs] == [2]
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,8 @@ class Refit:
         self._worker = make_worker(self._on_result)
         self._on_fit = on_fit
         self._wanted: tuple[Made, tuple[Ticket, ...]] | None = None
+        self._job: Job | None = None
+        self._is_over = False
 
     @property
     def is_busy(self) -> bool:
@@ -41,6 +43,8 @@ class Refit:
 
     def begin(self, base: Made, tickets: tuple[Ticket, ...]) -> None:
         """Fit the empty drive with these; what is under way is ended first. Raises OSError."""
+        if self._is_over:
+            return
         there = {entry.id: entry for entry in self._shelf.entries()}
 
         def files(batch_ids: tuple[str, ...]) -> list[BatchFile]:
@@ -56,11 +60,12 @@ class Refit:
             lost = "batches that it needs are no longer kept: commission the vehicle again, or withdraw the ticket"
             self._told(TicketFit(**self._names(base, tickets), fault=lost))
             return
-        self._worker.start(self._jobs.refit(base.vehicle, base.line, whole), {})
+        self._job = self._jobs.refit(base.vehicle, base.line, whole)
+        self._worker.start(self._job, {})
 
     def end(self) -> None:
-        """Stop what is under way; it is begun again at the next start."""
-        self._wanted = None
+        """Stop what is under way, and begin nothing more; it is begun again at the next start."""
+        self._wanted, self._is_over = None, True
         self._worker.end()
 
     def leave_only(self, fit: TicketFit | None, history: TicketHistory, base: Made) -> bool:
@@ -82,7 +87,7 @@ class Refit:
 
     def _on_result(self, job: Job, result: Result) -> None:
         with self._book.lock:
-            if self._wanted is None:
+            if self._wanted is None or job is not self._job:  # another was begun while its end waited for the lock
                 return
             base, tickets = self._wanted
             fault = result.fault or result.refusal
