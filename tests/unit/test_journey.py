@@ -68,8 +68,12 @@ def test_a_stop_has_its_time_and_its_door():
     assert stop.watched == Watched(True, False)
     assert ways(beside(rows, 60.0))[0].stops[0].watched == Watched(False, False)
     assert ways(rows)[0].stops[0].watched == Watched(None, None)
-    short = drive(60.5, lambda t_s: np.where((t_s > 20.0) & (t_s < 27.0), 0.0, 15.0))
-    assert ways(short)[0].stops == ()
+
+
+@pytest.mark.parametrize(("stood_s", "n_stops"), [(9.0, 0), (11.0, 1)])
+def test_a_stop_in_traffic_is_none(stood_s: float, n_stops: int):
+    short = drive(60.5, lambda t_s: np.where((t_s > 20.0) & (t_s < 20.0 + stood_s), 0.0, 15.0))
+    assert len(ways(short)[0].stops) == n_stops
 
 
 def test_what_happens_while_it_is_parked_is_told_by_the_next_drive():
@@ -101,6 +105,12 @@ def test_an_old_position_is_no_place():
     assert first.start.is_known
     assert not first.end.is_known
     assert not second.start.is_known
+
+
+@pytest.mark.parametrize(("until_s", "is_known"), [(50.0, False), (52.0, True)])
+def test_a_position_is_of_the_ten_seconds_about_its_moment(until_s: float, is_known: bool):
+    """Told every second, the last a second before ``until_s``; the window ends at 60."""
+    assert ways(beside(drive(120.5), until_s), decimals=5)[0].end.is_known is is_known
 
 
 def test_a_coarse_odometer_is_passed_over():
