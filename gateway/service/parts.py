@@ -93,7 +93,7 @@ def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
     board = Board(stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None))
     try:
         board.restore(**asdict(store.reader().latest()))
-    except (StoreError, ValueError, KeyError) as fault:  # the last two: another version's record
+    except (StoreError, TimeoutError, ValueError, KeyError) as fault:  # the last two: another version's record
         log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
     heard = board.heard()
     calibration_id = setup.calibration.id if setup.calibration else None

@@ -265,13 +265,21 @@ def test_a_service_whose_watching_fails_stops_its_parts_and_says_why(
     assert not gateway.pipeline.is_alive()
 
 
+@pytest.mark.parametrize(
+    "refusal",
+    [
+        StoreError("springscale.db cannot be read: unable to open database file"),
+        TimeoutError("the question took longer than 5 s: ask for less at a time"),
+    ],
+    ids=["refused", "slow"],
+)
 def test_a_database_that_cannot_even_be_read_at_the_start_does_not_keep_the_service_from_running(
-    config: Path, monkeypatch: pytest.MonkeyPatch
+    refusal: Exception, config: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As SQLite refuses to open a write-ahead database on a disk that is read-only."""
+    """As SQLite refuses to open a write-ahead database on a read-only disk, or as a disk is slow after a cut."""
 
     def refuse(_self: object) -> Latest:
-        raise StoreError("springscale.db cannot be read: unable to open database file")
+        raise refusal
 
     monkeypatch.setattr("gateway.store.reader.StoreReader.latest", refuse)
     settings = load_settings(config)

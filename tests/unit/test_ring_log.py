@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.bus_drive import white_noise
+from support.log import fields_of
 from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus.frames import take
@@ -19,6 +20,7 @@ from gateway.bus.logs.open import open_log
 from gateway.bus.ring import RingLimits, RingLog
 from gateway.bus.ring.block import packed_block
 from gateway.bus.signals import load_signal_map
+from gateway.log import Event
 from gateway.records import Frames
 
 DRIVE = white_noise(20.0, 1_790_000_000_000_000_000, seed=1)
@@ -263,3 +265,18 @@ def test_no_thread_waits_for_the_disk(tmp_path: Path, monkeypatch: pytest.Monkey
     release.set()
     log.stop(PATIENCE_S)
     assert log.status().n_frames_written == 2 * len(DRIVE)
+
+
+def test_what_a_stop_leaves_behind_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A disk that hangs holds the stop no longer than it may, and the frames went without a word."""
+    release, real = threading.Event(), os.fdatasync
+    monkeypatch.setattr(os, "fdatasync", lambda file: (release.wait(PATIENCE_S), real(file)))
+    log = RingLog(tmp_path, "can0", PLENTY)
+    log.start()
+    log.put(DRIVE)
+    log.stop(0.05)
+    assert fields_of(caplog, Event.RECORD_REFUSED)["n_frames_held"] == len(DRIVE)
+    release.set()
+    assert wait_until(lambda: not log.status().n_frames_held)

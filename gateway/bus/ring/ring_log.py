@@ -57,6 +57,9 @@ class RingLog:
             self._is_stopping = True
             self._changed.notify_all()
         self._thread.join(timeout_s)
+        if self._thread.is_alive():
+            fault = "the disk was too slow for the stop"
+            log_event(Event.RECORD_REFUSED, level=logging.WARNING, fault=fault, n_frames_held=self._n_held)
 
     def put(self, frames: Frames) -> None:
         """Take frames to be written; what finds no room is counted. Never waits for the disk."""
