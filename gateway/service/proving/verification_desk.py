@@ -20,7 +20,7 @@ from gateway.calibration.verification_file import (
 )
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.errors import WeightRefusedError
-from gateway.log import Event, log_event
+from gateway.log import Event, tell_event
 from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.proving.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
 from gateway.service.proving.history_file import HistoryFile
@@ -125,8 +125,7 @@ class VerificationDesk:
             except OSError as fault:
                 raise WeightRefusedError(WeightRefusal.NOT_STORED, f"the record cannot be kept: {fault}") from None
         told: dict[str, Any] = {"verification_id": entry.id, "by": by, "verdict": entry.verdict, "n_loads": len(loads)}
-        log_event(Event.VERIFIED, **told)
-        self._on_event("verified", told)
+        tell_event(Event.VERIFIED, told, self._on_event)
         return json_line(entry.model_dump(mode="json"))
 
     def _judged(self, stated: StatedWeight, epoch: WeighedEpoch, calibrated: CalibratedVehicle) -> VerifiedLoad:

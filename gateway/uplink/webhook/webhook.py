@@ -42,7 +42,6 @@ class Webhook(Forwarder[WebhookStatus]):
         on_event: OnEvent = lambda kind, detail: None,
         back_off: BackOff | None = None,
         *,
-        receiver: Receiver | None = None,
         clock_s: Callable[[], float] = time.monotonic,
         poll_s: float = POLL_S,
     ) -> None:
@@ -51,7 +50,7 @@ class Webhook(Forwarder[WebhookStatus]):
         )
         self._settings = settings
         self._on_event = on_event
-        self._receiver = receiver or Receiver(settings)
+        self._receiver = Receiver(settings)
         self._clock_s = clock_s
         self._poll_s = poll_s
         self._refused_since_s: float | None = None
