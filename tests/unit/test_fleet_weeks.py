@@ -142,6 +142,18 @@ def test_a_sensor_that_fails_for_good_is_bad_since_that_day() -> None:
     assert (trouble.recent, trouble.days, trouble.n_batches) == (Share(14, 14), Share(20, 80), 80)
 
 
+def test_a_sensor_that_fails_again_is_bad_since_it_did_so_and_not_since_it_was_mended() -> None:
+    [again] = troubles_of(days(*[True] * 40, *[False] * 60, *[True] * 10))
+    assert (again.health, again.since) == (Health.BAD, date(2026, 1, 5) + timedelta(days=100))
+
+
+@pytest.mark.parametrize(("n_bad", "health"), [(5, Health.SOME), (6, Health.BAD)])
+def test_more_than_a_fifth_of_the_recent_days_for_sure_are_bad(n_bad: int, health: Health) -> None:
+    """Wilson's interval of 5 of 14 begins at 16 %, that of 6 at 21 %."""
+    [found] = troubles_of(days(*[False] * (14 - n_bad), *[True] * n_bad))
+    assert found.health is health
+
+
 def test_a_sensor_that_was_mended_is_told_apart_from_one_that_fails_now_and_then() -> None:
     [mended] = troubles_of(days(*[False] * 20, *[True] * 20, *[False] * 30))
     assert (mended.health, mended.since) == (Health.WAS_BAD, None)

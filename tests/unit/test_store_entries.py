@@ -69,6 +69,12 @@ def test_following_the_cursor_shows_every_revision_that_comes(store):
     assert revisions(store, cursor=page.last_cursor) == [("event-1-abc", 2), ("event-2-abc", 1)]
 
 
+def test_a_page_goes_up_to_a_row_and_holds_it(store):
+    cursors = [write(store, entry(n)) for n in range(3)]
+    settled(store)
+    assert revisions(store, upto=cursors[1]) == [("event-0-abc", 1), ("event-1-abc", 1)]
+
+
 def test_times_choose(store):
     for n in range(4):
         write(store, entry(n), t_end_ns=n * 10)

@@ -94,6 +94,18 @@ def test_a_sure_but_small_change_is_no_warning() -> None:
     assert not rear_of(-0.05 * np.arange(52))[0]
 
 
+@pytest.mark.parametrize(("pct", "is_told"), [(4.5, False), (5.5, True)])
+def test_a_damper_is_told_from_five_per_cent(pct: float, is_told: bool) -> None:
+    assert rear_of(-pct * np.arange(53) / 52.0)[0] is is_told
+
+
+def test_scatter_as_large_as_a_change_warns_once_in_a_hundred() -> None:
+    """Two hundred years as below, of 12 %: the change is large by chance, and only its interval keeps it back."""
+    rng = np.random.default_rng(3)
+    n_warned = sum(rear_of(rng.normal(0.0, 12.0, 52))[0] for _ in range(200))
+    assert n_warned <= 6
+
+
 def test_scatter_alone_seldom_warns() -> None:
     """A hundred years of weeks of one vehicle that stays as it is, a year at a time: 2 % of scatter."""
     rng = np.random.default_rng(2)
