@@ -9,6 +9,7 @@ from typing import Any
 
 import httpx
 import pytest
+import uvicorn
 from support.patience import PATIENCE_S, until
 from support.web import Client, Gateway, Server, serving
 
@@ -187,6 +188,11 @@ def test_what_is_no_request_ends_with_400_and_leaves_no_word_in_the_log(
 
     run(tmp_path, scenario)
     assert [record for record in caplog.records if record.levelno > logging.INFO] == []
+
+
+def test_another_server_in_the_process_does_not_bring_these_words_back() -> None:
+    uvicorn.Config("another:app")  # as it comes, it forgets the levels of all loggers below its own
+    assert not connection._log.isEnabledFor(logging.WARNING)
 
 
 def test_who_reads_nothing_is_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

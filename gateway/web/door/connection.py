@@ -22,7 +22,7 @@ UNREAD_BYTES: Final = 16_384  # that wait for one client before the answer itsel
 CONNECTIONS: Final = 256  # some are left where four addresses have all that one may have
 CONNECTIONS_PER_ADDRESS: Final = 48  # its answers from the history and its streams (turns.py)
 
-_log = logging.getLogger("uvicorn.error.connection")
+_log = logging.getLogger(__name__)
 _log.setLevel(logging.ERROR)  # uvicorn warns of each request it cannot read: strangers could fill the log with them
 
 
