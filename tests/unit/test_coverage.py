@@ -18,6 +18,13 @@ def test_batches_of_different_runs_give_the_exact_binomial_limits() -> None:
     assert (found.low, found.high) == pytest.approx((exact.low, exact.high), abs=2e-4)
 
 
+@pytest.mark.parametrize("n_covered", [1, 10, 18])
+def test_what_is_covered_and_what_is_not_have_mirrored_limits(n_covered: int) -> None:
+    covered = [True] * n_covered + [False] * (20 - n_covered)
+    found, other = (coverage_of([one is held for one in covered], list(range(20))) for held in (True, False))
+    assert (found.low, found.high) == pytest.approx((1.0 - other.high, 1.0 - other.low))
+
+
 @given(st.integers(2, 8), st.integers(0, 2**32 - 1))
 def test_saying_everything_k_times_over_adds_nothing(k: int, seed: int) -> None:
     covered = np.random.default_rng(seed).random(60) < 0.9

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.drives import T0_NS, drive, joined, later
 
-from gateway.calibration.judgement import Judged, error_table, errors_of, judge
+from gateway.calibration.judgement import Comparison, Judged, error_table, errors_of, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import Window, build_batch
 from gateway.core.calibrated import CalibratedVehicle
@@ -36,6 +36,14 @@ def judged(true_kg: float, found_kg: float | None, true_pct: float = 50.0, found
         front_share=Quantity(found_pct, interval95=(found_pct - 1.0, found_pct + 1.0)),
     )
     return Judged(1, "a.log", true_kg, true_pct, answer)
+
+
+@pytest.mark.parametrize(
+    ("true", "is_covered"), [(89.9, False), (90.0, True), (110.0, True), (110.1, False), (float("nan"), False)]
+)
+def test_an_interval_holds_the_truth_between_its_ends(true: float, is_covered: bool) -> None:
+    assert Comparison(true, 100.0, 90.0, 110.0).is_covered is is_covered
+    assert Comparison(true, 100.0, float("nan"), float("nan")).is_covered is None
 
 
 def test_error_table_by_hand() -> None:

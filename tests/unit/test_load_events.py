@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.days import OWN_KG, RULES, T0_NS, at, batch, day, events, told
+from support.days import OWN_KG, RULES, SHARED_KG, T0_NS, at, batch, day, events, told
 
 from gateway.core.events import Ledger
-from gateway.core.events.change import probability
+from gateway.core.events.change import change_of, probability
 from gateway.core.events.ledger import SETTLED
 from gateway.core.events.load import load_of, weighings_of
 from gateway.estimate import Correction, Place, Quantity, Stop, Watched
@@ -26,6 +26,14 @@ def test_a_delivery_is_told_with_its_weight_time_and_both_loads():
     assert found["probability"] > 0.999
     assert not found["is_withdrawn"]
     assert found["revision"] == 1
+
+
+@pytest.mark.parametrize(("after_kg", "of_shared"), [(320.0, 0.16), (900.0, 1.0), (1000.0, 1.0)])
+def test_a_change_is_the_less_sure_the_less_alike_the_loads_are(after_kg, of_shared):
+    """Of the shared variance (2 d / range)^2, twice, for d up to half the range of 1000 kg: 1 beyond."""
+    before, after = (load_of(weighings_of(day(kg)), 0, 0) for kg in (120.0 if of_shared < 1.0 else 0.0, after_kg))
+    std_kg = math.sqrt(2.0 * OWN_KG**2 + 2.0 * SHARED_KG**2 * of_shared)
+    assert change_of(before, after, RULES).std == pytest.approx(std_kg)
 
 
 def test_nothing_loaded_is_nothing_told():

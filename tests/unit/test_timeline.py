@@ -111,3 +111,20 @@ def test_samples_of_one_stamp_stay_in_the_order_they_came_in() -> None:
     times, x = sort_by_time(np.array([3, 1, 3, 2]), np.array([30.0, 10.0, 31.0, 20.0]))
     assert times.tolist() == [1, 2, 3, 3]
     assert x.tolist() == [10.0, 20.0, 30.0, 31.0]
+
+
+@pytest.mark.parametrize(("n_lost", "is_known"), [(1, True), (3, False)])
+def test_a_gap_is_bridged_up_to_its_limit(n_lost: int, is_known: bool) -> None:
+    """Of 0.05 s: one sample that is missing of 52 in a second leaves 0.04 s, three leave 0.08 s."""
+    t_s, t_ns = stamps(52.0)
+    kept = np.r_[0:500, 500 + n_lost : len(t_s)]
+    within = (t_s[499] < GRID_S) & (t_s[500 + n_lost] > GRID_S)
+    assert np.all(np.isfinite(gridded(t_ns[kept], t_s[kept])[within]) == is_known)
+
+
+def test_nothing_is_known_beyond_a_quarter_of_a_gap_from_either_end() -> None:
+    t_s, t_ns = stamps(52.0)
+    kept = slice(200, 1200)
+    known = GRID_S[np.isfinite(gridded(t_ns[kept], t_s[kept]))]
+    assert t_s[200] - GAP_S / 4.0 <= known[0] <= t_s[200] + 0.02
+    assert t_s[1199] - 0.02 <= known[-1] <= t_s[1199] + GAP_S / 4.0
