@@ -49,8 +49,25 @@ def test_the_odometer_is_believed_where_the_speed_agrees(first_m, last_m, distan
     assert (trip["distance_m"], trip["distance_by"]) == (distance_m, by)
 
 
-def test_standing_still_is_no_trip():
-    assert not trips([batch(0.0, 5.0, 300.0, metres=3.0)])
+@pytest.mark.parametrize(
+    ("odometer_m", "by"), [(2330, "speed"), (2340, "odometer"), (3990, "odometer"), (4010, "speed")]
+)
+def test_the_odometer_may_be_off_by_a_fifth_and_two_hundred_metres(odometer_m, by):
+    one = batch(0.0, 5.0, 300.0)
+    one = replace(one, way=replace(one.way, odometer_start_m=0.0, odometer_end_m=odometer_m))
+    (trip,) = trips([one])
+    assert trip["distance_by"] == by
+
+
+@pytest.mark.parametrize(("kg", "share"), [(59.0, 1.0), (61.0, 0.0)])
+def test_empty_is_less_than_three_per_cent_of_the_vehicle(kg, share):
+    (trip,) = trips([batch(0.0, 5.0, kg)])
+    assert trip["empty_share"] == share
+
+
+@pytest.mark.parametrize(("metres", "n_trips"), [(3.0, 0), (49.0, 0), (51.0, 1)])
+def test_moving_the_vehicle_in_the_yard_is_no_trip(metres, n_trips):
+    assert len(trips([batch(0.0, 5.0, 300.0, metres=metres)])) == n_trips
 
 
 def test_a_trip_ends_where_it_stopped():
