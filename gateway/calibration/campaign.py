@@ -132,8 +132,8 @@ class RunTable(_Table):
     split: Literal["identification", "validation"] | None = Field(
         None, description="use the whole run for this alone; absent: cut at `identification_fraction`"
     )
-    start_s: float = Field(0.0, ge=0.0, description="begin so long after the log's first frame")
-    end_s: float | None = Field(None, gt=0.0, description="end so long after the log's first frame; after `start_s`")
+    start_s: float = Field(0.0, ge=0.0, description="begin so long after the first frame that the signal map reads")
+    end_s: float | None = Field(None, gt=0.0, description="end so long after that frame; after `start_s`")
 
     @model_validator(mode="after")
     def _is_complete(self) -> "RunTable":

@@ -24,7 +24,7 @@ def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Part of a log, in seconds from its first frame; an open end is None."""
+    """Part of a log, in seconds from the first frame that tells motion; an open end is None."""
 
     start_s: float = 0.0
     end_s: float | None = None

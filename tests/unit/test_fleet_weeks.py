@@ -113,6 +113,14 @@ def test_what_nobody_knows_stays_unknown() -> None:
     assert all(np.isnan(weeks.medians[name]).all() for name in DRIFTING)
 
 
+def test_a_batch_that_tells_the_share_alone_takes_the_mean_from_no_week() -> None:
+    told = row(MONDAY_S + 3600.0, payload_kg=200.0, payload_std_kg=10.0, payload_own_std_kg=None)
+    share_alone = row(MONDAY_S + 7200.0, payload_kg=None, payload_std_kg=None, payload_own_std_kg=None)
+    weeks = weeks_of(batches_of([told, share_alone]))
+    assert (weeks.n_answered.tolist(), weeks.payload_mean_kg.tolist()) == ([2], [200.0])
+    assert weeks.payload_high_kg[0] == pytest.approx(200.0 + Z95 * 10.0)
+
+
 def test_the_mean_of_many_is_no_surer_than_what_they_have_in_common() -> None:
     [one], [many] = (weeks_of(batches_of(week(0, n))).payload_high_kg - 100.0 for n in (1, 200))
     assert one == pytest.approx(Z95 * 5.0)

@@ -23,8 +23,9 @@ CAUSES: Final[Mapping[str, Cause]] = {str(why): told.cause for why, told in EXPL
 class Weeks:
     """Arrays (m,), a week with batches each, UTC, from Monday; NaN where unknown, never 0.
 
-    ``payload_mean_kg`` is over the answered batches; its 95 % interval counts in full what the errors of batches have
-    in common, and lets what each has for itself shrink with their number. The quartiles are of what was carried.
+    ``payload_mean_kg`` is over the batches that tell a payload; its 95 % interval counts in full what the errors of
+    batches have in common, and lets what each has for itself shrink with their number. The quartiles are of what was
+    carried.
     ``medians`` are of every batch that has the number, refused ones too: what refuses would else hide what drifts.
     """
 
@@ -88,10 +89,12 @@ def known_reason(reason: str) -> Why | None:
 
 
 def _payload(batches: Batches, of_week: slice, answered: Bool) -> tuple[float, float, float, float, float]:
-    """Mean, its interval, and the quartiles; NaN where no batch was answered."""
+    """Mean, its interval, and the quartiles; NaN where no batch told a payload."""
     payload, std, own = (
         batches.numbers[name][of_week][answered] for name in ("payload_kg", "payload_std_kg", "payload_own_std_kg")
     )
+    told = np.isfinite(payload)  # a calibration may tell the front share alone
+    payload, std, own = payload[told], std[told], own[told]
     if payload.size == 0:
         return (np.nan,) * 5
     mean = float(np.mean(payload))
