@@ -1,11 +1,9 @@
 """With which calibration a service starts: the one made on the vehicle, where there is one."""
 
 import logging
-from pathlib import Path
 
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
-from gateway.files.signed import Read
 from gateway.log import Event, log_event
 from gateway.service.commissioning.record import load_record
 from gateway.service.last_good import setup_or_last_good
@@ -50,7 +48,7 @@ def commissioned(settings: Settings) -> tuple[Settings, Setup, str | None]:
     if chosen is settings:
         return settings, *setup_or_last_good(settings)
     try:
-        return chosen, setup_in_use(chosen), None
+        return chosen, _with_made(chosen), None
     except ConfigurationError as broken:
         log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=str(broken))
         setup, fault = setup_or_last_good(settings)
@@ -61,14 +59,10 @@ def commissioned(settings: Settings) -> tuple[Settings, Setup, str | None]:
 def setup_in_use(settings: Settings) -> Setup:
     """The setup with the calibration in use; one that was made here is believed unsigned. Raises as ``setup_of``."""
     chosen = with_commissioned(settings)
-    return setup_of(settings) if chosen is settings else setup_of(chosen, read=_reading(chosen))
+    return setup_of(settings) if chosen is settings else _with_made(chosen)
 
 
-def _reading(settings: Settings) -> Read:
-    """All as the settings trust it, but the one file that was made here and that nobody signs."""
-    own, read = settings.calibration, settings.trust.for_reading().read
-
-    def reading(path: Path) -> bytes:
-        return path.read_bytes() if path == own else read(path)
-
-    return reading
+def _with_made(chosen: Settings) -> Setup:
+    """All read as the settings trust it, but the one calibration that was made here and that nobody signs."""
+    own, read = chosen.calibration, chosen.trust.for_reading().read
+    return setup_of(chosen, read=lambda path: path.read_bytes() if path == own else read(path))
