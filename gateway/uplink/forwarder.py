@@ -26,10 +26,11 @@ class Forwarder(ABC, Generic[Report]):
 
     NAME: ClassVar[str]
 
-    def __init__(self, outbox: Outbox, report: Report, back_off: BackOff) -> None:
+    def __init__(self, outbox: Outbox, report: Report, back_off: BackOff | None, back_off_max_s: float) -> None:
+        """``back_off`` tells the pauses; without one they grow to ``back_off_max_s``."""
         self._outbox = outbox
         self._report: Report = report
-        self._back_off = back_off
+        self._back_off = back_off or BackOff(FIRST_PAUSE_S, back_off_max_s)
         self._stop = threading.Event()
         self._looked_s = -LOOK_S
         self._thread = threading.Thread(target=self._run, name=self.NAME, daemon=True)

@@ -11,7 +11,7 @@ from gateway.errors import ConfigurationError, StoreError
 from gateway.log import Event, log_event
 from gateway.status import UplinkStatus
 from gateway.uplink.back_off import BackOff
-from gateway.uplink.forwarder import FIRST_PAUSE_S, PAGE, Forwarder
+from gateway.uplink.forwarder import PAGE, Forwarder
 from gateway.uplink.link import Answer, LinkError, MqttLink
 from gateway.uplink.outbox import Letter, Outbox
 from gateway.uplink.settings import UplinkSettings
@@ -46,9 +46,7 @@ class Uplink(Forwarder[UplinkStatus]):
         connect: Callable[[UplinkSettings, Mapping[str, Any]], Link] = MqttLink,
         back_off: BackOff | None = None,
     ) -> None:
-        super().__init__(
-            outbox, UplinkStatus(settings.broker), back_off or BackOff(FIRST_PAUSE_S, settings.back_off_max_s)
-        )
+        super().__init__(outbox, UplinkStatus(settings.broker), back_off, settings.back_off_max_s)
         self._settings = settings
         self._birth = {"state": "online", **birth}
         self._connect = connect

@@ -12,7 +12,7 @@ from gateway.log import Event, log_event
 from gateway.records import iso_utc
 from gateway.status import DeadLetter, WebhookStatus
 from gateway.uplink.back_off import BackOff
-from gateway.uplink.forwarder import FIRST_PAUSE_S, PAGE, Forwarder
+from gateway.uplink.forwarder import PAGE, Forwarder
 from gateway.uplink.outbox import ESTIMATE, Letter, Outbox
 from gateway.uplink.webhook.receiver import Answer, Receiver, Verdict
 from gateway.uplink.webhook.settings import WebhookSettings
@@ -45,9 +45,7 @@ class Webhook(Forwarder[WebhookStatus]):
         clock_s: Callable[[], float] = time.monotonic,
         poll_s: float = POLL_S,
     ) -> None:
-        super().__init__(
-            outbox, WebhookStatus(settings.receiver), back_off or BackOff(FIRST_PAUSE_S, settings.back_off_max_s)
-        )
+        super().__init__(outbox, WebhookStatus(settings.receiver), back_off, settings.back_off_max_s)
         self._settings = settings
         self._on_event = on_event
         self._receiver = Receiver(settings)
