@@ -22,7 +22,7 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError, CampaignError, ConfigurationError
-from gateway.files.whole import write_whole
+from gateway.files.whole import refusal_told, write_whole
 from gateway.offline import inspect
 from gateway.records import json_line
 
@@ -115,7 +115,8 @@ def calibrate(
             on_fit=on_share(on_step, estimators or ESTIMATOR_NAMES),
         )
     if output is not None:
-        _write(output, outcome.file)
+        with refusal_told(output, ConfigurationError):
+            write_whole(output, outcome.file.to_json())
     if report is not None:
         _report(report, loaded, outcome, _curve(loaded, outcome) if wants_curve else None)
     plan = plan_next(outcome, loaded.vehicle) if wants_plan else None
@@ -182,13 +183,6 @@ def _require_places(output: Path | None, report: Path | None) -> None:
         raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")
     if report is not None and report.exists() and not report.is_dir():
         raise click.UsageError(f"--report {report}: is a file, a directory is wanted")
-
-
-def _write(output: Path, file: CalibrationFile) -> None:
-    try:
-        write_whole(output, file.to_json())
-    except OSError as fault:
-        raise ConfigurationError(f"{output}: cannot be written: {fault.strerror or fault}") from None
 
 
 def _inspect(campaign: Campaign, numbers: Sequence[int] | None, settings: BatchSettings) -> Inspection:

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from gateway.errors import SpringscaleError
+
 
 @contextmanager
 def written_whole(output: Path) -> Iterator[BinaryIO]:
@@ -27,6 +29,15 @@ def written_whole(output: Path) -> Iterator[BinaryIO]:
         part.replace(place)
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def refusal_told(output: Path, error: type[SpringscaleError]) -> Iterator[None]:
+    """Where the disk refuses ``output``, ``error`` says so, to people."""
+    try:
+        yield
+    except OSError as fault:
+        raise error(f"{output}: cannot be written: {fault.strerror or fault}") from None
 
 
 def write_whole(output: Path, text: str) -> None:

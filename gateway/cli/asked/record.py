@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, Final
 
 import click
 
@@ -18,7 +18,7 @@ from gateway.cli.asked.service import Service, asks_service
 from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.text.progress import StatusLine
 from gateway.errors import SpringscaleError
-from gateway.files.whole import written_whole
+from gateway.files.whole import refusal_told, written_whole
 from gateway.records import json_line
 from gateway.words import counted
 
@@ -69,7 +69,7 @@ def fetch(
     chosen = [item for item in items if (item["name"] in names or not names) and _overlaps(item, since, until)]
     if not chosen:
         raise SpringscaleError("the ring log has no such frames: `springscale record list` shows what it has")
-    with _written_whole(output) as file, StatusLine() as status:
+    with refusal_told(output, SpringscaleError), written_whole(output) as file, StatusLine() as status:
         for item in chosen:
             for piece in _pieces(service, item["name"], item["n_bytes"]):
                 file.write(piece)
@@ -91,18 +91,15 @@ def from_bus(log: Path, signals: str, interface: str, channel: str, for_s: float
     signal_map = load_signal_map(signals)
     source = LiveSource(interface, channel, signal_map)
     stop = threading.Event()
-    with StatusLine() as status, _until_told(stop):
-        try:
-            n_frames = record_to_file(
-                source,
-                signal_map.channel or channel,
-                log,
-                stop,
-                duration_s=for_s,
-                on_frames=lambda n: status.show(f"{n} frames"),
-            )
-        except OSError as fault:
-            raise SpringscaleError(f"{log}: cannot be written: {fault.strerror or fault}") from None
+    with StatusLine() as status, _until_told(stop), refusal_told(log, SpringscaleError):
+        n_frames = record_to_file(
+            source,
+            signal_map.channel or channel,
+            log,
+            stop,
+            duration_s=for_s,
+            on_frames=lambda n: status.show(f"{n} frames"),
+        )
     n_dropped = source.counts().dropped_inbox
     if not n_frames:
         raise SpringscaleError(f"{log}: no mapped frame came ({source.reason or 'the bus was silent'})")
@@ -119,16 +116,6 @@ def _until_told(stop: threading.Event) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@contextlib.contextmanager
-def _written_whole(output: Path) -> Iterator[BinaryIO]:
-    """A file that has its name only once it is whole. Raises SpringscaleError where the disk refuses."""
-    try:
-        with written_whole(output) as file:
-            yield file
-    except OSError as fault:
-        raise SpringscaleError(f"{output}: cannot be written: {fault.strerror or fault}") from None
 
 
 def _pieces(service: Service, name: str, n_bytes: int) -> Iterator[bytes]:

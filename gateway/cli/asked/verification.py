@@ -10,7 +10,7 @@ from gateway.cli.asked.stated import KnownLoad
 from gateway.cli.options import FILE, as_json
 from gateway.errors import SpringscaleError
 from gateway.estimate import Z95
-from gateway.files.whole import written_whole
+from gateway.files.whole import refusal_told, written_whole
 from gateway.records import json_line
 
 PATH: Final = "/api/v1/calibration/verifications"
@@ -60,11 +60,8 @@ def export(service: Service, record_id: str, output: Path) -> None:
         raise SpringscaleError(f"{record_id}: {len(found)} records begin so: `springscale verification show` has them")
     with service.opened(f"{PATH}/{found[0]}") as answer:
         page = answer.read()
-    try:
-        with written_whole(output) as file:
-            file.write(page)
-    except OSError as fault:
-        raise SpringscaleError(f"{output}: cannot be written: {fault.strerror or fault}") from None
+    with refusal_told(output, SpringscaleError), written_whole(output) as file:
+        file.write(page)
     click.echo(f"{output}: record {found[0][:19]}")
 
 

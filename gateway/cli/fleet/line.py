@@ -13,7 +13,7 @@ from gateway.cli.options import FILE, as_json, batch_settings
 from gateway.cli.text.line import line_text
 from gateway.cli.text.progress import Steps, counted
 from gateway.errors import CampaignError, ConfigurationError
-from gateway.files.whole import write_whole
+from gateway.files.whole import refusal_told, write_whole
 from gateway.offline import inspect
 from gateway.records import json_line
 
@@ -46,10 +46,8 @@ def build(files: tuple[Path, ...], output: Path, campaigns: tuple[Path, ...], as
     with counted("reading drives") as on_step:
         runs = _runs(calibrations, [load_campaign(path) for path in campaigns], on_step)
     built = _build(calibrations, runs)
-    try:
+    with refusal_told(output, ConfigurationError):
         write_whole(output, built.to_json())
-    except OSError as fault:
-        raise ConfigurationError(f"{output}: cannot be written: {fault.strerror or fault}") from None
     if as_json:
         left_out = built.expected_errors.model_dump(mode="json") if built.expected_errors else None
         record: dict[str, object] = {"line_id": built.id, "output": str(output), "members": list(built.line.members)}
