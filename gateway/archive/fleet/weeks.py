@@ -25,8 +25,8 @@ class Weeks:
 
     ``payload_mean_kg`` is over the batches that tell a payload; its 95 % interval counts in full what the errors of
     batches have in common, and lets what each has for itself shrink with their number. The quartiles are of what was
-    carried.
-    ``medians`` are of every batch that has the number, refused ones too: what refuses would else hide what drifts.
+    carried. ``medians`` are of every batch that has the number, refused ones too: what refuses would else hide what
+    drifts.
     """
 
     number: I64

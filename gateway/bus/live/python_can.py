@@ -67,10 +67,8 @@ class PythonCanReceiver:
                 messages.append(message)
         except (OSError, can.CanError) as fault:
             self._fault = fault
-        except (
-            ValueError,
-            LookupError,
-        ) as fault:  # python-can's parsers raise what noise makes int() or an index raise
+        except (ValueError, LookupError) as fault:
+            # python-can's parsers raise what noise makes int() or an index raise
             self._fault = can.CanOperationError(
                 f"what the adapter sends cannot be read ({fault}): check its cable and its speed ([bus] options)"
             )
