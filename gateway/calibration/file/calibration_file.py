@@ -33,14 +33,14 @@ Content = dict[str, Any]
 FIRST_VERSION: Final = 1
 
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 6
+VERSION: Final = 7
 
 
 class CalibrationFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-calibration"] = FORMAT
-    version: Literal[6] = VERSION
+    version: Literal[7] = VERSION
     migrated_from: str | None = Field(
         None, description="id of the file of an older version that this content was read from; null: written as it is"
     )
@@ -222,9 +222,17 @@ def _to_version_6(content: Content) -> None:
         content["cross_spectrum"]["least_slack"] = 0.01
 
 
+def _to_version_7(content: Content) -> None:
+    """Version 7 says how fast each axle's springs usually move. Before, friction went by how much the body moves."""
+    if content["cross_spectrum"] is not None:
+        content["cross_spectrum"]["usual_stroke_mps"] = None
+    if content["line"] is not None:
+        content["line"]["usual_stroke_mps"] = None
+
+
 # Entry v turns version v into v + 1. Entries are never edited, only added.
 MIGRATIONS: Final[Mapping[int, Callable[[Content], None]]] = MappingProxyType(
-    {1: _to_version_2, 2: _to_version_3, 3: _to_version_4, 4: _to_version_5, 5: _to_version_6}
+    {1: _to_version_2, 2: _to_version_3, 3: _to_version_4, 4: _to_version_5, 5: _to_version_6, 6: _to_version_7}
 )
 
 

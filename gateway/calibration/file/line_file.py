@@ -9,6 +9,7 @@ from pydantic import Field, ValidationError
 
 from gateway.calibration.file.calibration_file import (
     CalibrationFile,
+    Content,
     content_id,
     load_calibration,
     matches_its_id,
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from gateway.calibration.line import Line
 
 LINE_FORMAT: Final = "springscale-line"
-LINE_VERSION: Final = 1
+LINE_VERSION: Final = 2
 
 
 class SiblingPart(Part):
@@ -40,7 +41,10 @@ class LineFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-line"] = LINE_FORMAT
-    version: Literal[1] = LINE_VERSION
+    version: Literal[2] = LINE_VERSION
+    migrated_from: str | None = Field(
+        None, description="id of the file of version 1 that this content was read from; null: written as it is"
+    )
     software: str
     siblings: tuple[SiblingPart, ...] = Field(min_length=1)
     line: LinePart
@@ -69,10 +73,10 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
     content = read_content(path, read)
     if content.get("format") != LINE_FORMAT:
         return load_calibration(path, read)
-    if content.get("version") != LINE_VERSION:
+    if content.get("version") not in (1, LINE_VERSION):
         raise CalibrationFileError(
-            f"{path}: line file version {content.get('version')!r}, this springscale reads version {LINE_VERSION}: "
-            "build it again with `springscale line build`"
+            f"{path}: line file version {content.get('version')!r}, this springscale reads up to version "
+            f"{LINE_VERSION}: build it again with `springscale line build`"
         )
     if not matches_its_id(content):
         raise CalibrationFileError(
@@ -80,13 +84,21 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
             "it again"
         )
     try:
-        held = LineFile.model_validate({key: part for key, part in content.items() if key != "id"})
+        current = content if content["version"] == LINE_VERSION else _from_version_1(content)
+        held = LineFile.model_validate({key: part for key, part in current.items() if key != "id"})
         held.line.require_known()
     except ValidationError as fault:
         raise CalibrationFileError(describe_faults(path, fault)) from None
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
     return held
+
+
+def _from_version_1(content: Content) -> Content:
+    """Version 2 says how fast each axle's springs usually move. Before, friction went by how much the body moves."""
+    line = content.get("line")
+    told = {**line, "usual_stroke_mps": None} if isinstance(line, dict) else line
+    return {**content, "version": LINE_VERSION, "migrated_from": content["id"], "line": told}
 
 
 def line_of_files(files: Sequence[LikeFile]) -> "Line":

@@ -90,6 +90,9 @@ class LinePart(Part):
     wheelbase_m: float = Field(gt=0.0)
     empty_mass_kg: float = Field(gt=0.0)
     usual_log_amplitude: float
+    usual_stroke_mps: tuple[float, float] | None = Field(
+        description="how fast the springs of front and rear axle usually move; null: no member read a roll rate"
+    )
     half_car: EvidencePart
     roll: EvidencePart | None = Field(description="null: no member read a roll rate")
     scatter_std: dict[str, Annotated[float, Field(gt=0.0, allow_inf_nan=False)]] = Field(
@@ -110,7 +113,8 @@ class LinePart(Part):
             members=line.members,
             wheelbase_m=line.wheelbase_m,
             empty_mass_kg=line.empty_mass_kg,
-            usual_log_amplitude=line.usual_log_amplitude,
+            usual_log_amplitude=line.usual.log_amplitude,
+            usual_stroke_mps=line.usual.stroke_mps,
             half_car=EvidencePart.of(line.half_car, PARAMETERS),
             roll=None if line.roll is None else EvidencePart.of(line.roll, ROLL_PARAMETERS),
             scatter_std={name: std for name, std in stds if std > 0.0},
@@ -127,14 +131,14 @@ class LinePart(Part):
 
     def for_core(self) -> "Line":
         """The same in the core's terms. Raises as :meth:`require_known` does."""
-        from gateway.calibration.line import Limits, Line, Seen  # noqa: PLC0415 # as above
+        from gateway.calibration.line import Limits, Line, Seen, Usual  # noqa: PLC0415 # as above
 
         known_loads = tuple(Load(*load) for load in self.seen.known_loads)
         return Line(
             members=self.members,
             wheelbase_m=self.wheelbase_m,
             empty_mass_kg=self.empty_mass_kg,
-            usual_log_amplitude=self.usual_log_amplitude,
+            usual=Usual(self.usual_log_amplitude, self.usual_stroke_mps),
             half_car=self.half_car.for_core(PARAMETERS),
             roll=None if self.roll is None else self.roll.for_core(ROLL_PARAMETERS),
             scatter_std=_by_name(self.scatter_std),

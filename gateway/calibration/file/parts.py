@@ -4,7 +4,16 @@ from dataclasses import astuple, fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PositiveFloat,
+    WithJsonSchema,
+    model_validator,
+)
 
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import LEAST_SLACK, PARAMETERS, ROLL_PARAMETERS
@@ -179,6 +188,7 @@ class CrossSpectrumPart(Part):
     sensor_left_std_m: float = Field(UNKNOWN_OFFSET_STD_M, gt=0.0)
     payload_length_m: float | None = Field(None, gt=0.0)
     least_slack: float = Field(LEAST_SLACK, gt=0.0)
+    usual_stroke_mps: tuple[PositiveFloat, PositiveFloat] | None = None
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "CrossSpectrumPart":

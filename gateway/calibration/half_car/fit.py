@@ -68,8 +68,8 @@ def fit_cross_spectrum(
     ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError where no run holds enough
     steady driving.
     """
-    usual = inherited.usual_log_amplitude if inherited else None
-    known = known_spectra(runs, vehicle, with_roll=can_roll(vehicle), usual_log_amplitude=usual)
+    usual = inherited.usual if inherited else None
+    known = known_spectra(runs, vehicle, with_roll=can_roll(vehicle), usual=usual)
     with_roll = known[0].spectra.roll is not None
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=with_roll)
     shifts = _STARTS[:1] if inherited else _STARTS  # sisters tell which peak it is
@@ -143,11 +143,12 @@ def _left_out_in_turn(
 
 def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
     """What the known runs taught, its intervals not yet tested on any run left out."""
-    reading = known[0].spectra.reading
+    seen = seen_by(known, found.x)
+    reading = seen[0].spectra.reading
     runs = [k.run for k in known]
     payloads, shares = [r.payload_kg for r in runs], [r.front_share_pct for r in runs]
     speeds = [batch.mean_speed_mps for run in runs for batch in run.batches if not batch.rejected]
-    misfits = [k.whittle.misfit(k.at(upright(found.x))) for k in seen_by(known, found.x)]
+    misfits = [k.whittle.misfit(k.at(upright(found.x))) for k in seen]
     return CrossSpectrumCalibration(
         empty_mass_kg=vehicle.empty_mass_kg,
         empty_front_share_pct=vehicle.empty_front_share_pct,
@@ -173,5 +174,6 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         sensor_left_std_m=vehicle.sensor_offset_left_std_m,
         payload_length_m=vehicle.payload_length_m,
         least_slack=known[0].whittle.ground.least_slack,
+        usual_stroke_mps=reading.usual_stroke_mps,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),
     )

@@ -3,6 +3,7 @@
 from typing import Protocol
 
 from gateway.calibration.half_car.prior import Prior
+from gateway.calibration.half_car.usual import Usual
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.vehicle import Vehicle
 
@@ -11,8 +12,8 @@ class Inherited(Protocol):
     """A line, as a fit sees it."""
 
     @property
-    def usual_log_amplitude(self) -> float:
-        """How much its vehicles usually moved: friction shares are told at this amplitude."""
+    def usual(self) -> Usual:
+        """How much its vehicles usually moved."""
 
     def prior_of(self, vehicle: Vehicle, *, with_roll: bool) -> Prior:
         """Of one of its vehicles that has not been driven yet."""

@@ -7,11 +7,13 @@ from typing import Final
 
 import numpy as np
 
+from gateway.calibration.half_car.usual import Usual
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, Ground, level, mount_of
+from gateway.core.cross_spectrum.model.strokes import log_stroke_speeds, with_strokes
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
@@ -24,8 +26,9 @@ LEAST_MOMENT_STD_KGM: Final = 0.5  # about the centre line, of an empty vehicle 
 class KnownSpectra:
     """A run's spectra and likelihood with its true load.
 
-    ``whittle`` is of vertical acceleration and pitch rate. With a roll rate, ``rolling`` is of all three sensors, and
-    :meth:`brought` makes ``whittle`` what it would be on the centre line.
+    ``whittle`` is of vertical acceleration and pitch rate. With a roll rate, ``rolling`` is of all three sensors,
+    :meth:`brought` makes ``whittle`` what it would be on the centre line, and :meth:`stroking` lets friction go by how
+    fast each axle's springs move.
     """
 
     def __init__(self, run: KnownRun, vehicle: Vehicle, spectra: CrossSpectra) -> None:
@@ -49,6 +52,23 @@ class KnownSpectra:
             one.whittle = self._whittle(spectra.without_roll)
         one._roll = level(theta)[len(PARAMETERS) :]
         return one
+
+    def stroking(self, theta: F64, usual_mps: tuple[float, float]) -> "KnownSpectra":
+        """The same run with how much faster than usual the axles of a vehicle theta (n,) stroke."""
+
+        def told(spectra: CrossSpectra) -> CrossSpectra:
+            usual = replace(spectra, reading=replace(spectra.reading, usual_stroke_mps=usual_mps))
+            return with_strokes(usual, theta, self.run.load, self.whittle.ground)
+
+        one = copy(self)
+        one.spectra, one.whittle = told(self.spectra), self._whittle(told(self.whittle.spectra))
+        return one
+
+    def log_stroke_speeds(self, theta: F64) -> F64:
+        """(2,) logarithm of how fast (m/s) front and rear axle of a vehicle theta (n,) stroke, over all segments."""
+        spectra = self.whittle.spectra
+        every = log_stroke_speeds(spectra, theta, self.run.load, self.whittle.ground)
+        return np.asarray(np.average(every, axis=0, weights=spectra.n_segments[:, 0]), float)
 
     def at(self, theta: F64) -> Point:
         """The half-car's parameters theta (p,) with the run's load, where this was noted to lie."""
@@ -82,7 +102,7 @@ class KnownSpectra:
 
 
 def known_spectra(
-    runs: Sequence[KnownRun], vehicle: Vehicle, *, with_roll: bool = False, usual_log_amplitude: float | None = None
+    runs: Sequence[KnownRun], vehicle: Vehicle, *, with_roll: bool = False, usual: Usual | None = None
 ) -> list[KnownSpectra]:
     """Those of ``runs`` that hold enough steady driving, their usual amplitude the median of all unless given.
 
@@ -96,11 +116,15 @@ def known_spectra(
             "no run holds enough steady driving with both sensors for the cross-spectral estimator: drive at least a "
             "minute at speed, and map both"
         )
-    usual = usual_log_amplitude
     if usual is None:
-        usual = float(np.median([spectra.reading.usual_log_amplitude for _, spectra in read]))
+        usual = Usual(float(np.median([spectra.reading.usual_log_amplitude for _, spectra in read])))
     with_roll = all(spectra.roll is not None for _, spectra in read)
-    reading = replace(reading, usual_log_amplitude=usual, with_roll=with_roll)
+    reading = replace(
+        reading,
+        usual_log_amplitude=usual.log_amplitude,
+        usual_stroke_mps=usual.stroke_mps if with_roll else None,
+        with_roll=with_roll,
+    )
     again = [(run, _spectra_of(run, reading)) for run, _ in read]
     return [KnownSpectra(run, vehicle, spectra) for run, spectra in again if spectra is not None]
 

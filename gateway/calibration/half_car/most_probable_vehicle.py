@@ -1,6 +1,7 @@
 """The most probable vehicle: its half-car, and where a roll rate was read, how it rolls."""
 
 from collections.abc import Callable, Sequence
+from math import exp
 from typing import Final
 
 import numpy as np
@@ -21,24 +22,41 @@ def fit_vehicle(
 ) -> Found:
     """The most probable parameters (n,) of all known runs together, of what is found from each of ``starts`` (n,).
 
-    ``step`` is called after each. For how half-car and roll take turns, see rolling_fit.
+    ``step`` is called after each. For how half-car and roll take turns, see rolling_fit. How fast axles stroke waits
+    for the second turn: before the first nobody knows the vehicle that tells it.
     """
     tried = []
     for start in starts:
-        tried.append(fit_half_car(seen_by(known, start), prior.upright, upright(start)))
+        tried.append(fit_half_car(_brought(known, start), prior.upright, upright(start)))
         step()
     found = min(tried, key=lambda one: one.cost)
     if not has_roll(prior.mean):
         return found
     rolling = fit_roll(known, found, prior.roll, starts[0][len(PARAMETERS) :])
     for _ in range(TURNS - 1):
-        found = fit_half_car(seen_by(known, rolling.x), prior.upright, found.x)
-        rolling = fit_roll(known, found, prior.roll, rolling.x[len(PARAMETERS) :])
+        seen = seen_by(known, rolling.x)
+        found = fit_half_car(seen, prior.upright, found.x)
+        rolling = fit_roll(seen, found, prior.roll, rolling.x[len(PARAMETERS) :])
     return rolling
 
 
 def seen_by(known: Sequence[KnownSpectra], theta: F64) -> Sequence[KnownSpectra]:
-    """The runs as a half-car is held against them: from the centre line, if theta (n,) knows how the vehicle rolls."""
+    """The runs as a half-car is held against them.
+
+    If theta (n,) knows how the vehicle rolls, from the centre line, and with how fast each axle strokes: over what is
+    usual, which is the median of the runs where they do not say.
+    """
+    if not has_roll(theta):
+        return known
+    brought = _brought(known, theta)
+    usual_mps = known[0].spectra.reading.usual_stroke_mps
+    if usual_mps is None:
+        front, rear = np.median([one.log_stroke_speeds(theta) for one in brought], axis=0).tolist()
+        usual_mps = (exp(front), exp(rear))
+    return [one.stroking(theta, usual_mps) for one in brought]
+
+
+def _brought(known: Sequence[KnownSpectra], theta: F64) -> Sequence[KnownSpectra]:
     return [one.brought(theta) for one in known] if has_roll(theta) else known
 
 

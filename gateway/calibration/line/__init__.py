@@ -6,9 +6,21 @@ in turn tell how far intervals must be widened (``with_siblings_left_out``).
 """
 
 from gateway.calibration.half_car.limits import Limits
+from gateway.calibration.half_car.usual import Usual
 from gateway.calibration.line.evidence import Evidence
 from gateway.calibration.line.left_out import Sibling, TestedLine, with_siblings_left_out
 from gateway.calibration.line.line import Line, Sister, line_of
 from gateway.calibration.line.seen import Seen
 
-__all__ = ["Evidence", "Limits", "Line", "Seen", "Sibling", "Sister", "TestedLine", "line_of", "with_siblings_left_out"]
+__all__ = [
+    "Evidence",
+    "Limits",
+    "Line",
+    "Seen",
+    "Sibling",
+    "Sister",
+    "TestedLine",
+    "Usual",
+    "line_of",
+    "with_siblings_left_out",
+]

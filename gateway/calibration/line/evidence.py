@@ -64,8 +64,8 @@ class Evidence:
         mean = np.linalg.solve(precision, prior.precision @ prior.mean + self.pull)
         return Prior(np.asarray(mean, float), _symmetric(precision))
 
-    def at_amplitude(self, about: F64, log_ratio: float) -> "Evidence":
-        """The same with friction shares and rates told at another usual amplitude, exp(-log_ratio) times the old one.
+    def at_amplitude(self, about: F64, log_ratios: tuple[float, float]) -> "Evidence":
+        """The same with friction told at other usual amplitudes: of front and rear axle exp(-log_ratio) times the old.
 
         A rate c (1 - p + p / a) at the amplitude a is c' (1 - p' + p' / a') at a' = r a (log_ratio = log r) with
 
@@ -73,12 +73,12 @@ class Evidence:
 
         linearised about the parameters ``about`` (n,).
         """
-        if log_ratio == 0.0:
+        if not any(log_ratios):
             return self
-        r, moved = np.exp(log_ratio), about.copy()
+        moved = about.copy()
         back = np.eye(len(about))  # of the old parameters by the new
-        for share, rate in RATES:
-            p = about[share]
+        for axle, share, rate in RATES:
+            p, r = about[share], np.exp(log_ratios[axle])
             whole = 1.0 - p + p * r
             moved[rate] += np.log(whole)
             moved[share] = p * r / whole

@@ -29,8 +29,8 @@ class Sibling:
     def errors_of(self, calibration: CrossSpectrumCalibration) -> list[LeftOut]:
         """Every batch of its other drives."""
         rest = [run for run in self.runs if run is not self._empty]
-        vehicle, usual = self.sister.vehicle, calibration.usual_log_amplitude
-        known = known_spectra(rest, vehicle, with_roll=can_roll(vehicle), usual_log_amplitude=usual)
+        vehicle = self.sister.vehicle
+        known = known_spectra(rest, vehicle, with_roll=can_roll(vehicle))
         return [error for one in known for error in left_out_errors(one, calibration)]
 
     @property

@@ -21,6 +21,7 @@ import numpy as np
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS
 from gateway.calibration.half_car.limits import Limits
 from gateway.calibration.half_car.prior import Prior, prior_of
+from gateway.calibration.half_car.usual import Usual
 from gateway.calibration.line.evidence import Evidence
 from gateway.calibration.line.scatter import SCATTER_DOF, default_scatter_std, is_inherited
 from gateway.calibration.line.seen import Seen
@@ -49,7 +50,7 @@ class Line:
     members: tuple[str, ...]
     wheelbase_m: float
     empty_mass_kg: float
-    usual_log_amplitude: float
+    usual: Usual
     half_car: Evidence
     roll: Evidence | None
     scatter_std: F64
@@ -85,11 +86,12 @@ class Sister:
     line: Line | None = None
 
     @property
-    def usual_log_amplitude(self) -> float:
+    def usual(self) -> Usual:
         """Raises LineError where the calibration does not say: it was made before that was kept."""
-        if self.calibration.usual_log_amplitude is None:
+        c = self.calibration
+        if c.usual_log_amplitude is None:
             raise LineError(f"{self.vehicle.name} ({self.id}): says not how much it usually moved: calibrate it again")
-        return self.calibration.usual_log_amplitude
+        return Usual(c.usual_log_amplitude, c.usual_stroke_mps)
 
     @property
     def half_car(self) -> Evidence:
@@ -124,7 +126,7 @@ def line_of(sisters: Sequence[Sister], line: Line | None = None) -> Line:
         return lines[0]
     if not lines and not sisters:
         raise LineError("a line needs the calibration of one vehicle at least")
-    usual = fmean([*(one.usual_log_amplitude for one in sisters), *(each.usual_log_amplitude for each in lines)])
+    usual = Usual.mean([*(one.usual for one in sisters), *(each.usual for each in lines)])
     found = [_at(one.half_car, one, usual) for one in sisters]
     rolls = [roll for one in sisters if (roll := one.roll) is not None]
     scatter_std, n_siblings = _scatter(found, rolls, lines)
@@ -134,7 +136,7 @@ def line_of(sisters: Sequence[Sister], line: Line | None = None) -> Line:
         members=tuple(sorted([*known, *(one.id for one in sisters)])),
         wheelbase_m=fmean([*(one.vehicle.wheelbase_m for one in sisters), *(each.wheelbase_m for each in lines)]),
         empty_mass_kg=fmean([*(one.vehicle.empty_mass_kg for one in sisters), *(each.empty_mass_kg for each in lines)]),
-        usual_log_amplitude=usual,
+        usual=usual,
         half_car=_sum([*of_line, *(one.of_another(variance[:_N]) for one in found)]),
         roll=_sum_or_none(
             [*(each.roll for each in lines if each.roll), *(one.of_another(variance[_N:]) for one in rolls)]
@@ -168,16 +170,15 @@ def _about_mean(scatter_std: F64) -> F64:
     return 0.5 * scatter_std**2
 
 
-def _at(evidence: Evidence, sister: Sister, usual_log_amplitude: float) -> Evidence:
+def _at(evidence: Evidence, sister: Sister, usual: Usual) -> Evidence:
     """Told at the line's usual amplitude."""
-    about = upright(sister.calibration.parameters)
-    return evidence.at_amplitude(about, sister.usual_log_amplitude - usual_log_amplitude)
+    return evidence.at_amplitude(upright(sister.calibration.parameters), sister.usual.log_over(usual))
 
 
-def _line_at(line: Line, usual_log_amplitude: float) -> Evidence:
+def _line_at(line: Line, usual: Usual) -> Evidence:
     """The same of a line, about the mean that its evidence has."""
     mean = np.linalg.pinv(line.half_car.information, hermitian=True) @ line.half_car.pull
-    return line.half_car.at_amplitude(np.asarray(mean, float), line.usual_log_amplitude - usual_log_amplitude)
+    return line.half_car.at_amplitude(np.asarray(mean, float), line.usual.log_over(usual))
 
 
 def _distinct(lines: Iterable[Line]) -> list[Line]:

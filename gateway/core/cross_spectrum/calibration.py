@@ -26,7 +26,8 @@ class CrossSpectrumCalibration:
     band. usual_log_amplitude: see measured.Reading. gravity_mps2 is what the accelerometer read on average; None where
     the file does not say. The two scores are the largest that are believed of a sensor that nobody touched
     (sensor_change). As stated, the sensor sits sensor_left_m left of the centre line, and what is carried usually
-    reaches payload_length_m along the floor. least_slack: see parameters.Ground.
+    reaches payload_length_m along the floor. least_slack: see parameters.Ground. usual_stroke_mps: see
+    measured.Reading; None too where no roll rate was read.
     """
 
     empty_mass_kg: float
@@ -59,6 +60,7 @@ class CrossSpectrumCalibration:
     sensor_left_std_m: float = UNKNOWN_OFFSET_STD_M
     payload_length_m: float | None = None
     least_slack: float = LEAST_SLACK
+    usual_stroke_mps: tuple[float, float] | None = None
 
     @property
     def ground(self) -> Ground:
@@ -84,5 +86,11 @@ class CrossSpectrumCalibration:
         """How spectra of this vehicle are taken."""
         mount = mount_of(self.parameters)
         return Reading(
-            self.wheelbase_m, self.band_hz, self.n_segment, self.usual_log_amplitude, mount is not None, mount
+            self.wheelbase_m,
+            self.band_hz,
+            self.n_segment,
+            self.usual_log_amplitude,
+            with_roll=mount is not None,
+            mount=mount,
+            usual_stroke_mps=self.usual_stroke_mps,
         )

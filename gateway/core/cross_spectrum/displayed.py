@@ -17,6 +17,7 @@ from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.driven import spectral_model
 from gateway.core.cross_spectrum.model.expected import expected_spectra
 from gateway.core.cross_spectrum.model.parameters import INDEX
+from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.vehicle import Load
 from gateway.records import F64, Bool, Spectra
 
@@ -45,8 +46,9 @@ class Fitted:
 def modelled_spectra(seen: Spectra, calibration: CrossSpectrumCalibration, fitted: Fitted) -> Spectra:
     """Spectra (k,) of the fitted vehicle at those k of the m seen frequencies that calibration has used."""
     is_used = (seen.freq_hz >= calibration.band_hz[0]) & (seen.freq_hz <= calibration.band_hz[1])
-    measured = _as_one_group(seen, is_used, fitted, calibration)
     load = Load(fitted.payload_kg, fitted.front_share_pct)
+    measured = _as_one_group(seen, is_used, fitted, calibration)
+    measured = with_strokes(measured, calibration.parameters, load, calibration.ground)
     point = Point.of(_parameters(calibration, fitted), load, fitted.cg_left_m)
     model = spectral_model(point.theta, point.loaded, calibration.ground, measured.freq_hz)
     matrix = expected_spectra(model, measured)

@@ -13,6 +13,7 @@ from gateway.core.cross_spectrum.lateral.unseen import sideways_covariance
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Curvature, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll, level, upright
+from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.cross_spectrum.packing import Packing, packings
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
@@ -68,14 +69,14 @@ class _Peak:
 def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Located:
     """The most probable load of ``spectra`` under a flat prior on payload and share.
 
-    With a roll rate the load is first sought as if it lay on the centre line; then roll tells where it lies, and the
-    load is sought once more from there. Where the roll rate is lost, the sensor reads roll all the same: it is taken to
-    sit where calibration has it, with the load on the centre line. How long it lies is never sought (spread).
+    How much each axle moves goes with the load, so that it is told anew at each answer, and the load sought on from
+    there. With a roll rate the load is first sought as if it lay on the centre line; then roll tells where it lies, and
+    the load is sought once more from there. Where the roll rate is lost, the sensor reads roll all the same: it is
+    taken to sit where calibration has it, with the load on the centre line. How long it lies is never sought (spread).
     """
     calibration = as_carried(calibration)
-    whittle = Whittle(spectra.without_roll, calibration.ground)
     if spectra.roll is None or not has_roll(calibration.parameters):
-        peak = _best(whittle, calibration)
+        whittle, peak = _best(spectra.without_roll, calibration)
         located = _told(whittle, peak, calibration, 0.0)
 
         def weigh(other: CrossSpectra) -> F64:
@@ -84,9 +85,11 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
 
         unseen = sideways_covariance(whittle.spectra, located.point, calibration, weigh)
         return replace(located, drift_covariance=located.drift_covariance + unseen)
-    rolling = Whittle(spectra.within(ROLL_BAND_HZ), calibration.ground)
     placed = replace(calibration, parameters=level(calibration.parameters))
-    peak = _best(whittle, replace(calibration, parameters=upright(calibration.parameters)))
+    _, peak = _best(spectra.without_roll, replace(calibration, parameters=upright(calibration.parameters)))
+    moving = _moving(spectra, peak.found.x, placed)
+    whittle = Whittle(moving.without_roll, calibration.ground)
+    rolling = Whittle(moving.within(ROLL_BAND_HZ), calibration.ground)
     place = sought_sideways(rolling, _point(peak.found.x, placed, 0.0))
     peak = replace(peak, found=_sought(whittle, peak.found.x, peak.packing, placed, place.cg_left_m))
     place = sought_sideways(rolling, _point(peak.found.x, placed, place.cg_left_m))
@@ -144,16 +147,26 @@ def _point(x: F64, calibration: CrossSpectrumCalibration, cg_left_m: float) -> P
     return Point(theta, float(x[-2]), float(x[-1]), cg_left_m)
 
 
-def _best(whittle: Whittle, calibration: CrossSpectrumCalibration) -> _Peak:
-    """The best of the peaks that a few starting loads, firm and soft, lead to, and how far the others compete."""
+def _moving(spectra: CrossSpectra, x: F64, calibration: CrossSpectrumCalibration) -> CrossSpectra:
+    """The same with how much each axle of the calibrated vehicle moves under the load at x."""
+    load = _point(x, calibration, 0.0).load
+    return with_strokes(spectra, calibration.parameters, load, calibration.ground)
+
+
+def _best(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> tuple[Whittle, _Peak]:
+    """The best of the peaks that a few starting loads, firm and soft, lead to, and how far the others compete; before
+    it the likelihood under which it was sought.
+    """
+    whittle = Whittle(spectra, calibration.ground)
     peaks = []
     for packing, n in zip(packings(calibration.parameters), (STARTS_TRIED, 1), strict=True):
         starts = [np.r_[packing.drifting, load] for load in _starting_loads(calibration)]
         starts.sort(key=lambda x: whittle.cost(_point(x, calibration, 0.0)))
         peaks += [_Peak(_sought(whittle, one, packing, calibration, 0.0, COARSE), packing) for one in starts[:n]]
     best = min(peaks, key=lambda peak: peak.found.cost + peak.packing.decisive)
+    whittle = Whittle(_moving(spectra, best.found.x, calibration), calibration.ground)
     found = _sought(whittle, best.found.x, best.packing, calibration, 0.0)
-    return _Peak(found, best.packing, _rivalry(found, peaks))
+    return whittle, _Peak(found, best.packing, _rivalry(found, peaks))
 
 
 def _rivalry(found: Found, peaks: Sequence[_Peak]) -> F64:

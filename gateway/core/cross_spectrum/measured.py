@@ -30,8 +30,9 @@ class Reading:
     """How spectra are taken of a vehicle: band_hz is inclusive, n_segment in samples.
 
     usual_log_amplitude is how much the vehicle moved in calibration (:func:`log_amplitude_of`); None for as much as in
-    the drive that is read. with_roll: the roll rate is read too, where a drive has enough of it; then all is read as on
-    the centre line, if mount says where the sensor sits.
+    the drive that is read. usual_stroke_mps is how fast the springs of front and rear axle moved there (model.strokes);
+    None where friction goes by how much the body moves. with_roll: the roll rate is read too, where a drive has enough
+    of it; then all is read as on the centre line, if mount says where the sensor sits.
     """
 
     wheelbase_m: float
@@ -40,6 +41,7 @@ class Reading:
     usual_log_amplitude: float | None = None
     with_roll: bool = False
     mount: Mount | None = None
+    usual_stroke_mps: tuple[float, float] | None = None
 
     def with_gyro_late_by(self, lag_s: float) -> "Reading":
         """The same with another lag of the gyro, where a mount is told."""
@@ -69,7 +71,8 @@ class CrossSpectra:
     (b, 1) the number of segments in each group. inverse_power (b, 1) is the mean of what segments were
     multiplied by, log_amplitude (b, 1) how much they moved over the usual. The two root mean squares are of
     the segments before division, in m/s2 and rad/s within the band; reading is how they were taken, the usual
-    amplitude filled in. roll is None where no roll rate was read.
+    amplitude filled in. roll is None where no roll rate was read. log_strokes (b, 2) is how much faster than usual the
+    springs of front and rear axle move (model.strokes); None where nobody worked it out.
     """
 
     freq_hz: F64
@@ -85,6 +88,12 @@ class CrossSpectra:
     pitch_rate_rms_radps: float
     reading: Reading
     roll: RollSpectra | None = None
+    log_strokes: F64 | None = None
+
+    @property
+    def log_movement(self) -> F64:
+        """(b, 2) logarithm of how much front and rear axle move over the usual: as the body, if no more is known."""
+        return np.repeat(self.log_amplitude, 2, axis=1) if self.log_strokes is None else self.log_strokes
 
     @property
     def n_sensors(self) -> int:

@@ -13,6 +13,7 @@ from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import upright
+from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64, Spectra
@@ -52,7 +53,8 @@ def fits_of(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration) -> 
             amplitude_ratio=math.exp(cross.log_amplitude_mean),
         )
         point = Point.of(upright(calibration.parameters), run.load)
-        misfit = Whittle(cross.without_roll, calibration.ground).misfit(point)
+        moving = with_strokes(cross.without_roll, point.theta, run.load, calibration.ground)
+        misfit = Whittle(moving, calibration.ground).misfit(point)
         fits.append(Fit(run, measured, modelled_spectra(measured, calibration, at_truth), misfit))
     return fits
 

@@ -4,7 +4,7 @@ Three things make groups differ that carry the same load:
 
 - speed, by the delay of the rear axle, and by the tracks: axles whose wheels do not run in one track, and the two
   tracks of one axle, meet roads that resemble each other the less the shorter the waves are;
-- how much the vehicle moves, by the friction of its axles;
+- how much each axle moves, by its friction;
 - sensor noise, which is the same on every road, so that it counts for more on a smooth one.
 """
 
@@ -37,7 +37,7 @@ Paths = tuple[C128, ...]
 class SpectralModel:
     """Vehicles theta (..., n) with their loads, solved but not yet driven at any speed.
 
-    ``paths`` (p, ..., 3, m) are to a unit of road under one axle, at three amplitudes of movement; slack (p, ..., m) is
+    ``paths`` (p, ..., 5, m) are to a unit of road under one axle, at each of friction.LEVELS; slack (p, ..., m) is
     a share of each sensor's power, least_slack and what parameters add; noise (p, ..., 1) is a density in the square of
     the sensor's unit per hertz.
     tracks_apart_m and twist_level are None for a vehicle that does not roll.
@@ -94,7 +94,7 @@ def spectral_model(
 
 
 def responses(theta: F64, load: tuple[F64 | float, ...], ground: Ground, freq_hz: F64, n_sensors: int) -> Paths:
-    """Responses (p, ..., 3, m) by front and rear axle, at each of friction.LEVELS."""
+    """Responses (p, ..., 5, m) by front and rear axle, at each of friction.LEVELS."""
     acting = at_levels(theta)
     payload_kg, front_share, *cg_left_m = (np.asarray(one)[..., None, None] for one in load)
     if not has_roll(theta):
@@ -112,7 +112,7 @@ def responses(theta: F64, load: tuple[F64 | float, ...], ground: Ground, freq_hz
 
 def driven(model: SpectralModel, spectra: CrossSpectra) -> Driven:
     """The model as the groups of ``spectra`` drive."""
-    weights = level_weights(spectra.log_amplitude)
+    weights = level_weights(spectra.log_movement)
     later_s = spectra.delay_s * model.delay_scale[..., None, :] + model.rear_lag_s[..., None, :]
     phase = spectra.delay_phase * np.exp(-2j * np.pi * spectra.freq_hz * later_s)
     x = along(model.track_offset_m, model, spectra)

@@ -82,6 +82,35 @@ def frequency_response(car: HalfCar, payload_kg: Real, front_share: Real, freq_h
     road: over each axle the displacement is that of the road there.
     """
     omega = 2.0 * np.pi * freq_hz
+    by_front, by_rear = _body_over_axles(car, payload_kg, front_share, freq_hz)
+    from_front, from_rear = _sensed(car, *by_front, omega), _sensed(car, *by_rear, omega)
+    return Response(from_front[0], from_rear[0], from_front[1], from_rear[1])
+
+
+def strokes(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> tuple[C128, C128]:
+    """By how much the springs of front and rear axle (2, ..., m) stretch, for a unit of road under the front axle, and
+    under the rear one.
+
+    With K the suspension and T the wheel held by its tyre the wheel moves by (K body + k_t road) / (K + T).
+    """
+    omega = 2.0 * np.pi * freq_hz
+    added = added_axle_masses_kg(car, payload_kg, front_share)
+    stretched = []
+    for i, over_axles in enumerate(_body_over_axles(car, payload_kg, front_share, freq_hz)):
+        of_axles = []
+        for k, (axle, added_kg) in enumerate(zip((car.front, car.rear), added, strict=True)):
+            wheel = wheel_npm(axle, omega)
+            by_road = axle.tyre_npm if i == k else 0.0
+            of_axles.append((wheel * over_axles[k] - by_road) / (suspension_npm(axle, added_kg, omega) + wheel))
+        stretched.append(np.stack(of_axles))
+    return stretched[0], stretched[1]
+
+
+def _body_over_axles(
+    car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64
+) -> tuple[tuple[C128, C128], tuple[C128, C128]]:
+    """The body's displacement over front and rear axle, for a unit of road under the front one; then the rear one."""
+    omega = 2.0 * np.pi * freq_hz
     mass_ff, mass_rr, mass_fr = body_mass(car, payload_kg, front_share, freq_hz)
     added_front_kg, added_rear_kg = added_axle_masses_kg(car, payload_kg, front_share)
     body_front, road_front = axle_forces(car.front, added_front_kg, omega)
@@ -92,9 +121,7 @@ def frequency_response(car: HalfCar, payload_kg: Real, front_share: Real, freq_h
     determinant = d_ff * d_rr - d_fr * d_fr
     by_front = road_front / determinant
     by_rear = road_rear / determinant
-    from_front = _sensed(car, d_rr * by_front, -d_fr * by_front, omega)
-    from_rear = _sensed(car, -d_fr * by_rear, d_ff * by_rear, omega)
-    return Response(from_front[0], from_rear[0], from_front[1], from_rear[1])
+    return (d_rr * by_front, -d_fr * by_front), (-d_fr * by_rear, d_ff * by_rear)
 
 
 def _sensed(car: HalfCar, over_front: C128, over_rear: C128, omega: F64) -> tuple[C128, C128]:

@@ -83,7 +83,7 @@ def _moved(theta: F64, load: tuple[float, ...], ground: Ground, spectra: CrossSp
         else:
             step[row] = LOAD_STEPS[entry - len(theta)]
             loads[entry - len(theta)][2 * row : 2 * row + 2] += (step[row], -step[row])
-    weights, per_step = level_weights(spectra.log_amplitude), 0.5 / step[:, None, None]
+    weights, per_step = level_weights(spectra.log_movement), 0.5 / step[:, None, None]
     solved = responses(thetas, tuple(loads), ground, spectra.freq_hz, spectra.n_sensors)
     return tuple(weights @ ((path[:, ::2] - path[:, 1::2]) * per_step) for path in solved)
 
