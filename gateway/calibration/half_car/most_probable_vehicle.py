@@ -14,7 +14,7 @@ from gateway.core.cross_spectrum.model.parameters import PARAMETERS, has_roll, u
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.records import F64
 
-TURNS: Final = 2
+TURNS: Final = 3
 
 
 def fit_vehicle(
