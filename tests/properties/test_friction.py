@@ -13,7 +13,14 @@ from gateway.calibration.half_car import calibrate_cross_spectrum, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.measured import log_amplitude_of
-from gateway.core.cross_spectrum.model.friction import LEAST_LEFT, LEVELS, MOST, at_levels, level_weights
+from gateway.core.cross_spectrum.model.friction import (
+    LEAST_LEFT,
+    LEVELS,
+    MOST,
+    MOST_APART,
+    at_levels,
+    level_weights,
+)
 from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, is_positive
 from gateway.records import F64, Batch, Why
@@ -21,7 +28,7 @@ from gateway.records import F64, Batch, Why
 ROADS_MPS2 = (0.4, 0.8, 1.4)
 MOVED_MPS2 = 0.8  # where friction makes up these shares of a rate
 DAMPER_SHARE, SPRING_SHARE = 0.35, 0.04
-amplitudes = st.floats(-2.0, 2.0)
+amplitudes, factors = st.floats(-2.0, 2.0), st.floats(-3.0, 3.0)
 
 
 def in_units(theta: F64, name: str) -> float:
@@ -58,19 +65,26 @@ def test_a_rate_goes_with_one_less_p_and_p_over_s(share: float) -> None:
     theta = prior_of(VAN).mean.copy()
     theta[INDEX["damper_rear_nspm"]] = np.log(4000.0)
     theta[INDEX["damper_friction_rear"]] = share
-    for level, moved in zip(LEVELS, at_levels(theta), strict=True):
-        left = max(LEAST_LEFT, 1.0 - share + share / np.exp(level))
+    for (_, rear), moved in zip(LEVELS, at_levels(theta), strict=True):
+        left = max(LEAST_LEFT, 1.0 - share + share / np.exp(rear))
         assert in_units(moved, "damper_rear_nspm") == pytest.approx(4000.0 * left)
         untouched = [i for i, name in enumerate(PARAMETERS) if not name.startswith(("damper_", "spring_"))]
         np.testing.assert_array_equal(moved[untouched], theta[untouched])
 
 
-@given(amplitude=amplitudes, a=st.floats(-3.0, 3.0), b=st.floats(-3.0, 3.0), c=st.floats(-3.0, 3.0))
-def test_between_levels_a_parabola_is_met_exactly(amplitude: float, a: float, b: float, c: float) -> None:
-    at = np.array(LEVELS)
-    within = np.clip(amplitude, -MOST, MOST)
-    met = level_weights(np.array([[amplitude]])) @ (a + b * at + c * at**2)
-    assert met[0] == pytest.approx(a + b * within + c * within**2, abs=1e-9)
+@given(front=amplitudes, rear=amplitudes, a=factors, b=factors, c=factors, d=factors, e=factors)
+def test_between_levels_parabolas_are_met_exactly(
+    front: float, rear: float, a: float, b: float, c: float, d: float, e: float
+) -> None:
+    """One of what both axles have in common, one of what sets them apart."""
+
+    def value(front: F64, rear: F64) -> F64:
+        u = np.clip(0.5 * (front + rear), -MOST, MOST)
+        v = np.clip(0.5 * (front - rear), -MOST_APART, MOST_APART)
+        return np.asarray(a + b * u + c * u**2 + d * v + e * v**2)
+
+    met = level_weights(np.array([[front, rear]])) @ value(*np.array(LEVELS).T)
+    assert met[0] == pytest.approx(float(value(np.array(front), np.array(rear))), abs=1e-9)
 
 
 @given(ratio=st.floats(0.1, 10.0))

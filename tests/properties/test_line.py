@@ -77,17 +77,20 @@ def test_what_is_a_vehicle_s_own_is_marginalised_out(drives: Evidence, prior: Pr
     assert np.allclose(told.mean[~shared], prior.mean[~shared])
 
 
-@pytest.mark.parametrize("log_ratio", [-0.7, 0.0, 0.4])
-def test_rates_are_the_same_at_every_amplitude_whatever_amplitude_is_called_usual(log_ratio: float) -> None:
+@pytest.mark.parametrize("log_ratios", [(-0.7, -0.7), (0.0, 0.0), (0.4, -0.2)])
+def test_rates_are_the_same_at_every_amplitude_whatever_amplitude_is_called_usual(
+    log_ratios: tuple[float, float],
+) -> None:
     n = len(PARAMETERS)
     about = np.linspace(0.05, 0.4, n)
-    seen = Evidence(np.eye(n), about.copy()).at_amplitude(about, log_ratio)
+    seen = Evidence(np.eye(n), about.copy()).at_amplitude(about, log_ratios)
     moved = np.linalg.solve(seen.information, seen.pull)
-    for (share, rate), amplitude in itertools.product(RATES, (0.5, 1.0, 2.0)):
+    for (axle, share, rate), amplitude in itertools.product(RATES, (0.5, 1.0, 2.0)):
         old = np.exp(about[rate]) * (1.0 - about[share] + about[share] / amplitude)
-        new = np.exp(moved[rate]) * (1.0 - moved[share] + moved[share] / (amplitude * np.exp(log_ratio)))
+        new = np.exp(moved[rate]) * (1.0 - moved[share] + moved[share] / (amplitude * np.exp(log_ratios[axle])))
         assert new == pytest.approx(old)
-    back = seen.at_amplitude(moved, -log_ratio)
+    front, rear = log_ratios
+    back = seen.at_amplitude(moved, (-front, -rear))
     assert np.allclose(back.information, np.eye(n))
     assert np.allclose(back.pull, about)
 

@@ -12,7 +12,7 @@ from support.odd_content import GONE, ODD, changed, places
 from gateway.calibration.file import LineFile, LinePart, SiblingPart, line_of_files, load_like
 from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.half_car import prior_of
-from gateway.calibration.line import Evidence, Limits, Line, Seen
+from gateway.calibration.line import Evidence, Limits, Line, Seen, Usual
 from gateway.calibration.line.scatter import default_scatter_std, is_inherited
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
 from gateway.core.vehicle import Load
@@ -29,7 +29,7 @@ def line() -> Line:
         members=("sha256:" + 64 * "a",),
         wheelbase_m=VAN.wheelbase_m,
         empty_mass_kg=VAN.empty_mass_kg,
-        usual_log_amplitude=-4.0,
+        usual=Usual(-4.0, (0.06, 0.05)),
         half_car=Evidence.of(prior.mean, 0.25 * prior.covariance, prior, shared),
         roll=None,
         scatter_std=default_scatter_std(PARAMETERS + ROLL_PARAMETERS),
@@ -50,11 +50,25 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     held = load_like(path)
     assert held.id == line_file().id
     read, built = line_of_files([held]), line()
-    assert (read.members, read.seen, read.limits) == (built.members, built.seen, built.limits)
+    assert (read.members, read.usual, read.seen) == (built.members, built.usual, built.seen)
+    assert read.limits == built.limits
     assert np.array_equal(read.half_car.information, built.half_car.information)
     assert np.array_equal(read.half_car.pull, built.half_car.pull)
     assert np.array_equal(read.scatter_std, built.scatter_std)
     assert read.roll is None
+
+
+def test_a_file_of_version_1_is_read_on(tmp_path: Path) -> None:
+    """Its vehicles' friction goes by how much the body moves, as it did; it says which file it was."""
+    content = line_file().model_dump(mode="json") | {"version": 1}
+    del content["migrated_from"], content["line"]["usual_stroke_mps"]
+    content["id"] = content_id(content)
+    path = tmp_path / "line.json"
+    path.write_text(json.dumps(content))
+    held = load_like(path)
+    assert isinstance(held, LineFile)
+    assert (held.version, held.migrated_from) == (2, content["id"])
+    assert line_of_files([held]).usual == Usual(-4.0, None)
 
 
 @pytest.mark.filterwarnings("ignore:overflow")  # numbers of 1e308 are finite

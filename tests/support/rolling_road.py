@@ -21,8 +21,9 @@ def batch_over_two_tracks(
     speed_mps: float = 14.0,
     noise: float = 0.02,
     car: RollingCar = ROLLING_CAR,
+    shaken_mps2: float = 0.8,
 ) -> Batch:
-    """Constant speed, 0.8 m/s2 of vertical acceleration; the tracks differ more the shorter the waves are."""
+    """Constant speed; ``shaken_mps2`` is the vertical acceleration's standard deviation. The tracks differ more the shorter the waves are."""
     rng = np.random.default_rng(seed)
     n = int(duration_s * RATE_HZ)
     freq_hz = np.fft.rfftfreq(n, 1.0 / RATE_HZ)[1:]
@@ -36,7 +37,7 @@ def batch_over_two_tracks(
     sensed = sensed + (r.against_front + r.against_rear * later) * half_difference
     sensed = sensed * ((freq_hz > 0.5) & (freq_hz < 22.0))
     signals = np.fft.irfft(np.concatenate([np.zeros((3, 1)), sensed], axis=1), n, axis=1)
-    signals *= 0.8 / signals[0].std()
+    signals *= shaken_mps2 / signals[0].std()
     signals = signals + noise * signals.std(axis=1, keepdims=True) * rng.standard_normal(signals.shape)
     batch = batch_of(signals[0], signals[1], np.full(n, speed_mps))
     return replace(batch, roll_rate_radps=signals[2])

@@ -85,7 +85,7 @@ def test_a_lost_id_is_refused(tmp_path: Path) -> None:
 
 
 FAULTS: list[tuple[Change, str]] = [
-    (lambda c: c.update(version=7), "reads up to version 6: use the springscale that wrote it"),
+    (lambda c: c.update(version=8), "reads up to version 7: use the springscale that wrote it"),
     (lambda c: c.update(version=0), "version 0 was never written"),
     (lambda c: c.update(version="2"), "version '2' was never written"),
     (lambda c: c.update(version=True), "version True was never written"),

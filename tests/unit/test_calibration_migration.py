@@ -100,10 +100,25 @@ def test_what_was_fitted_with_more_slack_keeps_it(tmp_path: Path) -> None:
     assert fitted_anew is not None
     assert fitted_anew.ground.least_slack == LEAST_SLACK_ON_CENTRE_LINE
     content["version"] = 5
-    del content["cross_spectrum"]["least_slack"]
+    del content["cross_spectrum"]["least_slack"], content["cross_spectrum"]["usual_stroke_mps"]
     content["id"] = content_id(content)
     path = tmp_path / "van.json"
     path.write_text(json.dumps(content))
     fitted_then = load_calibration(path).for_core().cross_spectrum
     assert fitted_then is not None
     assert fitted_then.ground.least_slack == LEAST_SLACK
+
+
+def test_what_was_fitted_with_one_amplitude_for_both_axles_keeps_it(tmp_path: Path) -> None:
+    content = json.loads(SHIPPED.read_text())
+    fitted_anew = load_calibration(SHIPPED).for_core().cross_spectrum
+    assert fitted_anew is not None
+    assert fitted_anew.reading.usual_stroke_mps is not None
+    content["version"] = 6
+    del content["cross_spectrum"]["usual_stroke_mps"]
+    content["id"] = content_id(content)
+    path = tmp_path / "van.json"
+    path.write_text(json.dumps(content))
+    fitted_then = load_calibration(path).for_core().cross_spectrum
+    assert fitted_then is not None
+    assert fitted_then.reading.usual_stroke_mps is None

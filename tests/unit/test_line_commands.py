@@ -108,7 +108,7 @@ def test_what_is_no_line_is_refused_with_what_to_do(sisters: list[Path], tmp_pat
     assert run("line", "build", *sisters, "--output", line).exit_code == 0
     content = json.loads(line.read_text())
     broken.write_text(json.dumps(content | {"software": "another"}))
-    content["version"] = 2
+    content["version"] = 3
     newer.write_text(json.dumps(content | {"id": content_id(content)}))
     for arguments, said in (
         (("line", "build", ratio_index, "--output", line), "calibrate it again without --estimator"),
@@ -119,7 +119,7 @@ def test_what_is_no_line_is_refused_with_what_to_do(sisters: list[Path], tmp_pat
         (("line", "show", sisters[0]), "springscale calibration show"),
         (("calibrate", line, "--like", line, "--estimator", "ratio_index", "--check"), "nothing to inherit"),
         (("line", "show", broken), "does not match its id"),
-        (("line", "show", newer), "version 2"),
+        (("line", "show", newer), "version 3"),
     ):
         assert said in refused(*arguments)
 

@@ -66,7 +66,7 @@ def test_it_is_believed_where_its_line_is(line: Line, inheriting: CrossSpectrumC
     assert set(line.seen.known_loads) <= set(inheriting.known_loads)
     assert not {SPRINGS_FROM_PRIORS, UNTESTED} & set(inheriting.warnings)
     assert inheriting.payload_inflation == line.limits.payload_inflation
-    assert inheriting.usual_log_amplitude == line.usual_log_amplitude
+    assert inheriting.usual_log_amplitude == line.usual.log_amplitude
 
 
 def test_a_line_of_vehicles_that_were_only_driven_empty_knows_no_springs() -> None:

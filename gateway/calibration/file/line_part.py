@@ -4,7 +4,7 @@ from dataclasses import asdict, astuple
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, PositiveFloat, model_validator
 
 from gateway.calibration.file.parts import Array, Part, check_shapes
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, ROLL_PARAMETERS
@@ -90,7 +90,7 @@ class LinePart(Part):
     wheelbase_m: float = Field(gt=0.0)
     empty_mass_kg: float = Field(gt=0.0)
     usual_log_amplitude: float
-    usual_stroke_mps: tuple[float, float] | None = Field(
+    usual_stroke_mps: tuple[PositiveFloat, PositiveFloat] | None = Field(
         description="how fast the springs of front and rear axle usually move; null: no member read a roll rate"
     )
     half_car: EvidencePart
