@@ -15,11 +15,11 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.measured import log_amplitude_of
 from gateway.core.cross_spectrum.model.friction import (
     LEAST_LEFT,
-    LEVELS,
     MOST,
     MOST_APART,
     at_levels,
     level_weights,
+    levels,
 )
 from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, is_positive
@@ -65,7 +65,7 @@ def test_a_rate_goes_with_one_less_p_and_p_over_s(share: float) -> None:
     theta = prior_of(VAN).mean.copy()
     theta[INDEX["damper_rear_nspm"]] = np.log(4000.0)
     theta[INDEX["damper_friction_rear"]] = share
-    for (_, rear), moved in zip(LEVELS, at_levels(theta), strict=True):
+    for (_, rear), moved in zip(levels(), at_levels(theta), strict=True):
         left = max(LEAST_LEFT, 1.0 - share + share / np.exp(rear))
         assert in_units(moved, "damper_rear_nspm") == pytest.approx(4000.0 * left)
         untouched = [i for i, name in enumerate(PARAMETERS) if not name.startswith(("damper_", "spring_"))]
@@ -83,7 +83,7 @@ def test_between_levels_parabolas_are_met_exactly(
         v = np.clip(0.5 * (front - rear), -MOST_APART, MOST_APART)
         return np.asarray(a + b * u + c * u**2 + d * v + e * v**2)
 
-    met = level_weights(np.array([[front, rear]])) @ value(*np.array(LEVELS).T)
+    met = level_weights(np.array([[front, rear]])) @ value(*np.array(levels()).T)
     assert met[0] == pytest.approx(float(value(np.array(front), np.array(rear))), abs=1e-9)
 
 

@@ -63,7 +63,7 @@ def over_all(spectra: CrossSpectra, log_speeds: F64) -> F64:
 def test_what_the_springs_push_is_what_the_body_weighs_times_its_acceleration(
     payload_kg: float, front_share_pct: float
 ) -> None:
-    """Newton's law: of both axles together, for a payload that stands firmly and a sensor over the centre of gravity."""
+    """Newton's law, both axles together: a payload that stands firmly, a sensor over the centre of gravity."""
     share = front_share_pct / 100.0
     above = replace(CAR, sensor_position_m=(1.0 - share) * CAR.wheelbase_m, payload_mode_hz=1e4)
     freq_hz = np.array([0.3, 1.2, 3.0, 9.0, 14.0])

@@ -23,7 +23,10 @@ def batch_over_two_tracks(
     car: RollingCar = ROLLING_CAR,
     shaken_mps2: float = 0.8,
 ) -> Batch:
-    """Constant speed; ``shaken_mps2`` is the vertical acceleration's standard deviation. The tracks differ more the shorter the waves are."""
+    """Constant speed; ``shaken_mps2`` is the acceleration's standard deviation.
+
+    The tracks differ more the shorter the waves are.
+    """
     rng = np.random.default_rng(seed)
     n = int(duration_s * RATE_HZ)
     freq_hz = np.fft.rfftfreq(n, 1.0 / RATE_HZ)[1:]

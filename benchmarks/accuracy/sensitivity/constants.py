@@ -57,8 +57,8 @@ CONSTANTS: Final = (
         "how straight a road's spectrum is believed to be",
     ),
     Constant(
-        "LEVELS", "gateway.core.cross_spectrum.model.friction", Acts.IN_CALIBRATION,
-        "amplitudes at which a vehicle with friction is solved",
+        "LEVEL_STEPS", "gateway.core.cross_spectrum.model.friction", Acts.IN_CALIBRATION,
+        "how far apart the amplitudes are at which a vehicle with friction is solved",
     ),
     Constant(
         "MISFIT_MARGIN", "gateway.calibration.half_car.left_out", Acts.IN_CALIBRATION,

@@ -37,7 +37,7 @@ Paths = tuple[C128, ...]
 class SpectralModel:
     """Vehicles theta (..., n) with their loads, solved but not yet driven at any speed.
 
-    ``paths`` (p, ..., 5, m) are to a unit of road under one axle, at each of friction.LEVELS; slack (p, ..., m) is
+    ``paths`` (p, ..., 5, m) are to a unit of road under one axle, at each of friction.levels(); slack (p, ..., m) is
     a share of each sensor's power, least_slack and what parameters add; noise (p, ..., 1) is a density in the square of
     the sensor's unit per hertz.
     tracks_apart_m and twist_level are None for a vehicle that does not roll.
@@ -94,7 +94,7 @@ def spectral_model(
 
 
 def responses(theta: F64, load: tuple[F64 | float, ...], ground: Ground, freq_hz: F64, n_sensors: int) -> Paths:
-    """Responses (p, ..., 5, m) by front and rear axle, at each of friction.LEVELS."""
+    """Responses (p, ..., 5, m) by front and rear axle, at each of friction.levels()."""
     acting = at_levels(theta)
     payload_kg, front_share, *cg_left_m = (np.asarray(one)[..., None, None] for one in load)
     if not has_roll(theta):

@@ -14,8 +14,9 @@ import numpy as np
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.records import F64
 
-LEVELS: Final = ((-0.8, -0.8), (0.0, 0.0), (0.8, 0.8), (0.4, -0.4), (-0.4, 0.4))
-"""Logarithms of front and rear axle's amplitude over the usual one at which a vehicle is solved: u + d and u - d.
+LEVEL_STEPS: Final = (0.8, 0.4)
+"""How far apart the levels are at which a vehicle is solved, in logarithms of amplitude over the usual one: of u, the
+mean of front and rear axle, and of d, half their difference.
 
 Of a rate 1 - p + p exp(-x) quadratic interpolation along u misses at most p |u (u^2 - 0.8^2)| exp(0.8) / 6, which is
 0.07 p between the outer levels; p is 0.1 or so. What u and d do together to both axles is left out.
@@ -32,16 +33,22 @@ RATES: Final = tuple(
 """Of which axle (0: front) each friction share is, where the vector has it, and the rate that it is a share of."""
 
 
+def levels() -> tuple[tuple[float, float], ...]:
+    """The five of front and rear axle at which a vehicle is solved."""
+    u, d = LEVEL_STEPS
+    return (-u, -u), (0.0, 0.0), (u, u), (d, -d), (-d, d)
+
+
 def at_levels(theta: F64) -> F64:
-    """Parameters theta (..., p) as they act at each of LEVELS: (..., 5, p)."""
-    return np.stack([_at(theta, level) for level in LEVELS], axis=-2)
+    """Parameters theta (..., p) as they act at each of :func:`levels`: (..., 5, p)."""
+    return np.stack([_at(theta, level) for level in levels()], axis=-2)
 
 
 def level_weights(log_amplitudes: F64) -> F64:
-    """What of the five LEVELS makes up amplitudes (b, 2) of front and rear axle, by quadratic interpolation: (b, 5)."""
+    """(b, 5) what of :func:`levels` makes up amplitudes (b, 2) of front and rear axle, by quadratic interpolation."""
     front, rear = log_amplitudes[:, :1], log_amplitudes[:, 1:]
-    u = np.clip(0.5 * (front + rear), -MOST, MOST) / LEVELS[2][0]
-    d = np.clip(0.5 * (front - rear), -MOST_APART, MOST_APART) / LEVELS[3][0]
+    u = np.clip(0.5 * (front + rear), -MOST, MOST) / LEVEL_STEPS[0]
+    d = np.clip(0.5 * (front - rear), -MOST_APART, MOST_APART) / LEVEL_STEPS[1]
     parts = [0.5 * u * (u - 1.0), 1.0 - u**2 - d**2, 0.5 * u * (u + 1.0), 0.5 * d * (d + 1.0), 0.5 * d * (d - 1.0)]
     weights: F64 = np.concatenate(parts, axis=1)
     return weights
