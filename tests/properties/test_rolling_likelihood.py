@@ -43,7 +43,7 @@ def rolling_theta() -> F64:
 def test_the_gradient_is_the_slope_of_the_cost(
     band_hz: tuple[float, float], usually: float, spectra: CrossSpectra
 ) -> None:
-    """For every parameter of a vehicle that rolls, and for the load; also where an axle moves not as it usually does."""
+    """For every parameter of a vehicle that rolls, and for the load, wherever axles move as they usually do or not."""
     moving = replace(spectra, log_strokes=spectra.log_amplitude - np.log([[usually, usually**0.5]]))
     whittle = Whittle(moving.within(band_hz), GROUND)
     theta = rolling_theta()
