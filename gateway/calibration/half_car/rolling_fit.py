@@ -2,7 +2,7 @@
 
 The half-car is fitted to what the sensors would read on the centre line (core.cross_spectrum.model.mount); for that it
 must be known where they sit. Roll is fitted to all three sensors with the half-car as found. Each needs the other,
-so that they take turns; twice is enough, for the sensor's place hardly moves.
+so that they take turns (most_probable_vehicle).
 
 A model of roll is cruder than one of heave: tyres slip sideways, axles turn about points that nobody measured. Fitted
 together, its errors would bend dampers and tyres of the half-car by several standard deviations (measured:
