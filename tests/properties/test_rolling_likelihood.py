@@ -121,3 +121,13 @@ def test_two_sensors_of_a_car_that_is_level_are_those_of_the_half_car(spectra: C
     flat = Whittle(spectra.without_roll, GROUND)
     rolling, half = flat.cost(Point(theta, *LOADED[:2], 0.0)), flat.cost(Point(upright(theta), *LOADED[:2]))
     assert rolling == pytest.approx(half, rel=1e-10)
+
+
+@pytest.mark.parametrize("flat", [False, True], ids=["three sensors", "two"])
+def test_points_cost_together_what_each_costs_alone(flat: bool, spectra: CrossSpectra) -> None:
+    theta = rolling_theta()
+    points = [Point(theta, *LOADED), Point(theta, 300.0, 0.47, -0.05), Point(1.01 * theta, 0.0, 0.52)]
+    if flat:
+        spectra, points = spectra.without_roll, [replace(one, theta=upright(one.theta)) for one in points]
+    whittle = Whittle(spectra, GROUND)
+    np.testing.assert_allclose(whittle.costs(points), [whittle.cost(one) for one in points], rtol=1e-12)

@@ -118,7 +118,15 @@ class Whittle:
     def cost(self, point: Point) -> float:
         """Negative log-likelihood, up to a constant."""
         whitened = self._whitened(point)
-        return self._shape_cost(whitened) + self._level_cost(whitened)
+        return float(self._cost(whitened.by, whitened.trace))
+
+    def costs(self, points: Sequence[Point]) -> F64:
+        """(k,) of several points, solved at once."""
+        theta = np.stack([point.theta for point in points])
+        loads = np.array([point.loaded for point in points]).T
+        model, driven = solved_at(theta, tuple(loads), self.ground, self.spectra)
+        by = Whitener.of(expected_of_driven(driven, model, self.spectra))
+        return self._cost(by, _sum(by(self._seen).auto))
 
     def misfit(self, point: Point) -> float:
         """Likelihood ratio per degree of freedom against matrices free at every group and frequency.
@@ -160,17 +168,14 @@ class Whittle:
             self._last = _Whitened(point, model, driven, by, by(self._seen))
         return self._last
 
-    def _shape_cost(self, z: _Whitened) -> float:
-        cost = self._p * np.log(z.trace)
-        for root in z.by.roots:
-            cost = cost + 2.0 * np.log(root)
-        return float(np.sum(self._n * cost))
-
-    def _level_cost(self, z: _Whitened) -> float:
-        level = _centred(np.log(z.trace / self._p))
+    def _cost(self, by: Whitener, trace: F64) -> F64:
+        """(...) of whitened spectra of that trace (..., b, m): of their shape, and of the road's level."""
+        shape = self._p * np.log(trace) + 2.0 * _sum(np.log(by.roots))
+        level = _centred(np.log(trace / self._p))
         w, x = self._level_weight, self._slope
-        along, stiffness = np.sum(w * x * level), np.sum(w * x * x) + ROAD_SLOPE_STD**-2
-        return float(0.5 * (np.sum(w * level**2) - along**2 / stiffness))
+        along, stiffness = _over_all(w * x * level), np.sum(w * x * x) + ROAD_SLOPE_STD**-2
+        of_level = 0.5 * (_over_all(w * level**2) - along**2 / stiffness)
+        return np.asarray(_over_all(self._n * shape) + of_level, np.float64)
 
     def _level_curvature(self, z: _Whitened, d_level: F64) -> tuple[F64, F64]:
         level, d = _centred(np.log(z.trace / self._p)), _centred(d_level)
@@ -185,6 +190,12 @@ class Whittle:
 def _sum(x: F64) -> F64:
     """Over sensors, or pairs of them."""
     total: F64 = x.sum(axis=0)
+    return total
+
+
+def _over_all(x: F64) -> F64:
+    """Over groups and frequencies."""
+    total: F64 = x.sum(axis=(-2, -1))
     return total
 
 

@@ -137,7 +137,7 @@ def _is_reversed(whittle: Whittle, point: Point, misfit: float, calibration: Cro
     if not misfit <= calibration.misfit_limit:
         usual = calibration.parameters[DRIFTING]
         tried += [_point(np.r_[usual, load], calibration, point.cg_left_m) for load in _starting_loads(calibration)]
-    return min(reverse.cost(one) for one in tried) < whittle.cost(point)
+    return float(reverse.costs(tried).min()) < whittle.cost(point)
 
 
 def _point(x: F64, calibration: CrossSpectrumCalibration, cg_left_m: float) -> Point:
@@ -161,8 +161,9 @@ def _best(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> tuple
     peaks = []
     for packing, n in zip(packings(calibration.parameters), (STARTS_TRIED, 1), strict=True):
         starts = [np.r_[packing.drifting, load] for load in _starting_loads(calibration)]
-        starts.sort(key=lambda x: whittle.cost(_point(x, calibration, 0.0)))
-        peaks += [_Peak(_sought(whittle, one, packing, calibration, 0.0, COARSE), packing) for one in starts[:n]]
+        costs = whittle.costs([_point(x, calibration, 0.0) for x in starts])
+        tried = [starts[i] for i in np.argsort(costs, kind="stable")[:n].tolist()]
+        peaks += [_Peak(_sought(whittle, one, packing, calibration, 0.0, COARSE), packing) for one in tried]
     best = min(peaks, key=lambda peak: peak.found.cost + peak.packing.decisive)
     whittle = Whittle(_moving(spectra, best.found.x, calibration), calibration.ground)
     found = _sought(whittle, best.found.x, best.packing, calibration, 0.0)
