@@ -42,6 +42,15 @@ def test_every_mapped_frame_is_in_the_log(tmp_path: Path, monkeypatch: pytest.Mo
     assert report.ended_early is None
 
 
+def test_what_came_as_it_was_stopped_is_counted_too(tmp_path: Path) -> None:
+    source, stop = LiveSource("virtual", tmp_path.name, SIGNAL_MAP), threading.Event()
+    source.inbox.put(DRIVE)
+    stop.set()
+    heard: list[int] = []
+    assert record_to_file(source, "can0", tmp_path / "drive.log.gz", stop, on_frames=heard.append) == len(DRIVE)
+    assert heard == [len(DRIVE)]
+
+
 @pytest.mark.parametrize(("name", "why"), [("taken.log.gz", "File exists"), ("fresh.log.gz", "no mapped frame came")])
 def test_what_cannot_be_recorded_is_told(tmp_path: Path, name: str, why: str) -> None:
     (tmp_path / "taken.log.gz").write_text("mine")

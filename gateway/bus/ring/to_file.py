@@ -36,8 +36,7 @@ def record_to_file(
         source.start()
         try:
             while not (stop.is_set() or (end_s is not None and time.monotonic() >= end_s) or source.failure):
-                frames = source.inbox.drain(LOOK_S)
-                if frames is not None:
+                if (frames := source.inbox.drain(LOOK_S)) is not None:
                     held.append(frames)
                     n_held += len(frames)
                     on_frames(n_written + n_held)
@@ -48,6 +47,8 @@ def record_to_file(
             source.stop()
             while (frames := source.inbox.drain(0.0)) is not None:
                 held.append(frames)
+                n_held += len(frames)
+                on_frames(n_written + n_held)
             n_written += _written(file, held, channel)
     return n_written
 
