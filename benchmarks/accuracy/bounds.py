@@ -11,8 +11,8 @@ from gateway.calibration.half_car import prior_of
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.likelihood import Point
-from gateway.core.cross_spectrum.measured import Reading
 from gateway.core.cross_spectrum.model.parameters import Ground
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import Vehicle
 from gateway.units import STANDARD_GRAVITY_MPS2
 from gateway.workbench.campaigns import PAPER_PAYLOAD_KG, PAPER_ROUGHNESS_M3, PAPER_SPEED_MPS, PAPER_WHEELBASE_M

@@ -10,8 +10,9 @@ from support.half_car_road import VAN, batch_over_road
 
 from gateway.calibration.half_car import prior_of
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
-from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
+from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, Ground
+from gateway.core.cross_spectrum.model.reading import Reading
 
 GROUND = Ground.of(VAN)
 READING = Reading(VAN.wheelbase_m, (1.1, 14.0), 256)

@@ -9,11 +9,12 @@ from support.rolling_road import WIDE_VAN, batch_over_two_tracks
 from gateway.calibration.half_car import prior_of
 from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
-from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
+from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
 from gateway.core.cross_spectrum.model.driven import spectral_model
 from gateway.core.cross_spectrum.model.expected import expected_spectra
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix
 from gateway.core.cross_spectrum.model.parameters import INDEX, Ground, names_of, upright
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.records import F64
 
 GROUND = Ground.of(WIDE_VAN, with_roll=True)

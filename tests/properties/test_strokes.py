@@ -10,7 +10,7 @@ from scipy.signal import StateSpace, lsim
 from support.half_car_road import CAR, RATE_HZ, VAN, batch_of, batch_over_road
 
 from gateway.calibration.half_car import prior_of
-from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
+from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
 from gateway.core.cross_spectrum.model.half_car import (
     HalfCar,
     added_axle_masses_kg,
@@ -19,6 +19,7 @@ from gateway.core.cross_spectrum.model.half_car import (
     suspension_npm,
 )
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, Ground, is_positive
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.cross_spectrum.model.strokes import log_stroke_speeds, with_strokes
 from gateway.core.vehicle import Load
 from gateway.records import F64, Batch

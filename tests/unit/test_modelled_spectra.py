@@ -8,8 +8,9 @@ from support.half_car_road import CAR, VAN, batch_over_road
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
-from gateway.core.cross_spectrum.measured import Reading, cross_spectra_of
+from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, is_positive
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.spectrum import spectra_of
 from gateway.records import F64, Spectra
 

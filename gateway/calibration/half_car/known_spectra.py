@@ -11,8 +11,9 @@ from gateway.calibration.half_car.usual import Usual
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
-from gateway.core.cross_spectrum.measured import CrossSpectra, Reading, cross_spectra_of
+from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, Ground, level, mount_of
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.cross_spectrum.model.strokes import log_stroke_speeds, with_strokes
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError

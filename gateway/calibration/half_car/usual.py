@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Usual:
-    """Of one vehicle or of a line, as core.cross_spectrum.measured.Reading has it; None: nobody worked it out."""
+    """Of one vehicle or of a line, as core.cross_spectrum.model.reading.Reading has it; None: nobody worked it out."""
 
     log_amplitude: float
     stroke_mps: tuple[float, float] | None = None

@@ -24,11 +24,12 @@ from gateway.calibration.inspection.finding import Finding, Severity
 from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import COHERENCE_BAND_HZ
-from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
+from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.driven import spectral_model
 from gateway.core.cross_spectrum.model.expected import expected_spectra
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix
 from gateway.core.cross_spectrum.model.parameters import INDEX, Ground
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import Load, Vehicle
 from gateway.estimate import Z95
 from gateway.records import C128, F64

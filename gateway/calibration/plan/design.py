@@ -22,8 +22,8 @@ from gateway.calibration.plan.loads import PlacedLoad
 from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
-from gateway.core.cross_spectrum.measured import Reading
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, Ground, upright
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 

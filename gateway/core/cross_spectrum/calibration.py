@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cross_spectrum.measured import Reading
 from gateway.core.cross_spectrum.model.parameters import INDEX, LEAST_SLACK, Ground, mount_of
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
 from gateway.core.weights import Unsprung
 from gateway.estimate import Quantity
@@ -23,11 +23,11 @@ class CrossSpectrumCalibration:
     rate was read; logarithms where these are positive quantities). The inflations widen standard deviations, the first
     two by so much more per_reach as a load lies beyond ``known_loads`` (reach.beyond); misfit_limit is the largest
     likelihood ratio per degree of freedom that is still believed; the two amplitudes are root mean squares within the
-    band. usual_log_amplitude: see measured.Reading. gravity_mps2 is what the accelerometer read on average; None where
+    band. usual_log_amplitude: see model.reading. gravity_mps2 is what the accelerometer read on average; None where
     the file does not say. The two scores are the largest that are believed of a sensor that nobody touched
     (sensor_change). As stated, the sensor sits sensor_left_m left of the centre line, and what is carried usually
     reaches payload_length_m along the floor. least_slack: see parameters.Ground. usual_stroke_mps: see
-    measured.Reading; None too where no roll rate was read.
+    model.reading; None too where no roll rate was read.
     """
 
     empty_mass_kg: float

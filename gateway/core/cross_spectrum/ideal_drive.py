@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.core.cross_spectrum.likelihood import Point
-from gateway.core.cross_spectrum.measured import CrossSpectra, Reading
+from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.driven import spectral_model
 from gateway.core.cross_spectrum.model.expected import expected_spectra
 from gateway.core.cross_spectrum.model.parameters import Ground
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import F64
 

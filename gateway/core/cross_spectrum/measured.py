@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix
-from gateway.core.cross_spectrum.model.mount import Mount
+from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import C128, F64, I64, Batch, Bool, Why
 
@@ -23,29 +23,6 @@ SPEED_SAMPLE_STEP = 8
 LEAST_SEGMENTS = 6
 LEAST_SHARE_WITH_ROLL = 0.7  # of the segments; with fewer, what the roll rate tells is not worth what it costs
 _NO_SEGMENT = np.empty((0, 0), np.complex128)
-
-
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """How spectra are taken of a vehicle: band_hz is inclusive, n_segment in samples.
-
-    usual_log_amplitude is how much the vehicle moved in calibration (:func:`log_amplitude_of`); None for as much as in
-    the drive that is read. usual_stroke_mps is how fast the springs of front and rear axle moved there (model.strokes);
-    None where friction goes by how much the body moves. with_roll: the roll rate is read too, where a drive has enough
-    of it; then all is read as on the centre line, if mount says where the sensor sits.
-    """
-
-    wheelbase_m: float
-    band_hz: tuple[float, float]
-    n_segment: int
-    usual_log_amplitude: float | None = None
-    with_roll: bool = False
-    mount: Mount | None = None
-    usual_stroke_mps: tuple[float, float] | None = None
-
-    def with_gyro_late_by(self, lag_s: float) -> "Reading":
-        """The same with another lag of the gyro, where a mount is told."""
-        return replace(self, mount=replace(self.mount, gyro_lag_s=lag_s)) if self.mount else self
 
 
 @dataclass(frozen=True, slots=True)
