@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import StateSpace, lsim
-from support.half_car_road import CAR, RATE_HZ, VAN, batch_of, batch_over_road
+from support.half_car_road import CAR, RATE_HZ, VAN, batch_of, batch_over_road, parameters_of
 
-from gateway.calibration.half_car import prior_of
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
 from gateway.core.cross_spectrum.model.half_car import (
     HalfCar,
@@ -18,7 +17,7 @@ from gateway.core.cross_spectrum.model.half_car import (
     strokes,
     suspension_npm,
 )
-from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, Ground, is_positive
+from gateway.core.cross_spectrum.model.parameters import Ground
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.cross_spectrum.model.strokes import log_stroke_speeds, with_strokes
 from gateway.core.vehicle import Load
@@ -28,25 +27,6 @@ GROUND = Ground.of(VAN)
 READING = Reading(VAN.wheelbase_m, (1.1, 14.0), 256)
 EMPTY = Load(0.0, VAN.empty_front_share_pct)
 STIFF = replace(CAR, front=replace(CAR.front, damper_mount_npm=1e9), rear=replace(CAR.rear, damper_mount_npm=1e9))
-
-
-def theta_of(car: HalfCar) -> F64:
-    """Its parameters (p,), with sensors that add next to nothing of their own."""
-    told = {name: getattr(car, name) for name in PARAMETERS if hasattr(car, name)} | {"delay_scale": 0.0}
-    for end, axle in (("front", car.front), ("rear", car.rear)):
-        told |= {
-            f"spring_{end}_npm": axle.spring_npm,
-            f"spring_slope_{end}_per_kn": axle.spring_slope_per_kn,
-            f"damper_{end}_nspm": axle.damper_nspm,
-            f"damper_mount_{end}_npm": axle.damper_mount_npm,
-            f"tyre_{end}_npm": axle.tyre_npm,
-            f"unsprung_{end}_kg": axle.unsprung_kg,
-        }
-    quiet = {name: 1e-12 for name in PARAMETERS if name.startswith(("slack_", "noise_"))} | {"track_offset_m": 1e-4}
-    theta = prior_of(VAN).mean.copy()
-    for name, number in (told | quiet).items():
-        theta[INDEX[name]] = np.log(number) if is_positive(name) else number
-    return theta
 
 
 def spectra_of(batch: Batch) -> CrossSpectra:
@@ -133,14 +113,14 @@ def test_springs_move_as_fast_as_newtons_equations_make_them(speed_mps: float) -
     """Told from the body's sensors alone; no part of the model is in what is compared."""
     batch, speeds_mps = driven_in_time(STIFF, speed_mps, seed=int(speed_mps))
     spectra = spectra_of(batch)
-    told = over_all(spectra, log_stroke_speeds(spectra, theta_of(STIFF), EMPTY, GROUND))
+    told = over_all(spectra, log_stroke_speeds(spectra, parameters_of(STIFF), EMPTY, GROUND))
     np.testing.assert_allclose(told, speeds_mps, rtol=0.06)
 
 
 @given(ratio=st.floats(0.2, 5.0))
 def test_twice_the_movement_is_twice_the_stroke(ratio: float) -> None:
     slow, fast = (spectra_of(batch_over_road(0.0, 52.0, 3, 60.0, shaken_mps2=0.6 * one)) for one in (1.0, ratio))
-    a, b = (over_all(one, log_stroke_speeds(one, theta_of(CAR), EMPTY, GROUND)) for one in (slow, fast))
+    a, b = (over_all(one, log_stroke_speeds(one, parameters_of(CAR), EMPTY, GROUND)) for one in (slow, fast))
     np.testing.assert_allclose(b / a, ratio, rtol=1e-4)
 
 
@@ -148,7 +128,7 @@ def test_a_load_that_calms_the_body_makes_no_road_smooth() -> None:
     """Where the sensors show as much movement under a load, the road is rougher and the springs move faster."""
     spectra = spectra_of(batch_over_road(0.0, 52.0, 3, 60.0))
     empty, loaded = (
-        over_all(spectra, log_stroke_speeds(spectra, theta_of(CAR), load, GROUND))
+        over_all(spectra, log_stroke_speeds(spectra, parameters_of(CAR), load, GROUND))
         for load in (EMPTY, Load(400.0, 46.0))
     )
     assert np.all(loaded > 1.1 * empty)
@@ -156,7 +136,7 @@ def test_a_load_that_calms_the_body_makes_no_road_smooth() -> None:
 
 def test_where_it_moves_as_usual_nothing_is_told_of_friction() -> None:
     spectra = spectra_of(batch_over_road(0.0, 52.0, 3, 60.0))
-    theta = theta_of(CAR)
+    theta = parameters_of(CAR)
     front_mps, rear_mps = over_all(spectra, log_stroke_speeds(spectra, theta, EMPTY, GROUND)).tolist()
     usual = replace(spectra, reading=replace(spectra.reading, usual_stroke_mps=(front_mps, rear_mps)))
     told = with_strokes(usual, theta, EMPTY, GROUND)

@@ -5,6 +5,7 @@ import numpy as np
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar, frequency_response
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, is_positive
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
@@ -32,6 +33,22 @@ CAR = HalfCar(
     payload_damping_ratio=0.15,
     gyro_lag_s=0.0,
 )
+
+
+def parameters_of(car: HalfCar) -> F64:
+    """The car as the model's vector (p,), next to no slack or noise."""
+    known = {name: getattr(car, name) for name in PARAMETERS if hasattr(car, name)}
+    for end, axle in (("front", car.front), ("rear", car.rear)):
+        known |= {
+            f"spring_{end}_npm": axle.spring_npm,
+            f"spring_slope_{end}_per_kn": axle.spring_slope_per_kn,
+            f"damper_{end}_nspm": axle.damper_nspm,
+            f"damper_mount_{end}_npm": axle.damper_mount_npm,
+            f"tyre_{end}_npm": axle.tyre_npm,
+            f"unsprung_{end}_kg": axle.unsprung_kg,
+        }
+    usual = dict.fromkeys(PARAMETERS, 0.0) | {name: 1e-30 for name in PARAMETERS if is_positive(name)}
+    return np.array([np.log(x) if is_positive(name) else x for name, x in (usual | known).items()])
 
 
 def batch_over_road(

@@ -4,40 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.half_car_road import CAR, VAN, batch_over_road
+from support.half_car_road import CAR, VAN, batch_over_road, parameters_of
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, is_positive
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.spectrum import spectra_of
-from gateway.records import F64, Spectra
+from gateway.records import Spectra
 
 SPEED_MPS = 14.0
 DELAY_S = VAN.wheelbase_m / SPEED_MPS
 LOADED = Fitted(payload_kg=270.0, front_share_pct=47.0, delay_s=DELAY_S)
 
 
-def true_parameters() -> F64:
-    """CAR as the grey model's vector, next to no slack or noise."""
-    known = {name: getattr(CAR, name) for name in PARAMETERS if hasattr(CAR, name)}
-    for end, axle in (("front", CAR.front), ("rear", CAR.rear)):
-        known |= {
-            f"spring_{end}_npm": axle.spring_npm,
-            f"spring_slope_{end}_per_kn": axle.spring_slope_per_kn,
-            f"damper_{end}_nspm": axle.damper_nspm,
-            f"damper_mount_{end}_npm": axle.damper_mount_npm,
-            f"tyre_{end}_npm": axle.tyre_npm,
-            f"unsprung_{end}_kg": axle.unsprung_kg,
-        }
-    usual = dict.fromkeys(PARAMETERS, 0.0) | {name: 1e-30 for name in PARAMETERS if is_positive(name)}
-    return np.array([np.log(x) if is_positive(name) else x for name, x in (usual | known).items()])
-
-
 @pytest.fixture(scope="module")
 def calibration() -> CrossSpectrumCalibration:
-    parameters = true_parameters()
+    parameters = parameters_of(CAR)
     return CrossSpectrumCalibration(
         empty_mass_kg=VAN.empty_mass_kg,
         empty_front_share_pct=VAN.empty_front_share_pct,
