@@ -61,7 +61,7 @@ def simulate_drive(
 ) -> SimulatedDrive:
     """Drive once. The same arguments give the same recording.
 
-    ``loads`` are either constant or steps, which must happen at a standstill (ValueError otherwise).
+    ``loads`` are either constant or steps, never both, and steps happen at a standstill (ValueError otherwise).
     A drive that begins at speed is preceded by a few unrecorded seconds of it. A recipe lays a road
     long enough; a ready Road that is too short is a ValueError.
     """
@@ -78,8 +78,11 @@ def simulate_drive(
 def _steps(loads: Sequence[LoadStep] | tuple[Load, ...], drive: Drive) -> list[LoadStep]:
     """Load steps from time 0 on, in order, each at a standstill."""
     steps = [step for step in loads if isinstance(step, LoadStep)]
-    if len(steps) < len(loads) or not loads:
-        return [LoadStep(0.0, tuple(load for load in loads if isinstance(load, Load)))]
+    constant = tuple(load for load in loads if isinstance(load, Load))
+    if steps and constant:
+        raise ValueError("loads are either constant or steps, not both: what is always aboard belongs in every step")
+    if not steps:
+        return [LoadStep(0.0, constant)]
     if steps[0].t_s != 0.0:
         raise ValueError(f"the first load step must be at 0 s, not {steps[0].t_s:g} s")
     for before, step in itertools.pairwise(steps):

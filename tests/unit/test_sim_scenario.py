@@ -81,3 +81,9 @@ def test_a_heavier_van_rides_lower_in_its_bounce() -> None:
 def test_load_steps_that_cannot_be_are_refused(steps: list[LoadStep], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         simulate_drive(PAPER_VAN, steps, PaperRoad(), STOP_AND_GO, IDEAL, 1)
+
+
+def test_steps_among_constant_loads_are_refused_not_left_out() -> None:
+    mixed = [LoadStep(0.0, ()), Load(100.0, 2.0), LoadStep(AT_REST_S, (Load(280.0, 2.1),))]
+    with pytest.raises(ValueError, match="either constant or steps, not both"):
+        simulate_drive(PAPER_VAN, mixed, PaperRoad(), STOP_AND_GO, IDEAL, 1)
