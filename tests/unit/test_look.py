@@ -1,6 +1,7 @@
 """From an unknown log to a first signal map: what is heard, what fits, what points up, and what is lacking."""
 
 import json
+import resource
 from pathlib import Path
 
 import can
@@ -15,6 +16,7 @@ from gateway.bus.logs import write_candump
 from gateway.bus.messages import message_of
 from gateway.bus.signals import load_signal_map
 from gateway.cli import springscale
+from gateway.errors import ConfigurationError
 from gateway.offline.look.roles import axis_of
 from gateway.records import Frames, Signal
 
@@ -135,6 +137,25 @@ def test_a_map_is_not_written_over(box: Path) -> None:
     assert isinstance(found.exception, Exception)
     assert "is there already" in str(found.exception)
     assert mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize("shipped", [False, True], ids=["the map", "a database beside it"])
+def test_a_disk_that_is_full_leaves_no_half_draft(shipped: bool, box: Path, tmp_path: Path) -> None:
+    """As a kill in the middle would: each file has its name once it is whole."""
+    log, output = box, tmp_path / "signals.toml"
+    if shipped:
+        log = tmp_path / "drive.log"
+        write_candump(bus_drive(30.0, seed=3), "can0", log)
+    before = set(tmp_path.iterdir())
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        found = CliRunner().invoke(springscale, ["look", str(log), "--output", str(output)])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert isinstance(found.exception, ConfigurationError)
+    assert str(found.exception) == f"{output}: cannot be written: File too large"
+    assert set(tmp_path.iterdir()) == before
 
 
 @pytest.mark.parametrize("suffix", [".log", ".asc", ".blf", ".csv", ".trc"])

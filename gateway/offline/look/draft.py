@@ -1,6 +1,5 @@
 """A first signal map: what was found, written down with how it is known, to be checked by a person."""
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -9,6 +8,7 @@ import numpy as np
 
 from gateway.bus.signals import Coding, DatabaseSignal, load_signal_map, shipped_databases, shipped_map
 from gateway.errors import ConfigurationError, SpringscaleError
+from gateway.files.whole import refusal_told, write_whole, written_whole
 from gateway.offline.look.look import Look
 from gateway.offline.look.readings import Described
 from gateway.offline.look.roles import Found
@@ -24,7 +24,8 @@ _COUNTER_WORDS: Final = ("counter", "count", "alive", "sequence", "seq")
 def write_draft(seen: Look, output: Path) -> tuple[Path, ...]:
     """Write the map and, beside it, the databases it needs that come with the package; what was written, the map first.
 
-    Raises ConfigurationError where that would write over a file, SpringscaleError where nothing was found to write.
+    Raises ConfigurationError where that would write over a file or the disk refuses it, SpringscaleError where nothing
+    was found to write.
     """
     shipped = seen.shipped
     if shipped is None and not any(found.role is Signal.VERTICAL_ACCELERATION for found in seen.found):
@@ -37,9 +38,11 @@ def write_draft(seen: Look, output: Path) -> tuple[Path, ...]:
     taken = [path for path in new if path.exists()]
     if taken:
         raise ConfigurationError(f"{taken[0]}: is there already, and is not written over; name another --output")
-    for path in databases:
-        shutil.copyfile(path, output.parent / path.name)
-    output.write_text(text, encoding="utf-8")
+    with refusal_told(output, ConfigurationError):
+        for path in databases:
+            with written_whole(output.parent / path.name) as file:
+                file.write(path.read_bytes())
+        write_whole(output, text)
     load_signal_map(output)
     return tuple(new)
 
