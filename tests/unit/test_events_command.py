@@ -1,5 +1,6 @@
 """springscale events: from logs what the service would have told of the same frames, under the same tare."""
 
+import gzip
 import json
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from gateway.calibration.tare_file import FILE_NAME, TareEntry, TareHistory
 from gateway.cli import springscale
 from gateway.cli.text.events import entry_sentence
 from gateway.core.events import Entry, EntryKind
+from gateway.errors import LogUnreadableError
 from gateway.units import NS_PER_S
 
 T0_NS = 1_790_000_000 * NS_PER_S
@@ -70,6 +72,32 @@ def test_each_drive_is_a_trip_with_what_was_aboard(tmp_path: Path, drives: tuple
 def test_loads_are_less_the_tare_that_the_service_has_in_use(tmp_path: Path, drives: tuple[str, str]) -> None:
     tare_in_use(tmp_path, 12.0)
     assert [one["payload_kg"] for one in told(tmp_path, *drives)] == [188.0, 188.0]
+
+
+UNREADABLE = {
+    "missing": None,
+    "empty": b"",
+    "garbage": b"\0\xff no log\n" * 40,
+    "gzip cut in its header": gzip.compress(b"(1.0) can0 123#00\n")[:8],
+}
+
+
+@pytest.mark.parametrize("content", UNREADABLE.values(), ids=UNREADABLE.keys())
+@pytest.mark.parametrize("command", ["events", "estimate"])
+def test_a_log_that_cannot_be_read_takes_nothing_from_those_before_it(
+    tmp_path: Path, drives: tuple[str, str], command: str, content: bytes | None
+) -> None:
+    """The last window of the log before is still open when its end is reached."""
+    bad = tmp_path / "bad.log"
+    if content is not None:
+        bad.write_bytes(content)
+    options = ("--config", str(tmp_path / "springscale.toml"))
+    alone = CliRunner().invoke(springscale, [command, *drives, *options])
+    found = CliRunner().invoke(springscale, [command, *drives, str(bad), *options])
+    assert alone.stdout.count("\n") == (2 if command == "events" else 4)  # two batches a log, the last one short
+    assert found.stdout == alone.stdout
+    assert isinstance(found.exception, LogUnreadableError)
+    assert str(found.exception).startswith(f"{bad}: ")
 
 
 def test_a_withdrawn_event_does_not_say_how_sure_it_was() -> None:
