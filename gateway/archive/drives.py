@@ -25,22 +25,30 @@ class LogRead:
     report: LogReport
 
 
+@dataclass(frozen=True, slots=True)
+class _UnderWay:
+    """A log, and the pipeline as its end has left it."""
+
+    one: JobLog
+    flow: Flow
+
+
 class Drives:
     """Takes a job's logs in order."""
 
     def __init__(self, job: Job) -> None:
         """Goes on where the logs that lead in have left off."""
         self._job = job
-        self._open: Flow | None = None  # what the log before has left under way
+        self._open: _UnderWay | None = None  # where the log before may go on
         self._lead_in()
 
     def take(self, one: JobLog, next_ns: int | None) -> LogRead:
         """The next log; ``next_ns`` is the first frame of the one after it.
 
         Raises PlaceError where it cannot be reached now, LogUnreadableError where nothing can be made of it; then
-        nothing goes on into the next one.
+        :meth:`break_off` is to be asked before the one after it.
         """
-        flow, self._open = self._open or self._flow(), None
+        flow = self._open.flow.branch() if self._open else self._flow()
         with one.log.place.fetched(one.log.path) as fetched:
             if fetched.sha256 != one.facts.sha256:
                 raise PlaceError(f"{one.log.name}: was changed while the archive was read; run again")
@@ -54,11 +62,17 @@ class Drives:
                 report.require_frames()
             except Exception as fault:
                 raise _of_the_log(fault, one, str(fetched.path)) from fault
-        if goes_on(newest_ns, next_ns, self._job.settings):
-            self._open = flow
-        else:
+        self._open = _UnderWay(one, flow) if goes_on(newest_ns, next_ns, self._job.settings) else None
+        if self._open is None:
             estimates += self._weighed(flow, flow.scheduler.flush())
         return LogRead(estimates, report)
+
+    def break_off(self) -> list[tuple[JobLog, Estimate]]:
+        """Nothing goes on: what the log that was under way still tells, as if none had followed it."""
+        before, self._open = self._open, None
+        if before is None:
+            return []
+        return [(before.one, found) for found in self._weighed(before.flow, before.flow.scheduler.flush())]
 
     def _flow(self) -> Flow:
         setup, job = self._job.setup, self._job
@@ -79,8 +93,8 @@ class Drives:
         for one, next_ns in followed(before, first_ns):
             try:
                 self.take(one, next_ns)
-            except LogUnreadableError:  # it is told where it is a job's own
-                continue
+            except LogUnreadableError:  # it is told where it is a job's own, and so is what it breaks off
+                self.break_off()
 
     def _leads_on(self, one: JobLog, first_ns: int | None) -> bool:
         """Whether the last log before the job is under way when it begins. Decoding tells; nothing is weighed."""

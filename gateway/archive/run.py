@@ -32,7 +32,7 @@ class Status(StrEnum):
 
     DONE = "done"
     ALREADY = "already"  # by an earlier run, or by another worker
-    FAILED = "failed"  # not one log could be read: told in the data set, and no receipt
+    FAILED = "failed"  # not one log could be read, nor did the month before leave a window: told, and no receipt
     LOST = "lost"  # a store or a worker failed: to be tried again
 
 
@@ -65,6 +65,7 @@ def run(job: Job) -> Outcome:
             read = drives.take(one, next_ns)
         except LogUnreadableError as fault:
             failures[one] = str(fault)
+            rows += [_row(job, before, found) for before, found in drives.break_off()]
             continue
         rows += [_row(job, one, found) for found in read.estimates]
         told.append(_told(one, read.report))
@@ -72,7 +73,7 @@ def run(job: Job) -> Outcome:
         _tell_failure(job, one, reason)
     outcome = Outcome(
         slot=job.slot,
-        status=Status.DONE if told else Status.FAILED,
+        status=Status.DONE if told or rows else Status.FAILED,
         size=job.size,
         took_s=time.monotonic() - begun_s,
         n_batches=len(rows),
@@ -80,7 +81,7 @@ def run(job: Job) -> Outcome:
         n_failed_logs=len(failures),
         failures=tuple(failures.values())[:TOLD_FAILURES],
     )
-    return _written(job, outcome, rows, told, failures) if told else _failed(job, outcome)
+    return _written(job, outcome, rows, told, failures) if told or rows else _failed(job, outcome)
 
 
 def fail(job: Job, reason: str) -> Outcome:

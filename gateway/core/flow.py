@@ -1,6 +1,7 @@
 """Rows in, estimates out: the one path that the live service and the offline tools share."""
 
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass, replace
 
 from gateway.core.batch import Traits
@@ -63,6 +64,12 @@ class Flow:
         if weighed is None or drive_start_ns is None:
             return False
         return self._is_epoch_over or drive_start_ns != weighed.drive_start_ns
+
+    def branch(self) -> "Flow":
+        """Another that goes on from here: what either is fed leaves no trace in the other."""
+        other = copy(self)
+        other.scheduler = self.scheduler.branch()
+        return other
 
     def feed(self, motion: Motion) -> Iterator[Estimate]:
         """Estimates and rejections of the batches that end with these rows, provisional ones among them."""

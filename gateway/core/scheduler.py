@@ -5,6 +5,7 @@ clock: the live service and the offline tools therefore form the same batches.
 """
 
 from collections.abc import Generator, Iterator
+from copy import copy
 
 import numpy as np
 
@@ -74,6 +75,12 @@ class Scheduler:
         if rows is None:
             raise ValueError("no batch was yielded since rows were last taken")
         return rows
+
+    def branch(self) -> "Scheduler":
+        """Another that goes on from here: what either is fed leaves no trace in the other."""
+        other = copy(self)
+        other._rows, other._loose = list(self._rows), list(self._loose)
+        return other
 
     def feed(self, motion: Motion) -> Iterator[Batch]:
         """Take rows in order of arrival; yield the batches that end with them."""
