@@ -2,7 +2,7 @@
 
 A load off the centre line makes the body roll as it heaves, and heave as it rolls. Held against the likelihood of all
 three sensors with all else as the two others have it, this has one answer. What of roll has other causes, the tracks'
-own difference and how the payload is spread, is left free. The half-car's parameters are not: where the model of roll
+own difference, how the payload is spread and how fast the body rolls today, is left free. The half-car's parameters are not: where the model of roll
 errs, it must not move the weight.
 """
 
@@ -21,8 +21,13 @@ ROLL_BAND_HZ: Final = (1.1, 5.0)
 """Where the body rolls on its springs; above it wheels, axles and seats do things that no model here knows. Chosen."""
 
 CG_LEFT_STD_M: Final = 0.1  # of all that is sprung: a third of an empty mass 0.3 m off the centre line is 0.075
-FREE_STD: Final = {"twist_level": 0.3, "tracks_apart_m": 0.2, "payload_roll_gyration_m2": 0.5}
-"""What another road and another load have of their own, standard deviations of logarithms. Chosen."""
+FREE_STD: Final = {
+    "twist_level": 0.3,
+    "tracks_apart_m": 0.2,
+    "payload_roll_gyration_m2": 0.5,
+    "roll_inertia_kgm2": 0.03,  # over the rate against roll: a day's springs and tyres, who sits where, the tank
+}
+"""What another road, another load and another day have of their own, standard deviations of logarithms. Chosen."""
 
 MOST_MOUNT_CHANGE: Final = {"sensor_left_m": 0.1, "gyro_yaw_rad": 0.09}
 """A sensor that sits elsewhere, or is turned by five degrees more, than when it was calibrated; roll tells to a few
