@@ -1,9 +1,9 @@
 """Where the load lies to the side: what roll tells once payload and front share are known.
 
 A load off the centre line makes the body roll as it heaves, and heave as it rolls. Held against the likelihood of all
-three sensors with all else as the two others have it, this has one answer. What of roll has other causes, the tracks'
-own difference, how the payload is spread and how fast the body rolls today, is left free. The half-car's parameters are not: where the model of roll
-errs, it must not move the weight.
+three sensors with all else as the two others have it, this has one answer. What of roll has other causes is left free:
+the tracks' own difference, how the payload is spread, how fast the body rolls today. The half-car's parameters are not:
+where the model of roll errs, it must not move the weight.
 """
 
 from dataclasses import dataclass
@@ -25,9 +25,11 @@ FREE_STD: Final = {
     "twist_level": 0.3,
     "tracks_apart_m": 0.2,
     "payload_roll_gyration_m2": 0.5,
-    "roll_inertia_kgm2": 0.03,  # over the rate against roll: a day's springs and tyres, who sits where, the tank
+    "roll_inertia_kgm2": 0.06,  # over the rate against roll: a day's springs and tyres, who sits where, the tank
 }
-"""What another road, another load and another day have of their own, standard deviations of logarithms. Chosen."""
+"""What another road, another load and another day have of their own, and what calibration leaves open of it: standard
+deviations of logarithms. Chosen.
+"""
 
 MOST_MOUNT_CHANGE: Final = {"sensor_left_m": 0.1, "gyro_yaw_rad": 0.09}
 """A sensor that sits elsewhere, or is turned by five degrees more, than when it was calibrated; roll tells to a few
