@@ -55,7 +55,7 @@ def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("known_loads", ["--window-s", "60"], 50, 2.0, 1.2, None),
         ("speeds", [], 15, 2.5, 1.0, None),
         ("sideways", [], 10, 2.0, 0.8, 0.006),
-        ("mixed", [], 24, 2.6, 1.3, 0.007),
+        ("mixed", [], 24, 2.6, 1.3, 0.006),
     ],
     ids=["known loads", "known loads by the minute", "speeds", "sideways", "mixed"],
 )
