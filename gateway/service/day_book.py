@@ -46,8 +46,9 @@ def ledger_of(reader: StoreReader, rules: Rules) -> Ledger:
     page = reader.estimates(limit=HORIZON, newest_first=True, with_spectra=False)
     estimates = [estimate_from_json(json.loads(text)) for text in reversed(page.items)]
     known: list[Entry] = []
+    first_ns = min((one.t_start_ns for one in estimates), default=0)  # not the oldest's: clocks are put back
     for kind in EntryKind if estimates else ():
-        told = reader.entries(kind=kind, since_ns=estimates[0].t_start_ns, limit=MOST, newest_first=True)
+        told = reader.entries(kind=kind, since_ns=first_ns, limit=MOST, newest_first=True)
         known += (_entry(json.loads(text)) for text in told.items)
     return Ledger(rules, estimates, known)
 

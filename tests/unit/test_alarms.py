@@ -54,6 +54,15 @@ def test_one_batch_warns_early_the_load_confirms_and_unloading_ends_it() -> None
     assert told(watch, of_load(4, LIMIT_KG - 200.0)) == [("overload.gross", "cleared")]
 
 
+def test_a_clock_that_is_put_back_silences_no_alarm() -> None:
+    """What began by the clock that was ahead ends when it began, not before; what begins after it has its own time."""
+    watch, over = watching(), LIMIT_KG + 60.0
+    assert told(watch, of_load(600, over)) == [("overload.gross", "early")]
+    assert told(watch, of_load(0, LIMIT_KG - 200.0)) == [("overload.gross", "cleared")]
+    (begun,) = watch.weigh(of_load(1, over), VAN)
+    assert (begun.state, begun.steps[0].t_ns) == (AlarmState.EARLY, of_load(1, over).t_end_ns)
+
+
 def test_a_load_that_denies_what_one_batch_says_warns_nobody() -> None:
     assert told(watching(), of_load(0, LIMIT_KG + 60.0, LIMIT_KG - 40.0, n_batches=5)) == []
 

@@ -2,6 +2,7 @@
 
 import json
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,18 @@ def test_what_is_stored_is_what_a_log_tells_whatever_the_restarts(tmp_path: Path
     run(tmp_path, WHOLE[:cut])
     stored = run(tmp_path, WHOLE[cut:])
     assert stored == {entry.id: entry.record for entry in told(WHOLE, Rules()).values()}
+
+
+@pytest.mark.parametrize("cut", [3, 4, 5, 8])
+def test_a_restart_after_the_clock_was_put_back_doubles_and_forgets_nothing(tmp_path: Path, cut: int) -> None:
+    ahead_ns = 3 * 24 * 3600 * 10**9
+    whole = [
+        replace(one, t_start_ns=one.t_start_ns + ahead_ns, t_end_ns=one.t_end_ns + ahead_ns) if n < 4 else one
+        for n, one in enumerate(WHOLE)
+    ]
+    run(tmp_path, whole[:cut])
+    stored = run(tmp_path, whole[cut:])
+    assert stored == {entry.id: entry.record for entry in told(whole, Rules()).values()}
 
 
 def test_what_was_told_is_sent_to_whoever_listens(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from gateway.core.events.change import Rules, change_of
 from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json, rounded
-from gateway.core.events.halts import Halt, Link, halts_of, links_of
+from gateway.core.events.halts import Halt, Link, clocks_of, halts_of, links_of
 from gateway.core.events.load import Load, Weighing, weighings_of
 from gateway.core.events.loads import Loads, loads_of, sides_of
 from gateway.estimate import NOWHERE, Estimate, Quantity
@@ -24,6 +24,10 @@ class Day:
     @cached_property
     def weighings(self) -> list[Weighing]:
         return weighings_of(self.estimates)
+
+    @cached_property
+    def clocks(self) -> list[int]:
+        return clocks_of(self.estimates)
 
     @cached_property
     def halts(self) -> list[Halt]:
@@ -57,8 +61,7 @@ class Day:
     def _event(self, at: int, probability: float) -> Entry:
         link, halts = self.links[at], self.links[at].likely
         before, after = sides_of(self.weighings, self.found.of_weighing, at)
-        begin_ns = halts[0].t_start_ns if halts else link.t_start_ns
-        end_ns = halts[-1].t_end_ns if halts else link.t_end_ns
+        begin_ns, end_ns = link.span_ns
         place = halts[0].place if len(halts) == 1 else NOWHERE
         newest = self.estimates[-1]
         first = self.estimates[self.weighings[at + 1].at]  # never moves: the id hangs on it
@@ -76,7 +79,7 @@ class Day:
             "before": self._load_json(before),
             "after": self._load_json(after),
         }
-        return Entry(EntryKind.EVENT, str(record["id"]), end_ns, record)
+        return Entry(EntryKind.EVENT, str(record["id"]), end_ns, record, link.clock)
 
     def _load_json(self, load: Load) -> dict[str, Any]:
         share, cg_left = load.front_share_pct.quantity, load.cg_left_m and load.cg_left_m.quantity

@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Final
 
@@ -22,12 +22,14 @@ class EntryKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One event or trip in one revision. ``record`` is its JSON object; ``t_end_ns`` orders and dates it."""
+    """One event or trip in one revision. ``record`` is its JSON object; ``t_end_ns`` dates it, by the ``clock`` of the
+    batches that it was made of (see halts)."""
 
     kind: EntryKind
     id: str
     t_end_ns: int
     record: dict[str, Any]
+    clock: int = field(default=0, compare=False)
 
     @property
     def revision(self) -> int:

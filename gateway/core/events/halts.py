@@ -1,12 +1,16 @@
-"""Where the load can have changed: stops between drives and within, and how likely that was before weighing."""
+"""Where the load can have changed: stops between drives and within, and how likely that was before weighing.
+
+Batches count in the order in which they came. Where the clock was put back, what comes after is by another ``clock``
+(the first of them 0, then 1, ...): two moments are compared by their clocks first, by their stamps where those are one.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Final
 
 from gateway.core.events.load import Weighing
-from gateway.estimate import NOWHERE, UNWATCHED, Estimate, Place, Stop, Watched
+from gateway.estimate import NOWHERE, UNWATCHED, Estimate, Place, Watched
 from gateway.units import NS_PER_S
 
 LONG_S: Final = 60.0
@@ -34,6 +38,7 @@ class Halt:
     watched: Watched = UNWATCHED
     place: Place = NOWHERE
     is_between_drives: bool = False
+    clock: int = 0
 
     @property
     def prior(self) -> float:
@@ -48,7 +53,12 @@ class Halt:
             self.watched.joined(later.watched),
             self.place if self.place.is_known else later.place,
             self.is_between_drives or later.is_between_drives,
+            self.clock,
         )
+
+    @property
+    def middle(self) -> tuple[int, int]:
+        return self.clock, _middle(self.t_start_ns, self.t_end_ns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +68,7 @@ class Link:
     halts: tuple[Halt, ...]
     t_start_ns: int  # of the time between them, where there is no halt
     t_end_ns: int
+    clocks: tuple[int, int] = (0, 0)  # of the two weighings
 
     @property
     def prior(self) -> float:
@@ -72,17 +83,37 @@ class Link:
         most = max((halt.prior for halt in self.halts), default=0.0)
         return tuple(halt for halt in self.halts if halt.prior >= max(_CANDIDATE_SHARE * most, PRIORS[False, None]))
 
+    @property
+    def clock(self) -> int:
+        """By which the span's end is stamped."""
+        return self.likely[-1].clock if self.likely else self.clocks[1]
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """From and to when it can well have changed; within what both clocks allow, where two stamped it."""
+        halts = self.likely
+        begin_ns = halts[0].t_start_ns if halts else self.t_start_ns
+        end_ns = halts[-1].t_end_ns if halts else self.t_end_ns
+        return begin_ns if self.clock == self.clocks[0] else min(max(begin_ns, self.t_start_ns), end_ns), end_ns
+
 
 def follows(before: Estimate, after: Estimate) -> bool:
     """Whether two batches are of one drive, one right behind the other."""
     return abs(after.t_start_ns - before.t_end_ns) <= 1_000
 
 
+def clocks_of(estimates: Sequence[Estimate]) -> list[int]:
+    """By which clock each batch is stamped: how many times it was put back among those before."""
+    put_back = (after.t_start_ns < before.t_end_ns - SLACK_NS for before, after in pairwise(estimates))
+    return list(accumulate(put_back, initial=0))[: len(estimates)]
+
+
 def halts_of(estimates: Sequence[Estimate]) -> list[Halt]:
-    """All halts in order of time; what touches is one halt."""
+    """All halts in the order in which they came; what touches is one halt."""
     halts: list[Halt] = []
     for halt in _halts(estimates):
-        if halts and -SLACK_NS <= halt.t_start_ns - halts[-1].t_end_ns <= SLACK_NS:
+        touches = halts and -SLACK_NS <= halt.t_start_ns - halts[-1].t_end_ns <= SLACK_NS
+        if touches and halt.clock == halts[-1].clock:
             halts[-1] = halts[-1].joined(halt)
         else:
             halts.append(halt)
@@ -91,33 +122,35 @@ def halts_of(estimates: Sequence[Estimate]) -> list[Halt]:
 
 def links_of(estimates: Sequence[Estimate], weighings: Sequence[Weighing], halts: Sequence[Halt]) -> list[Link]:
     """What lies between each weighing and the next, by the middles of their batches and of the halts."""
-    links, after = [], 0
+    links, after, clocks = [], 0, clocks_of(estimates)
     for one, other in pairwise(weighings):
         before, behind = estimates[one.at], estimates[other.at]
-        begin_ns, end_ns = _middle(before.t_start_ns, before.t_end_ns), _middle(behind.t_start_ns, behind.t_end_ns)
-        while after < len(halts) and _middle(halts[after].t_start_ns, halts[after].t_end_ns) < begin_ns:
+        begin = clocks[one.at], _middle(before.t_start_ns, before.t_end_ns)
+        end = clocks[other.at], _middle(behind.t_start_ns, behind.t_end_ns)
+        while after < len(halts) and halts[after].middle < begin:
             after += 1
         last = after
-        while last < len(halts) and _middle(halts[last].t_start_ns, halts[last].t_end_ns) < end_ns:
+        while last < len(halts) and halts[last].middle < end:
             last += 1
-        links.append(Link(tuple(halts[after:last]), before.t_end_ns, max(before.t_end_ns, behind.t_start_ns)))
+        later_ns = behind.t_start_ns if end[0] > begin[0] else max(before.t_end_ns, behind.t_start_ns)
+        links.append(Link(tuple(halts[after:last]), before.t_end_ns, later_ns, (begin[0], end[0])))
         after = last
     return links
 
 
 def _halts(estimates: Sequence[Estimate]) -> Iterator[Halt]:
+    clocks = clocks_of(estimates)
     for i, one in enumerate(estimates):
         for stop in one.way.stops if one.way else ():
-            yield _halt(stop)
+            yield Halt(stop.t_start_ns, stop.t_end_ns, stop.watched, stop.place, clock=clocks[i])
         after = estimates[i + 1] if i + 1 < len(estimates) else None
         if after is not None and not follows(one, after):
             before = after.way.before if after.way else UNWATCHED
             place = one.way.end if one.way else NOWHERE
-            yield Halt(one.t_end_ns, max(one.t_end_ns, after.t_start_ns), before, place, is_between_drives=True)
-
-
-def _halt(stop: Stop) -> Halt:
-    return Halt(stop.t_start_ns, stop.t_end_ns, stop.watched, stop.place)
+            begin_ns, end_ns = one.t_end_ns, max(one.t_end_ns, after.t_start_ns)
+            if clocks[i + 1] > clocks[i]:  # nobody knows how long it stood
+                begin_ns = end_ns = after.t_start_ns
+            yield Halt(begin_ns, end_ns, before, place, is_between_drives=True, clock=clocks[i + 1])
 
 
 def _middle(begin_ns: int, end_ns: int) -> int:

@@ -40,19 +40,21 @@ class Ledger:
         if estimate.is_provisional:
             return []
         self._estimates = (*self._estimates, as_stored(estimate))[-HORIZON:]
-        first_ns, settled_ns = self._estimates[0].t_start_ns, self._estimates[-SETTLED:][0].t_start_ns
+        first_ns = min(one.t_start_ns for one in self._estimates)
         self._known = {each: entry for each, entry in self._known.items() if entry.t_end_ns >= first_ns}
         told = []
-        for entry in self._entries():
-            if entry.t_end_ns >= settled_ns and (news := self._news(entry)) is not None:
+        for entry in self._unsettled():
+            if (news := self._news(entry)) is not None:
                 self._known[news.id] = news
                 told.append(news)
         return told
 
-    def _entries(self) -> Iterator[Entry]:
+    def _unsettled(self) -> Iterator[Entry]:
         day = Day(self._estimates, self._rules)
-        yield from trips_of(day, is_cut=len(self._estimates) == HORIZON)
-        yield from day.events()
+        settled = day.clocks[-SETTLED:][0], self._estimates[-SETTLED:][0].t_start_ns
+        for entry in (*trips_of(day, is_cut=len(self._estimates) == HORIZON), *day.events()):
+            if (entry.clock, entry.t_end_ns) >= settled:
+                yield entry
 
     def _news(self, entry: Entry) -> Entry | None:
         before = self._known.get(entry.id)

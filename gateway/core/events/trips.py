@@ -112,7 +112,7 @@ def _trip(day: Day, first: int, last: int, loads: Sequence[Load | None]) -> Entr
         "mean_speed_mps": rounded(by_speed_m / moving_s, 2) if moving_s > 0.0 else None,
         **_carried(day, pieces),
     }
-    return Entry(EntryKind.TRIP, str(record["id"]), end_ns, record)
+    return Entry(EntryKind.TRIP, str(record["id"]), end_ns, record, day.clocks[last])
 
 
 def _distance(ways: Sequence[Way], by_speed_m: float, duration_s: float) -> tuple[float, str]:
