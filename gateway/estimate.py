@@ -68,7 +68,7 @@ class Lack(StrEnum):
     """What a weight would need to be known."""
 
     CALIBRATION = "calibration"  # nobody says what the vehicle weighs empty
-    ESTIMATE = "estimate"  # the batch was rejected
+    ESTIMATE = "estimate"  # the batch was rejected; of axles and wheels: or it does not tell the front share
     UNSPRUNG_MASS = "unsprung_mass"
     TRACK_WIDTH = "track_width"
     ROLL_RATE = "roll_rate"  # nothing tells where the load lies sideways

@@ -289,6 +289,15 @@ def test_an_unknown_wheel_says_what_it_lacks(estimate: Estimate, vehicle: Vehicl
     assert wheel.limit_kg == (None if vehicle is None else 500.0)
 
 
+def test_the_front_share_is_nothing_that_the_gross_weight_lacks() -> None:
+    """It follows from the payload and what the axles weigh below their springs."""
+    no_share = replace(ANSWER, front_share=Quantity())
+    assert weighed(no_share, TRACKED).weights.gross.is_known
+    weights = weighed(no_share, replace(TRACKED, unsprung_front_kg=None)).weights
+    assert weights.gross.lacks is Lack.UNSPRUNG_MASS
+    assert {weights.front_axle.lacks, weights.rear_axle.lacks, weights.front_left.lacks} == {Lack.ESTIMATE}
+
+
 def test_an_unsure_roll_share_alone_makes_the_wheels_deviations_unknown() -> None:
     weights = weighed(replace(ANSWER, roll_share_front_std=math.nan), TRACKED).weights
     assert weights.front_left.is_known

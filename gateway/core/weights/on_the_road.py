@@ -11,7 +11,8 @@ from gateway.core.weights.sideways import NOWHERE, Sideways
 from gateway.core.weights.unsprung import NOT_CALIBRATED, Unsprung
 from gateway.estimate import Estimate, Lack, Quantity, Weight, Weights
 
-_BY_AXLES: Final = 2  # the first so many make the loads of axles
+_BY_PAYLOAD: Final = 1  # the first so many make the gross weight
+_BY_AXLES: Final = 2  # and these the loads of axles
 
 
 def weighed(estimate: Estimate, vehicle: Vehicle | None, unsprung: Unsprung = NOT_CALIBRATED) -> Estimate:
@@ -76,7 +77,6 @@ class _Known:
         self.track_m = math.nan if vehicle.track_width_m is None else vehicle.track_width_m
         self.cg_left_m = sideways.cg_left.number
         self._errors = Errors(payload, front_share, correlation, sideways)
-        self._has_answer = math.isfinite(self.sprung_kg) and math.isfinite(self.share)
         self._is_sideways = sideways.is_known
 
     def weight(
@@ -87,13 +87,14 @@ class _Known:
         ``is_estimated`` is of the unsprung mass: errors of two axles may cancel in it, and yet it was not stated.
         """
         if math.isnan(kg):
-            return Weight(limit_kg=limit_kg, lacks=self._lack(is_wheel=len(slopes) > _BY_AXLES))
+            return Weight(limit_kg=limit_kg, lacks=self._lack(len(slopes)))
         std_kg = math.hypot(self._errors.std(slopes), unsprung_std_kg)
         return Weight(kg, std_kg, limit_kg, None, is_unsprung_estimated=is_estimated)
 
-    def _lack(self, *, is_wheel: bool) -> Lack:
-        """Why a weight is unknown, the first cause first."""
-        if not self._has_answer:
+    def _lack(self, n_slopes: int) -> Lack:
+        """Why a weight is unknown that follows from the first so many, the first cause first."""
+        is_wheel = n_slopes > _BY_AXLES
+        if not math.isfinite(self.sprung_kg) or (n_slopes > _BY_PAYLOAD and not math.isfinite(self.share)):
             return Lack.ESTIMATE
         if is_wheel and math.isnan(self.track_m):
             return Lack.TRACK_WIDTH
