@@ -55,7 +55,7 @@ class KnownSpectra:
         return one
 
     def stroking(self, theta: F64, usual_mps: tuple[float, float]) -> "KnownSpectra":
-        """The same run with how much faster than usual the axles of a vehicle theta (n,) stroke."""
+        """The same run with how much faster than usual the axles of a half-car theta (p,) stroke."""
 
         def told(spectra: CrossSpectra) -> CrossSpectra:
             usual = replace(spectra, reading=replace(spectra.reading, usual_stroke_mps=usual_mps))
@@ -66,7 +66,7 @@ class KnownSpectra:
         return one
 
     def log_stroke_speeds(self, theta: F64) -> F64:
-        """(2,) logarithm of how fast (m/s) front and rear axle of a vehicle theta (n,) stroke, over all segments."""
+        """(2,) logarithm of how fast (m/s) front and rear axle of a half-car theta (p,) stroke, over all segments."""
         spectra = self.whittle.spectra
         every = log_stroke_speeds(spectra, theta, self.run.load, self.whittle.ground)
         return np.asarray(np.average(every, axis=0, weights=spectra.n_segments[:, 0]), float)

@@ -48,12 +48,12 @@ def seen_by(known: Sequence[KnownSpectra], theta: F64) -> Sequence[KnownSpectra]
     """
     if not has_roll(theta):
         return known
-    brought = _brought(known, theta)
+    brought, flat = _brought(known, theta), upright(theta)
     usual_mps = known[0].spectra.reading.usual_stroke_mps
     if usual_mps is None:
-        front, rear = np.median([one.log_stroke_speeds(theta) for one in brought], axis=0).tolist()
+        front, rear = np.median([one.log_stroke_speeds(flat) for one in brought], axis=0).tolist()
         usual_mps = (exp(front), exp(rear))
-    return [one.stroking(theta, usual_mps) for one in brought]
+    return [one.stroking(flat, usual_mps) for one in brought]
 
 
 def _brought(known: Sequence[KnownSpectra], theta: F64) -> Sequence[KnownSpectra]:

@@ -40,7 +40,8 @@ def sideways_covariance(
 
     ``point`` is the answer to ``spectra``, and ``weigh`` finds payload and share (2,) in others not far from it. It is
     handed what the sensors would read with the load a standard deviation to either side: half of what the two answers
-    differ by is what such a load does. By symmetry that is nothing for a sensor on the centre line.
+    differ by is what such a load does. By symmetry that is nothing for a sensor on the centre line. Where calibration
+    knows how the vehicle rolls, what both have in common counts too: a load to either side couples roll with the rest.
     """
     width_m = calibration.track_width_m or TRACK_PER_WHEELBASE * calibration.wheelbase_m
     theta = _rolling(point.theta, calibration, width_m)
@@ -52,8 +53,13 @@ def sideways_covariance(
         model, by = solved_at(theta, (point.payload_kg, point.front_share, cg_left_m), ground, spectra)
         return weigh(spectra.showing(expected_of_driven(by, model, spectra)))
 
-    moved = 0.5 * (weighed_at(cg_left_std_m) - weighed_at(-cg_left_std_m)) if payload_kg else np.zeros(2)
-    return unseen_covariance(moved, payload_kg)
+    if not payload_kg:
+        return np.zeros((2, 2))
+    left, right = weighed_at(cg_left_std_m), weighed_at(-cg_left_std_m)
+    covariance = unseen_covariance(0.5 * (left - right), payload_kg)
+    if has_roll(calibration.parameters):
+        covariance += unseen_covariance(0.5 * (left + right) - (point.payload_kg, point.front_share), payload_kg)
+    return covariance
 
 
 def _rolling(theta: F64, calibration: CrossSpectrumCalibration, width_m: float) -> F64:

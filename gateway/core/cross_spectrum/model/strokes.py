@@ -12,7 +12,7 @@ import numpy as np
 from gateway.core.cross_spectrum.measured import CrossSpectra, log_amplitude_of
 from gateway.core.cross_spectrum.model.expected import ROAD_EXPONENT, expected_of_driven, power
 from gateway.core.cross_spectrum.model.half_car import strokes
-from gateway.core.cross_spectrum.model.parameters import Ground, half_car, upright
+from gateway.core.cross_spectrum.model.parameters import Ground, half_car, has_roll, upright
 from gateway.core.cross_spectrum.model.slopes import solved_at
 from gateway.core.vehicle import Load
 from gateway.records import F64
@@ -21,20 +21,21 @@ from gateway.records import F64
 def log_stroke_speeds(spectra: CrossSpectra, theta: F64, load: Load, ground: Ground) -> F64:
     """(b, 2) logarithm of the root mean square speed (m/s, within the band) of front and rear axle's springs.
 
-    Of a vehicle theta (n,) with that load, whose friction acts as it usually does: a mean logarithm of periodograms,
-    as the amplitude of ``spectra`` is one, lies half of Euler's constant below that of the density.
+    Of a vehicle theta (n,) with that load, on the centre line as far as it rolls, whose friction acts as it usually
+    does. A mean logarithm of periodograms, as the amplitude of ``spectra`` is one, lies half of Euler's constant below
+    that of the density.
     """
     reading = spectra.reading
     if reading.usual_log_amplitude is None:
         raise ValueError("these spectra do not say how much their vehicle usually moves")
-    flat = upright(theta)
     usually = replace(spectra.without_roll, log_strokes=np.zeros((len(spectra.log_amplitude), 2)))
-    model, driven = solved_at(flat, (load.payload_kg, load.front_share), ground, usually)
+    loaded = (load.payload_kg, load.front_share)
+    model, driven = solved_at(theta, (*loaded, 0.0) if has_roll(theta) else loaded, ground, usually)
     shown = expected_of_driven(driven, model, usually)
     moved = spectra.log_amplitude[:, 0] + reading.usual_log_amplitude + 0.5 * np.euler_gamma
     log_road = moved - log_amplitude_of(shown.auto[0], shown.auto[1])
     freq_hz = spectra.freq_hz
-    by_front, by_rear = strokes(half_car(flat, ground), load.payload_kg, load.front_share, freq_hz)
+    by_front, by_rear = strokes(half_car(upright(theta), ground), *loaded, freq_hz)
     stretched = power(by_front[:, None] + driven.phase * by_rear[:, None])
     speed = (2.0 * np.pi * freq_hz) ** 2 * freq_hz**ROAD_EXPONENT * stretched
     log_speed = 0.5 * np.log(np.sum(speed, axis=-1) * float(freq_hz[1] - freq_hz[0]))
