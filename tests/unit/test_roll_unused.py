@@ -12,6 +12,9 @@ from gateway.calibration.half_car.prior import can_roll
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.lateral.unseen import sideways_covariance
+from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Vehicle
@@ -84,12 +87,31 @@ def test_a_vehicle_of_which_too_little_is_known_does_not_use_roll(vehicle: Vehic
     assert_same(rolling, flat)
 
 
-def test_a_roll_rate_is_used_where_enough_is_known() -> None:
+@pytest.fixture(scope="module")
+def rolled() -> CrossSpectrumCalibration:
+    return calibrate_cross_spectrum(runs(with_roll=True), WIDE_VAN)
+
+
+def test_a_roll_rate_is_used_where_enough_is_known(rolled: CrossSpectrumCalibration) -> None:
     assert can_roll(WIDE_VAN)
     assert not can_roll(VAN)
-    found = calibrate_cross_spectrum(runs(with_roll=True), WIDE_VAN)
-    assert found.names == PARAMETERS + ROLL_PARAMETERS
-    answer = weighed(batch_over_two_tracks(200.0, 50.0, 0.03, seed=7), found)
+    assert rolled.names == PARAMETERS + ROLL_PARAMETERS
+    answer = weighed(batch_over_two_tracks(200.0, 50.0, 0.03, seed=7), rolled)
     low, high = answer.cg_left.interval95
     assert low <= 0.03 <= high
     assert answer.cg_left.number > 0.0
+
+
+def test_a_lost_roll_rate_leaves_what_a_load_to_either_side_does_alike(
+    rolled: CrossSpectrumCalibration, unrolled: CrossSpectrumCalibration
+) -> None:
+    """Half of what two sides differ by would be nothing; of a vehicle never seen to roll it is all there is."""
+    point = Point(rolled.parameters, 200.0, 0.5)
+    spectra = cross_spectra_of([silent(batch_over_two_tracks(200.0, 50.0, 0.03, seed=7))], rolled.reading)
+    assert spectra is not None
+    alike = sideways_covariance(spectra, point, rolled, lambda _: np.array([200.0, 0.52]))
+    np.testing.assert_allclose(alike, [[0.0, 0.0], [0.0, 0.02**2]], atol=1e-12)
+    flat = replace(point, theta=unrolled.parameters)
+    np.testing.assert_array_equal(
+        sideways_covariance(spectra, flat, unrolled, lambda _: np.array([200.0, 0.52])), np.zeros((2, 2))
+    )
