@@ -90,8 +90,9 @@ much is done, the rate, and the time that is left. What comes back from a job is
 streams, and one in an object store is copied to the worker's disk (`TMPDIR`), in chunks, for as long as it is read.
 
 - **Stop it, and run it again**: what has a receipt is not done again. A second run over the same logs writes nothing.
-- **A log that cannot be read** is told under `failed/` with the reason, and the rest goes on without it. The command
-  ends with 1, once; nothing else can be made of the same bytes.
+- **A log that cannot be read** is told under `failed/` with the reason, and the rest goes on without it: a drive that
+  was under way before it ends where the log before it ended. The command ends with 1, once; nothing else can be made of
+  the same bytes.
 - **A worker that is killed** costs the job it was doing, which another one does. A job over which workers die three
   times is told under `failed/`; `--retry-failed` tries such jobs again.
 - **A store that does not answer** leaves its jobs undone, and the command ends with 1: run it again. A vehicle of which

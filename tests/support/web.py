@@ -121,6 +121,11 @@ class Server:
         while not self.uvicorn.started and not serving.done():
             await asyncio.sleep(0.005)
         self.is_up.set()
+        while not serving.done():
+            await asyncio.wait([serving], timeout=0.1)
+            if self.uvicorn.should_exit:  # uvicorn forgets whoever is let in as it closes the door, and waits for him
+                for connection in tuple(self.uvicorn.server_state.connections):
+                    connection.shutdown()
         await serving
 
 
