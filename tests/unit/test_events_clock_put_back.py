@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from support.days import RULES, batch, day, told, trips
+from support.days import RULES, assert_a_restart_changes_nothing, batch, day, told, trips
 
 from gateway.core.events import Entry, Ledger
 from gateway.core.events.ledger import HORIZON, SETTLED
@@ -93,12 +93,7 @@ def test_each_drive_that_begins_in_1970_hides_no_load():
 
 
 def test_a_restart_after_it_goes_on_as_if_it_had_not_been():
-    whole = put_right(0.0, 500.0, 500.0, 320.0, 200.0, ahead=5, batches=2)
-    straight = told(whole)
-    for cut in range(1, len(whole)):
-        first = told(whole[:cut])
-        ledger = Ledger(RULES, whole[:cut], first.values())
-        assert {**first, **{e.id: e for one in whole[cut:] for e in ledger.add(one)}} == straight
+    assert_a_restart_changes_nothing(put_right(0.0, 500.0, 500.0, 320.0, 200.0, ahead=5, batches=2))
 
 
 def test_what_is_old_stays_as_it_was_told_whatever_the_clock_did():

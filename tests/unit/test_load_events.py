@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.days import OWN_KG, RULES, SHARED_KG, T0_NS, at, batch, day, events, told
+from support.days import OWN_KG, RULES, SHARED_KG, T0_NS, assert_a_restart_changes_nothing, at, batch, day, events, told
 
 from gateway.core.events import Ledger
 from gateway.core.events.change import change_of, probability
@@ -175,12 +175,7 @@ def test_another_calibration_is_compared_with_none():
 
 
 def test_a_restart_in_the_middle_goes_on_as_if_it_had_not_been():
-    whole = day(0.0, 500.0, 500.0, 320.0, 200.0, batches=2)
-    straight = told(whole)
-    for cut in range(1, len(whole)):
-        first = told(whole[:cut])
-        ledger = Ledger(RULES, whole[:cut], first.values())
-        assert {**first, **{e.id: e for one in whole[cut:] for e in ledger.add(one)}} == straight
+    assert_a_restart_changes_nothing(day(0.0, 500.0, 500.0, 320.0, 200.0, batches=2))
 
 
 def test_what_is_old_stays_as_it_was_told():
