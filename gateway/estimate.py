@@ -10,58 +10,21 @@ from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from typing import Final
 
+from gateway.budget import BudgetLine
+from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior
+from gateway.quantity import UNKNOWN, UNKNOWN_INTERVAL, Z95, Quantity
 from gateway.records import Spectra, Why
-
-Z95: Final = 1.959964  # standard deviations to either side of a normal distribution's middle 95 %
-UNKNOWN_INTERVAL: Final = (math.nan, math.nan)
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """A number, its standard deviation and its 95 % interval (low, high), all in one unit. NaN where unknown.
-
-    A payload is in kg, the lateral place of a centre of gravity in m. A share of the sprung mass, on the front axle
-    or on the left wheels, is in percent, its standard deviation in percentage points.
-    """
-
-    number: float = math.nan
-    std: float = math.nan
-    interval95: tuple[float, float] = UNKNOWN_INTERVAL
-
-    @classmethod
-    def normal(cls, number: float, std: float) -> "Quantity":
-        """With the interval of a normal distribution."""
-        return cls(number, std, (number - Z95 * std, number + Z95 * std))
-
-    def widened(self, std: float) -> "Quantity":
-        """With one more error that is independent; an interval keeps its shape, each half grows in quadrature."""
-        below, above = self.number - self.interval95[0], self.interval95[1] - self.number
-        interval95 = (self.number - math.hypot(below, Z95 * std), self.number + math.hypot(above, Z95 * std))
-        return Quantity(self.number, math.hypot(self.std, std), interval95)
-
-
-UNKNOWN: Final = Quantity()
 
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """What the batches since the load last changed tell together (core.fusion); no intervals."""
+    """What the batches since the load last changed show together (core.fusion)."""
 
     payload: Quantity
     front_share: Quantity
     n_batches: int
     cg_left: Quantity = UNKNOWN
-
-
-@dataclass(frozen=True, slots=True)
-class Correction:
-    """The tare that an estimate was corrected by (core.tare): what was taken off, and what was raw; no intervals."""
-
-    tare_id: str
-    payload: Quantity
-    front_share: Quantity
-    raw_payload: Quantity
-    raw_front_share: Quantity
+    posterior: Posterior | None = None
 
 
 class Lack(StrEnum):
@@ -86,6 +49,7 @@ class Weight:
     limit_kg: float | None = None
     lacks: Lack | None = Lack.CALIBRATION
     is_unsprung_estimated: bool = False
+    interval95_kg: tuple[float, float] = UNKNOWN_INTERVAL
 
     @property
     def is_known(self) -> bool:
@@ -182,7 +146,9 @@ class Estimate:
 
     With a roll rate also ``cg_left``, where the sprung mass has its centre of gravity (m left of the centre line),
     ``left_share``, its share on the left wheels (%), and ``roll_share_front``, the part of a sideways load's moment
-    that the front axle's springs and bar take (0 to 1). Correlations are of errors, -1 to 1.
+    that the front axle's springs and bar take (0 to 1). ``posterior`` carries all of these errors by their sources;
+    ``measured`` is what it was before known weights were taken into account (None: there were none), and
+    ``known_weights_id`` names these.
     """
 
     t_start_ns: int
@@ -204,16 +170,16 @@ class Estimate:
     spectra: Spectra | None = None
     diagnostics: Mapping[str, float] = field(default_factory=dict)
     epoch: Epoch | None = None
-    tare: Correction | None = None
+    posterior: Posterior | None = None
+    measured: Posterior | None = None
+    known_weights_id: str | None = None
+    error_budget: tuple[BudgetLine, ...] = ()
     vehicle_id: str | None = None
     vin: str | None = None
-    correlation: float = math.nan  # of payload and front share
     cg_left: Quantity = UNKNOWN
     left_share: Quantity = UNKNOWN
     roll_share_front: float = math.nan
     roll_share_front_std: float = math.nan
-    payload_cg_left_correlation: float = math.nan
-    front_share_cg_left_correlation: float = math.nan
     weights: Weights = Weights()
     way: Way | None = None  # None before there were ways, and for an early look
 
@@ -228,22 +194,66 @@ class Estimate:
             self,
             payload=UNKNOWN,
             front_share=UNKNOWN,
-            correlation=math.nan,
             cg_left=UNKNOWN,
             left_share=UNKNOWN,
             roll_share_front=math.nan,
             roll_share_front_std=math.nan,
-            payload_cg_left_correlation=math.nan,
-            front_share_cg_left_correlation=math.nan,
+            posterior=None,
+            measured=None,
+            known_weights_id=None,
+            error_budget=(),
             weights=Weights(),
             rejected=whys,
         )
 
+    def answered(self, posterior: Posterior) -> "Estimate":
+        """The same batch with this answer; what follows from it with the vehicle's figures is still to come."""
+        return replace(
+            self,
+            posterior=posterior,
+            payload=posterior.quantity(PAYLOAD),
+            front_share=posterior.quantity(FRONT_SHARE),
+            cg_left=posterior.quantity(CG_LEFT),
+        )
+
+    @property
+    def raw_payload(self) -> Quantity | None:
+        """As measured, where known weights changed it."""
+        return None if self.measured is None else self.measured.quantity(PAYLOAD)
+
+    @property
+    def raw_front_share(self) -> Quantity | None:
+        """As measured, where known weights changed it."""
+        return None if self.measured is None else self.measured.quantity(FRONT_SHARE)
+
+    @property
+    def payload_front_share_correlation(self) -> float:
+        """Of both errors, -1 to 1."""
+        return self._correlation(PAYLOAD, FRONT_SHARE)
+
+    @property
+    def payload_cg_left_correlation(self) -> float:
+        """Of both errors, -1 to 1."""
+        return self._correlation(PAYLOAD, CG_LEFT)
+
+    @property
+    def front_share_cg_left_correlation(self) -> float:
+        """Of both errors, -1 to 1."""
+        return self._correlation(FRONT_SHARE, CG_LEFT)
+
+    def _correlation(self, one: int, other: int) -> float:
+        return math.nan if self.posterior is None else self.posterior.correlation(one, other)
+
+    @property
+    def as_measured(self) -> Posterior | None:
+        """What the batch and the calibration alone say: known weights come and go, and no load changes with them."""
+        return self.posterior if self.measured is None else self.measured
+
     @property
     def id(self) -> str:
-        """The same batch, vehicle, estimator, calibration and tare have the same id, whenever it is computed."""
+        """The same batch, vehicle, estimator, calibration and known weights have the same id, whenever it is computed."""
         parts: tuple[object, ...] = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator)
-        parts += (self.calibration_id, *((self.tare.tare_id,) if self.tare else ()))
+        parts += (self.calibration_id, *((self.known_weights_id,) if self.known_weights_id else ()))
         digest = hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()
         return f"{self.t_end_ns}-{digest[:12]}"
 
@@ -252,3 +262,23 @@ def _either(one: bool | None, other: bool | None) -> bool | None:
     if one is None or other is None:
         return one if other is None else other
     return one or other
+
+
+__all__ = [
+    "NOWHERE",
+    "PLACES",
+    "UNKNOWN",
+    "UNKNOWN_INTERVAL",
+    "UNWATCHED",
+    "Z95",
+    "Epoch",
+    "Estimate",
+    "Lack",
+    "Place",
+    "Quantity",
+    "Stop",
+    "Watched",
+    "Way",
+    "Weight",
+    "Weights",
+]

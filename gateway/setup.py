@@ -1,16 +1,16 @@
-"""What turns frames into estimates: signal map, calibration, estimator and tare, loaded and checked."""
+"""What turns frames into estimates: signal map, calibration, estimator and known weights, loaded and checked."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.file import CalibrationFile, load_calibration
-from gateway.calibration.tare_file import load_tares
+from gateway.calibration.known_weights_file import load_known_weights
 from gateway.config import Settings
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
-from gateway.core.tare import Tare
+from gateway.core.known_weights import Knowledge
 from gateway.core.weights import Limits
 from gateway.errors import ConfigurationError
 from gateway.files.signed import Read
@@ -30,7 +30,7 @@ class Setup:
     calibration: CalibrationFile | None
     estimator: str
     identity: Identity
-    tare: Tare | None = None
+    knowledge: Knowledge | None = None
     limits: Limits = NO_OTHER
     calibrated: CalibratedVehicle | None = field(init=False)  # the calibration, as the core knows it, limits in force
 
@@ -42,16 +42,15 @@ class Setup:
 
     def flow(self, settings: BatchSettings) -> Flow:
         """A fresh pipeline."""
-        return Flow(settings, self.signal_map.traits, self.calibrated, self.estimator, self.identity, self.tare)
+        return Flow(settings, self.signal_map.traits, self.calibrated, self.estimator, self.identity, self.knowledge)
 
-    def with_tare_of(self, path: Path) -> "Setup":
-        """With the tare that ``path`` has in use for this calibration and estimator; without any where it has none.
+    def with_known_weights_of(self, path: Path) -> "Setup":
+        """With what the known weights in ``path`` teach of this calibration and estimator.
 
         Raises ConfigurationError for a file that cannot be believed.
         """
         calibration_id = self.calibration.id if self.calibration else None
-        active = load_tares(path).active(calibration_id, self.estimator)
-        return replace(self, tare=active.for_core() if active else None)
+        return replace(self, knowledge=load_known_weights(path).knowledge(calibration_id, self.estimator))
 
 
 def load_setup(

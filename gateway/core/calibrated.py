@@ -1,7 +1,9 @@
 """A vehicle together with what calibration found out about it: all an estimator may know beforehand."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
+from gateway.core.cargo import ShapePrior, shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
@@ -26,6 +28,13 @@ class CalibratedVehicle:
         """As known loads tell it; the ratio index tells nothing of it."""
         return NOT_CALIBRATED if self.cross_spectrum is None else self.cross_spectrum.unsprung
 
+    @property
+    def shape_prior(self) -> ShapePrior | None:
+        """What is believed of a load's shape, from what the fitter said and from the known loads."""
+        if self.cross_spectrum is None:
+            return None
+        return _shape_prior(self.vehicle, *self.cross_spectrum.known_shape)
+
     def is_out_of_range(self, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]) -> bool:
         """True where a 95 % interval lies wholly outside what calibration saw, plus a quarter of its span.
 
@@ -34,6 +43,9 @@ class CalibratedVehicle:
         return _is_outside(payload95_kg, self.payload_seen_kg) or _is_outside(
             front_share95_pct, self.front_share_seen_pct
         )
+
+
+_shape_prior = lru_cache(maxsize=8)(shape_prior)
 
 
 def believed(seen: tuple[float, float]) -> tuple[float, float] | None:

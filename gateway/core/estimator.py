@@ -6,12 +6,16 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Protocol
 
+import numpy as np
+
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.estimator import MOST_PAYLOAD_STD_SHARE, by_cross_spectrum
 from gateway.core.ratio_index.estimator import by_ratio_index
 from gateway.core.ratio_index.index import indexes_of
 from gateway.core.spectrum import roughness_mps2, spectra_of
+from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
+from gateway.posterior import FRONT_SHARE, Source
 from gateway.records import Batch, Why
 
 
@@ -45,10 +49,25 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
         return replace(blank, rejected=(*batch.rejected, Why.NO_CALIBRATION))
     if batch.rejected:
         return blank
-    found = ESTIMATORS[estimator](batch, calibrated, blank)
+    found = _as_stated(ESTIMATORS[estimator](batch, calibrated, blank), calibrated.vehicle)
     if found.counted and calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
         return found.refused(Why.OUT_OF_RANGE)
     return found
+
+
+def _as_stated(found: Estimate, vehicle: Vehicle) -> Estimate:
+    """With the error of the empty vehicle's front share, in proportion to the empty vehicle's part of the mass.
+
+    Known loads are placed by it, and the half-car that they calibrate takes an error of it up: refitted with another
+    share s it finds payloads as before and front shares D moved as statics has it, D (M + L) = s M + the part of L that
+    rests on the front axle, so that dD / ds = M / (M + L).
+    """
+    if found.posterior is None or found.posterior.size <= FRONT_SHARE:
+        return found
+    column = np.zeros((1, found.posterior.size))
+    sprung_kg = vehicle.empty_mass_kg + found.payload.number
+    column[0, FRONT_SHARE] = vehicle.empty_front_share_std_pct * vehicle.empty_mass_kg / sprung_kg
+    return found.answered(found.posterior.with_source(Source.EMPTY_SHARE, column))
 
 
 def _roll_usable_share(batch: Batch) -> float:
@@ -64,7 +83,7 @@ def _by_cross_spectrum(batch: Batch, calibrated: CalibratedVehicle, blank: Estim
     if calibrated.ratio_index is not None:
         ra, rg = indexes_of(batch, calibrated.ratio_index)
         blank = replace(blank, ratio_index_acceleration=ra, ratio_index_pitch_rate=rg)
-    return by_cross_spectrum(batch, calibrated.cross_spectrum, blank)
+    return by_cross_spectrum(batch, calibrated.cross_spectrum, calibrated.shape_prior, blank)
 
 
 def _by_ratio_index(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:

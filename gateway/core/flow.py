@@ -4,16 +4,19 @@ from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 
+from gateway.budget import budget_of
 from gateway.core.batch import Traits
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
-from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, fused, summary
+from gateway.core.cargo import is_said
+from gateway.core.change import Rules
+from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, WeighedLoad, epoch_of, fused_epoch, remembered
+from gateway.core.known_weights import Knowledge
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.core.stated_share import told
-from gateway.core.tare import Tare, Weighed, remembered, tared
-from gateway.core.weights import NOT_CALIBRATED, weighed
-from gateway.estimate import Epoch, Estimate
+from gateway.core.weights import weighed
+from gateway.estimate import Estimate
+from gateway.posterior import Posterior
 from gateway.records import Batch, Motion, Why
 
 
@@ -31,9 +34,9 @@ OnBatch = Callable[[Batch, Estimate, Motion], None]
 class Flow:
     """Scheduler and estimator in a row. Feed it decoded rows in order of arrival.
 
-    ``tare`` may be set from any thread and counts from the next batch on; ``weighed`` is the last load
-    epoch with a counted batch, in raw numbers: what a tare is made from. ``on_batch`` hears of every batch
-    before its estimate leaves: with it, and with the rows it was made of.
+    ``knowledge``, what known weights taught, may be set from any thread and counts from the next batch on; ``weighed``
+    is the last load epoch with a counted batch, as measured: what a known weight is of. ``on_batch`` hears of every
+    batch before its estimate leaves: with it, and with the rows it was made of.
     """
 
     def __init__(
@@ -43,7 +46,7 @@ class Flow:
         calibrated: CalibratedVehicle | None,
         estimator: str,
         identity: Identity,
-        tare: Tare | None = None,
+        knowledge: Knowledge | None = None,
     ) -> None:
         self.settings = settings
         self.scheduler = Scheduler(settings, traits)
@@ -53,8 +56,9 @@ class Flow:
         self._epoch: LoadEpoch | None = None
         self._drive_start_ns: int | None = None
         self._is_epoch_over = False
-        self.tare = tare
-        self.weighed: Weighed | None = None
+        self.knowledge = knowledge
+        self.weighed: WeighedLoad | None = None
+        self._rules = Rules.of(calibrated.vehicle) if calibrated else Rules()
         self.on_batch: OnBatch = lambda batch, found, rows: None
 
     @property
@@ -93,22 +97,40 @@ class Flow:
             self._is_epoch_over |= batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
             return self._shown(found)
         found = replace(found, way=self.scheduler.way_of_last)
-        shown = self._shown(replace(found, epoch=self._fused(batch, found)))
+        shown = self._shown(found, self._fused(batch, found))
         self.weighed = remembered(self.weighed, self._epoch, shown, batch.drive_start_ns)
         self._is_epoch_over = self._epoch is None
         return shown
 
-    def _shown(self, found: Estimate) -> Estimate:
-        """As it leaves: less the zero, with the weights that follow; epochs and tares are made of what was measured."""
-        vehicle, unsprung = None, NOT_CALIBRATED
-        if self._calibrated:
-            vehicle, unsprung = self._calibrated.vehicle, self._calibrated.unsprung
-        return weighed(tared(told(found, vehicle), self.tare), vehicle, unsprung)
+    def _shown(self, found: Estimate, epoch: LoadEpoch | None = None) -> Estimate:
+        """As it leaves: with what known weights taught, the weights that follow and the budget of the error."""
+        if found.posterior is not None:
+            found = self._with_knowledge(found, epoch)
+        if self._calibrated is None:
+            return weighed(found, None)
+        vehicle = self._calibrated.vehicle
+        if found.posterior is not None:
+            found = replace(found, error_budget=budget_of(found.posterior, is_shape_said=is_said(vehicle)))
+        return weighed(found, vehicle, self._calibrated.unsprung)
 
-    def _fused(self, batch: Batch, found: Estimate) -> Epoch | None:
+    def _with_knowledge(self, found: Estimate, epoch: LoadEpoch | None) -> Estimate:
+        knowledge = self.knowledge
+        if knowledge is None or not knowledge.is_for(found.calibration_id, found.estimator):
+            return replace(found, epoch=epoch and epoch_of(epoch.posterior, epoch.n_batches))
+
+        def known(posterior: Posterior) -> Posterior:
+            return knowledge.applied(posterior, found.t_end_ns)
+
+        assert found.posterior is not None
+        answer = replace(
+            found.answered(known(found.posterior)), measured=found.posterior, known_weights_id=knowledge.id
+        )
+        return replace(answer, epoch=epoch and epoch_of(known(epoch.posterior), epoch.n_batches))
+
+    def _fused(self, batch: Batch, found: Estimate) -> LoadEpoch | None:
         """The load epoch that this batch belongs to; a new drive or a long stop opens a new one."""
         is_new_drive = batch.drive_start_ns != self._drive_start_ns
         self._drive_start_ns = batch.drive_start_ns
         could_have_changed = is_new_drive or batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
-        self._epoch = fused(self._epoch, found, could_have_changed)
-        return summary(self._epoch) if found.counted else None
+        self._epoch = fused_epoch(self._epoch, found, self._rules, could_have_changed)
+        return self._epoch if found.counted else None

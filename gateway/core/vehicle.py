@@ -65,6 +65,10 @@ class Vehicle:
     kerb_rear_axle_kg: float | None = None
     wheel_radius_m: float | None = None
     payload_length_m: float | None = None
+    payload_height_m: float | None = None
+    carries: str | None = None
+    roof_rack: bool = False
+    tow_bar: bool = False
     front_axle_limit_kg: float | None = None
     rear_axle_limit_kg: float | None = None
     gross_limit_kg: float | None = None

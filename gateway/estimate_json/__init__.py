@@ -3,6 +3,7 @@
 ``FIELDS`` is the one place that knows its names, its schema and its columns in a CSV file.
 """
 
+from gateway.estimate_json.errors import posterior_from_json, posterior_to_json
 from gateway.estimate_json.fields import COLUMNS, FIELDS, EstimateField, Presence
 from gateway.estimate_json.kinds import (
     BY_NAME,
@@ -30,6 +31,8 @@ __all__ = [
     "csv_cells",
     "estimate_from_json",
     "estimate_to_json",
+    "posterior_from_json",
+    "posterior_to_json",
     "spectra_from_json",
     "spectra_to_json",
     "table_row",

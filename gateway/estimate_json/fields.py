@@ -5,6 +5,7 @@ from enum import Enum
 from typing import Any, Final
 
 from gateway.estimate import Weight, Weights
+from gateway.estimate_json.errors import BUDGET, POSTERIOR
 from gateway.estimate_json.kinds import (
     BY_NAME,
     COUNT,
@@ -67,7 +68,7 @@ _LEFT_SHARE: Final = "share of the sprung mass on the left wheels"
 _ROLL_SHARE: Final = "part of a sideways load's moment that the front axle takes, 0 to 1"
 _POINTS: Final = "its standard deviation, in percentage points"
 _STD: Final = "its standard deviation"
-_RAW: Final = "as the calibration alone has it"
+_RAW: Final = "by the calibration alone, without known weights"
 
 _WEIGHTS: Final = Weights(
     Weight(1711.3, 6.1, 2000.0, None),
@@ -107,7 +108,14 @@ FIELDS: Final = (
         [50.2, 50.6],
         columns=("front_share_low95_pct", "front_share_high95_pct"),
     ),
-    EstimateField("payload_front_share_correlation", "correlation", NUMBER, "of both errors, -1 to 1", 0.62, _LATER),
+    EstimateField(
+        "payload_front_share_correlation",
+        "payload_front_share_correlation",
+        NUMBER,
+        "of both errors, -1 to 1",
+        0.62,
+        _LATER,
+    ),
     _field("ratio_index_acceleration", "ratio_index_acceleration", NUMBER, "R_a of the paper", 0.97),
     _field("ratio_index_pitch_rate", "ratio_index_pitch_rate", NUMBER, "R_g of the paper", 1.21),
     _field("mean_speed_mps", "mean_speed_mps", NUMBER, "over what every gate let through", 13.9),
@@ -128,32 +136,23 @@ FIELDS: Final = (
         "epoch_payload_kg", "epoch.payload.number", NUMBER, "all batches of this load together", 270.4, _KNOWN
     ),
     EstimateField("epoch_payload_std_kg", "epoch.payload.std", NUMBER, _STD, 4.9, _KNOWN),
+    EstimateField("epoch_payload_interval95_kg", "epoch.payload.interval95", INTERVAL, _INTERVAL95, None, _KNOWN),
     EstimateField("epoch_front_share_pct", "epoch.front_share.number", NUMBER, _SHARE, 50.3, _KNOWN),
     EstimateField("epoch_front_share_std_pct", "epoch.front_share.std", NUMBER, _POINTS, 0.1, _KNOWN),
     EstimateField("epoch_cg_left_m", "epoch.cg_left.number", NUMBER, _CG_LEFT, 0.02, _KNOWN),
     EstimateField("epoch_cg_left_std_m", "epoch.cg_left.std", NUMBER, _STD, 0.003, _KNOWN),
     EstimateField("epoch_n_batches", "epoch.n_batches", COUNT, "batches since the load last changed", 3.0, _KNOWN),
     _field(
-        "tare_id",
-        "tare.tare_id",
+        "known_weights_id",
+        "known_weights_id",
         TEXT,
-        "the zero taken off this answer; absent: the factory zero",
+        "hash of the known weights that this answer takes into account; absent: none",
         presence=_KNOWN,
     ),
-    _field("tare_payload_kg", "tare.payload.number", NUMBER, "taken off the raw payload", 12.4, presence=_KNOWN),
-    EstimateField("tare_payload_std_kg", "tare.payload.std", NUMBER, _STD, presence=_KNOWN),
-    _field(
-        "tare_front_share_pct",
-        "tare.front_share.number",
-        NUMBER,
-        "percentage points taken off the raw front share",
-        presence=_KNOWN,
-    ),
-    EstimateField("tare_front_share_std_pct", "tare.front_share.std", NUMBER, _POINTS, presence=_KNOWN),
-    EstimateField("raw_payload_kg", "tare.raw_payload.number", NUMBER, _RAW, 283.7, _KNOWN),
-    EstimateField("raw_payload_std_kg", "tare.raw_payload.std", NUMBER, _STD, presence=_KNOWN),
-    EstimateField("raw_front_share_pct", "tare.raw_front_share.number", NUMBER, _RAW, presence=_KNOWN),
-    EstimateField("raw_front_share_std_pct", "tare.raw_front_share.std", NUMBER, _POINTS, presence=_KNOWN),
+    EstimateField("raw_payload_kg", "raw_payload.number", NUMBER, _RAW, 283.7, _KNOWN),
+    EstimateField("raw_payload_std_kg", "raw_payload.std", NUMBER, _STD, presence=_KNOWN),
+    EstimateField("raw_front_share_pct", "raw_front_share.number", NUMBER, _RAW, presence=_KNOWN),
+    EstimateField("raw_front_share_std_pct", "raw_front_share.std", NUMBER, _POINTS, presence=_KNOWN),
     # later ones stand last: whoever reads the CSV file by position finds the same
     _field("cg_left_m", "cg_left.number", NUMBER, _CG_LEFT, 0.021, presence=_LATER),
     _field("cg_left_std_m", "cg_left.std", NUMBER, _STD, 0.004, presence=_LATER),
@@ -213,6 +212,28 @@ FIELDS: Final = (
         presence=_LATER,
     ),
     EstimateField("way", "way", WAY, "how far it went, where it stood, what door and ignition did", EXAMPLE, _LATER),
+    EstimateField(
+        "error_budget",
+        "error_budget",
+        BUDGET,
+        "what each source adds to the error, largest payload first: one standard deviation each",
+        [],
+        _LATER,
+    ),
+    EstimateField(
+        "posterior",
+        "posterior",
+        POSTERIOR,
+        "mean, own covariance and columns by source, in kg, % and m; null: no answer",
+        presence=_KNOWN,
+    ),
+    EstimateField(
+        "measured_posterior",
+        "measured",
+        POSTERIOR,
+        "the same before known weights were taken into account; absent: there are none",
+        presence=_KNOWN,
+    ),
     EstimateField("vin", "vin", TEXT, "vehicle identification number", presence=_KNOWN),
     EstimateField(
         "provisional",

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.estimate import PLACES, Lack, Weight, Weights
+from gateway.estimate import PLACES, UNKNOWN_INTERVAL, Lack, Weight, Weights
 from gateway.records import F64, Spectra, Why, iso_utc, ns_of
 
 NS_PER_US: Final = 1000
@@ -43,16 +43,17 @@ def spectra_from_json(told: Mapping[str, Sequence[float | None]]) -> Spectra:
     return Spectra(*(np.array([math.nan if x is None else x for x in told[name]]) for name in names))
 
 
-def _number(x: float, digits: int) -> float | None:
+def rounded(x: float, digits: int) -> float | None:
+    """To so many significant digits; None where it is not finite."""
     return float(f"{x:.{digits}g}") if math.isfinite(x) else None
 
 
 def _numbers(x: F64, digits: int) -> list[float | None]:
-    return [_number(float(v), digits) for v in x]
+    return [rounded(float(v), digits) for v in x]
 
 
 def _interval(bounds: tuple[float, float]) -> list[float] | None:
-    low, high = (_number(b, 9) for b in bounds)
+    low, high = (rounded(b, 9) for b in bounds)
     return None if low is None or high is None else [low, high]
 
 
@@ -67,8 +68,9 @@ def weights_to_json(weights: Weights) -> dict[str, dict[str, Any]]:
 
 def _weight(weight: Weight) -> dict[str, Any]:
     return {
-        "kg": _number(weight.kg, 7),
-        "std_kg": _number(weight.std_kg, 7),
+        "kg": rounded(weight.kg, 7),
+        "std_kg": rounded(weight.std_kg, 7),
+        "interval95_kg": _interval(weight.interval95_kg),
         "limit_kg": weight.limit_kg,
         "is_over_limit": weight.is_over_limit,
         "lacks": None if weight.lacks is None else str(weight.lacks),
@@ -83,7 +85,8 @@ def _weights_of(told: Mapping[str, Mapping[str, Any]]) -> Weights:
 def _weight_of(told: Mapping[str, Any]) -> Weight:
     kg, std_kg = (math.nan if told[name] is None else told[name] for name in ("kg", "std_kg"))
     lacks = None if told["lacks"] is None else Lack(told["lacks"])
-    return Weight(kg, std_kg, told["limit_kg"], lacks, told.get("is_unsprung_estimated", False))
+    low_kg, high_kg = told["interval95_kg"] or UNKNOWN_INTERVAL
+    return Weight(kg, std_kg, told["limit_kg"], lacks, told["is_unsprung_estimated"], (low_kg, high_kg))
 
 
 def _weight_cells(shown: Mapping[str, Mapping[str, Any]]) -> list[Any]:
@@ -103,12 +106,12 @@ FLAG: Final = Kind(bool | None, _as_is, _as_is)
 WHOLE: Final = Kind(int | None, _as_is, _as_is)
 COUNT: Final = Kind(float | None, float, int)
 INSTANT: Final = Kind(str | None, iso_utc, ns_of)
-NUMBER: Final = Kind(float | None, lambda x: _number(x, 9), float)
-ROUGH_NUMBER: Final = Kind(float | None, lambda x: _number(x, 6), float)
+NUMBER: Final = Kind(float | None, lambda x: rounded(x, 9), float)
+ROUGH_NUMBER: Final = Kind(float | None, lambda x: rounded(x, 6), float)
 INTERVAL: Final = Kind(list[float] | None, _interval, tuple, cells=list)
 BY_NAME: Final = Kind(
     dict[str, float | None],
-    lambda numbers: {name: _number(x, 6) for name, x in numbers.items()},
+    lambda numbers: {name: rounded(x, 6) for name, x in numbers.items()},
     lambda told: {name: math.nan if x is None else x for name, x in told.items()},
 )
 REASONS: Final = Kind(

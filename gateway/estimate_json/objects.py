@@ -5,11 +5,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from gateway.estimate import UNKNOWN_INTERVAL, Correction, Epoch, Estimate, Quantity
+from gateway.estimate import UNKNOWN_INTERVAL, Epoch, Estimate, Quantity
 from gateway.estimate_json.fields import COLUMNS, FIELDS, Presence
 from gateway.estimate_json.kinds import NS_PER_US
 
-_FOLLOWS: Final = ("id", "t_end")  # from other fields: not read back
+_FOLLOWS: Final = frozenset(one.name for one in FIELDS if one.name.startswith("raw_") or "correlation" in one.name) | {
+    "id",
+    "t_end",
+}
+"""From other fields: not read back."""
 
 
 def estimate_to_json(estimate: Estimate) -> dict[str, Any]:
@@ -37,7 +41,6 @@ def estimate_from_json(told: Mapping[str, Any]) -> Estimate:
         cg_left=_quantity(known, "cg_left"),
         left_share=_quantity(known, "left_share"),
         epoch=_epoch(known),
-        tare=_correction(known),
     )
     return _with_its_nanoseconds(estimate, told["id"])
 
@@ -64,13 +67,6 @@ def _epoch(known: Mapping[str, Any]) -> Epoch | None:
         return None
     quantities = {name: _quantity(known, f"epoch.{name}") for name in ("payload", "front_share", "cg_left")}
     return Epoch(n_batches=known["epoch.n_batches"], **quantities)
-
-
-def _correction(known: Mapping[str, Any]) -> Correction | None:
-    if "tare.tare_id" not in known:
-        return None
-    names = ("payload", "front_share", "raw_payload", "raw_front_share")
-    return Correction(known["tare.tare_id"], *(_quantity(known, f"tare.{name}") for name in names))
 
 
 def csv_cells(told: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,11 +1,8 @@
 """The calibration file: versioned JSON whose id is the hash of its content. Written by the tool, never by hand."""
 
-import copy
 import hashlib
 import json
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import Field, ValidationError
@@ -21,7 +18,7 @@ from gateway.calibration.file.parts import (
     VehiclePart,
 )
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.vehicle import Vehicle, sensor_offset_left
+from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, LineError, UntrustedFileError
 from gateway.files.signed import Read
 from gateway.toml_file import describe_faults
@@ -30,20 +27,15 @@ if TYPE_CHECKING:
     from gateway.calibration.line import Sister
 
 Content = dict[str, Any]
-FIRST_VERSION: Final = 1
-
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 7
+VERSION: Final = 8
 
 
 class CalibrationFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-calibration"] = FORMAT
-    version: Literal[7] = VERSION
-    migrated_from: str | None = Field(
-        None, description="id of the file of an older version that this content was read from; null: written as it is"
-    )
+    version: Literal[8] = VERSION
     vehicle: VehiclePart
     seen: SeenPart
     cross_spectrum: CrossSpectrumPart | None = None
@@ -59,17 +51,12 @@ class CalibrationFile(Part):
 
     @property
     def id(self) -> str:
-        """What estimates name: the hash of the file as it was first written, which a migration does not change."""
-        return self.migrated_from or self.content_id
-
-    @property
-    def content_id(self) -> str:
-        """sha256 of the canonical JSON of everything in the file but the id itself."""
+        """sha256 of the canonical JSON of everything in the file but the id itself: what estimates name."""
         return content_id(self.model_dump(mode="json"))
 
     def to_json(self) -> str:
         """The file's text, id first."""
-        content = {"id": self.content_id, **self.model_dump(mode="json")}
+        content = {"id": self.id, **self.model_dump(mode="json")}
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
     def for_core(self) -> CalibratedVehicle:
@@ -110,7 +97,7 @@ def content_id(content: dict[str, Any]) -> str:
 
 
 def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> CalibrationFile:
-    """Reads, checks version, hash and shape; an older version is migrated, what it did not say is null.
+    """Reads; checks version, hash and shape.
 
     ``read`` sees to the signature where one is required (files.signed).
 
@@ -120,15 +107,18 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
     content = read_content(path, read)
     if content.get("format") != FORMAT:
         raise CalibrationFileError(f"{path}: not a springscale calibration file (format is {content.get('format')!r})")
-    _refuse_unknown_version(path, content.get("version"))
+    if content.get("version") != VERSION:
+        raise CalibrationFileError(
+            f"{path}: calibration file version {content.get('version')!r}, this springscale reads version {VERSION}: "
+            "calibrate again with `springscale calibrate`"
+        )
     if not matches_its_id(content):
         raise CalibrationFileError(
             f"{path}: content does not match its id: the file was changed after it was written; "
             "restore it or calibrate again"
         )
     try:
-        current = migrated(content, VERSION)
-        held = CalibrationFile.model_validate({key: part for key, part in current.items() if key != "id"})
+        held = CalibrationFile.model_validate({key: part for key, part in content.items() if key != "id"})
         held.for_core()  # a term or a model of another springscale is told here, with the file's name
         if held.line is not None:
             held.line.require_known()
@@ -136,24 +126,7 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
         raise CalibrationFileError(f"{path}: {fault}") from None
     except ValidationError as fault:
         raise CalibrationFileError(describe_faults(path, fault)) from None
-    except (KeyError, TypeError, AttributeError, RecursionError):  # a migration met a shape that its version never had
-        raise CalibrationFileError(
-            f"{path}: not the shape of a calibration file of version {content['version']}: calibrate again"
-        ) from None
     return held
-
-
-def _refuse_unknown_version(path: Path, version: Any) -> None:
-    if type(version) is not int or version < FIRST_VERSION:
-        raise CalibrationFileError(
-            f"{path}: calibration file version {version!r} was never written by any springscale: "
-            "calibrate again with `springscale calibrate`"
-        )
-    if version > VERSION:
-        raise CalibrationFileError(
-            f"{path}: calibration file version {version}, this springscale reads up to version {VERSION}: "
-            "use the springscale that wrote it, or calibrate again with this one"
-        )
 
 
 def matches_its_id(content: Content) -> bool:
@@ -179,74 +152,3 @@ def read_content(path: Path, read: Read) -> Content:
     if not isinstance(content, dict):
         raise CalibrationFileError(f"{path}: not a springscale calibration file")
     return content
-
-
-def _to_version_2(content: Content) -> None:
-    """Version 2 says over which roads it was calibrated, and the expected errors of every estimator."""
-    content["seen"]["roughness_mps2"] = None
-    for estimator in ("cross_spectrum", "ratio_index"):
-        if content[estimator] is not None:
-            content["expected_errors"].setdefault(estimator, {"payload_rms_kg": None, "front_share_rms_pct": None})
-
-
-def _to_version_3(content: Content) -> None:
-    """Version 3 says where things are to the side. An offset of 0 was what stood there when nobody stated one."""
-    vehicle = content["vehicle"]
-    _, offset_std_m = sensor_offset_left(vehicle["sensor_offset_left_m"] or None)
-    vehicle |= {"sensor_offset_left_std_m": offset_std_m, "track_width_m": None, "empty_cg_left_m": 0.0}
-    vehicle |= {"front_wheel_limit_kg": None, "rear_wheel_limit_kg": None}
-    if content["ratio_index"] is not None:
-        content["ratio_index"]["roll_lever_m"] = 0.0
-    if content["cross_spectrum"] is not None:
-        places = {"sensor_left_m": vehicle["sensor_offset_left_m"], "sensor_left_std_m": offset_std_m}
-        content["cross_spectrum"] |= {"track_width_m": None, "cg_left_inflation": 1.0, **places}
-    for run in content["provenance"]["runs"]:
-        run["payload_left_m"] = None
-
-
-def _to_version_4(content: Content) -> None:
-    """Version 4 says what was inherited from a line. Before, there were no lines."""
-    content["line"] = None
-
-
-def _to_version_5(content: Content) -> None:
-    """Version 5 says how long loads usually lie. Before, nobody was asked."""
-    content["vehicle"]["payload_length_m"] = None
-    if content["cross_spectrum"] is not None:
-        content["cross_spectrum"]["payload_length_m"] = None
-
-
-def _to_version_6(content: Content) -> None:
-    """Version 6 says how much slack the model has at least. Before, it was one percent with a roll rate too."""
-    if content["cross_spectrum"] is not None:
-        content["cross_spectrum"]["least_slack"] = 0.01
-
-
-def _to_version_7(content: Content) -> None:
-    """Version 7 says how fast each axle's springs usually move. Before, friction went by how much the body moves."""
-    if content["cross_spectrum"] is not None:
-        content["cross_spectrum"]["usual_stroke_mps"] = None
-    if content["line"] is not None:
-        content["line"]["usual_stroke_mps"] = None
-
-
-# Entry v turns version v into v + 1. Entries are never edited, only added.
-MIGRATIONS: Final[Mapping[int, Callable[[Content], None]]] = MappingProxyType(
-    {1: _to_version_2, 2: _to_version_3, 3: _to_version_4, 4: _to_version_5, 5: _to_version_6, 6: _to_version_7}
-)
-
-
-def migrated(content: Content, version: int) -> Content:
-    """``content`` as ``version`` has it, with the id it had in ``migrated_from``; the same object where it is that.
-
-    ``content["version"]`` must lie between FIRST_VERSION and ``version``. Raises KeyError, TypeError or
-    AttributeError where the content has not the shape of its version.
-    """
-    if content["version"] == version:
-        return content
-    current = copy.deepcopy(content)
-    current["migrated_from"] = content.get("migrated_from") or content["id"]
-    for step in range(content["version"], version):
-        MIGRATIONS[step](current)
-        current["version"] = step + 1
-    return current

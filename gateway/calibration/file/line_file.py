@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gateway.calibration.line import Line
 
 LINE_FORMAT: Final = "springscale-line"
-LINE_VERSION: Final = 2
+LINE_VERSION: Final = 3
 
 
 class SiblingPart(Part):
@@ -41,10 +41,7 @@ class LineFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-line"] = LINE_FORMAT
-    version: Literal[2] = LINE_VERSION
-    migrated_from: str | None = Field(
-        None, description="id of the file of version 1 that this content was read from; null: written as it is"
-    )
+    version: Literal[3] = LINE_VERSION
     software: str
     siblings: tuple[SiblingPart, ...] = Field(min_length=1)
     line: LinePart
@@ -73,9 +70,9 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
     content = read_content(path, read)
     if content.get("format") != LINE_FORMAT:
         return load_calibration(path, read)
-    if content.get("version") not in (1, LINE_VERSION):
+    if content.get("version") != LINE_VERSION:
         raise CalibrationFileError(
-            f"{path}: line file version {content.get('version')!r}, this springscale reads up to version "
+            f"{path}: line file version {content.get('version')!r}, this springscale reads version "
             f"{LINE_VERSION}: build it again with `springscale line build`"
         )
     if not matches_its_id(content):
@@ -84,21 +81,13 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
             "it again"
         )
     try:
-        current = content if content["version"] == LINE_VERSION else _from_version_1(content)
-        held = LineFile.model_validate({key: part for key, part in current.items() if key != "id"})
+        held = LineFile.model_validate({key: part for key, part in content.items() if key != "id"})
         held.line.require_known()
     except ValidationError as fault:
         raise CalibrationFileError(describe_faults(path, fault)) from None
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
     return held
-
-
-def _from_version_1(content: Content) -> Content:
-    """Version 2 says how fast each axle's springs usually move. Before, friction went by how much the body moves."""
-    line = content.get("line")
-    told = {**line, "usual_stroke_mps": None} if isinstance(line, dict) else line
-    return {**content, "version": LINE_VERSION, "migrated_from": content["id"], "line": told}
 
 
 def line_of_files(files: Sequence[LikeFile]) -> "Line":

@@ -9,12 +9,14 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    NonNegativeFloat,
     PlainSerializer,
     PositiveFloat,
     WithJsonSchema,
     model_validator,
 )
 
+from gateway.core.cargo import Carries
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import LEAST_SLACK, PARAMETERS, ROLL_PARAMETERS
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
@@ -165,8 +167,8 @@ class CrossSpectrumPart(Part):
     names: tuple[str, ...]
     parameters: Array
     covariance: Array
-    payload_inflation: float = Field(gt=0.0)
-    front_share_inflation: float = Field(gt=0.0)
+    directions: Array
+    model_std: tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
     misfit_limit: float = Field(gt=0.0)
     acceleration_rms_mps2: float = Field(gt=0.0)
     pitch_rate_rms_radps: float = Field(gt=0.0)
@@ -176,24 +178,26 @@ class CrossSpectrumPart(Part):
     warnings: tuple[str, ...] = ()
     version: int = 1  # of this part; there has been one
     known_loads: tuple[tuple[float, float], ...] = ()
-    payload_inflation_per_reach: float = Field(0.0, ge=0.0)
-    front_share_inflation_per_reach: float = Field(0.0, ge=0.0)
+    model_per_reach: tuple[NonNegativeFloat, NonNegativeFloat] = (0.0, 0.0)
     usual_log_amplitude: float | None = None
     gravity_mps2: float | None = Field(None, gt=0.0)
     most_position_score: float = Field(SCORE, gt=0.0)
     most_noise_score: float = Field(SCORE, gt=0.0)
     track_width_m: float | None = Field(None, gt=0.0)
-    cg_left_inflation: float = Field(1.0, gt=0.0)
     sensor_left_m: float = 0.0
     sensor_left_std_m: float = Field(UNKNOWN_OFFSET_STD_M, gt=0.0)
-    payload_length_m: float | None = Field(None, gt=0.0)
     least_slack: float = Field(LEAST_SLACK, gt=0.0)
     usual_stroke_mps: tuple[PositiveFloat, PositiveFloat] | None = None
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "CrossSpectrumPart":
         n = len(self.names)
-        check_shapes(parameters=(self.parameters, (n,)), covariance=(self.covariance, (n, n)))
+        k = self.directions.shape[-1]
+        check_shapes(
+            parameters=(self.parameters, (n,)),
+            covariance=(self.covariance, (n, n)),
+            directions=(self.directions, (n, k)),
+        )
         return self
 
     @classmethod
@@ -240,6 +244,10 @@ class VehiclePart(Part):
     front_wheel_limit_kg: float | None
     rear_wheel_limit_kg: float | None
     payload_length_m: float | None = Field(None, gt=0.0)
+    payload_height_m: float | None = Field(None, gt=0.0)
+    carries: Carries | None = None
+    roof_rack: bool = False
+    tow_bar: bool = False
 
 
 class SeenPart(Part):

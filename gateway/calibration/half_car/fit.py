@@ -10,30 +10,39 @@ true of loads that calibration has not seen.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, product
 from math import isfinite, nan
 from statistics import fmean
 from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATION
+from gateway.calibration.half_car.directions import directions_of
 from gateway.calibration.half_car.inherited import Inherited
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
 from gateway.calibration.half_car.left_out import MISFIT_MARGIN, LeftOut, left_out_errors, limits_shown_by
+from gateway.calibration.half_car.model_error import model_error
 from gateway.calibration.half_car.most_probable_vehicle import fit_vehicle, seen_by
 from gateway.calibration.half_car.prior import Prior, can_roll, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.model.parameters import names_of, upright
+from gateway.core.cross_spectrum.estimator import moves_of, weigh
+from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
+from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.located import answer_at
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, names_of, upright
 from gateway.core.cross_spectrum.search import Found
-from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError
-from gateway.records import F64
+from gateway.records import F64, Why
 
 LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
 SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
 UNTESTED: Final = "intervals_untested"
+
+IDEAL_S: Final = 300.0
+IDEAL_PARTS: Final = (0.02, 0.5, 1.0)  # of the payload range
+IDEAL_PLACES: Final = (0.25, 0.6, 0.95)  # of the wheelbase
 
 _STARTS: Final = ((0.0, 0.0), (0.4, 0.3), (-0.4, -0.3))  # log springs, log dampers, off the prior's centre
 
@@ -86,7 +95,8 @@ def fit_cross_spectrum(
             "hardly two stretches were driven at one speed, so that nothing tells whether the half-car fits: drive at "
             "an even speed"
         )
-    untested = calibration if inherited else replace(calibration, warnings=(*calibration.warnings, UNTESTED))
+    calibration = replace(calibration, directions=_directions(calibration, vehicle, runs))
+    untested = calibration if inherited else _untested(calibration)
     if not can_leave_out:
         return CrossSpectrumFit(untested, {})
     errors: list[LeftOut] = []
@@ -97,17 +107,45 @@ def fit_cross_spectrum(
         step()
     if not errors:
         return CrossSpectrumFit(untested, {})
-    limits = limits_shown_by(errors, calibration.misfit_limit)
+    limits = limits_shown_by(errors, calibration.misfit_limit, vehicle.empty_mass_kg)
 
     def tested(one: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
         shown = limits.on(one, is_tested=False)
         return inherited.on(shown, is_tested=True) if inherited else shown
 
     tested_without = {number: tested(one) for number, one in without.items()}
-    payload_kg, share_pct = (
-        np.array([getattr(one, name) for one in errors]) for name in ("payload_kg", "front_share_pct")
-    )
+    payload_kg, share_pct = np.array([one.error[:2] for one in errors]).T
     return CrossSpectrumFit(tested(calibration), tested_without, payload_kg, share_pct)
+
+
+def _untested(calibration: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
+    """With the model error of other vans, since no run could be left out."""
+    usual = model_error((), calibration.empty_mass_kg)
+    warnings = (*calibration.warnings, UNTESTED)
+    return replace(calibration, model_std=usual.std, model_per_reach=usual.per_reach, warnings=warnings)
+
+
+def _directions(calibration: CrossSpectrumCalibration, vehicle: Vehicle, runs: Sequence[KnownRun]) -> F64:
+    """Over the known runs, and over loads that the vehicle may carry at the speed of these runs."""
+    moves = []
+    for run in runs:
+        batch = next((one for one in run.batches if not one.rejected), None)
+        found = None if batch is None else weigh(batch, calibration, None)
+        if found is not None and not isinstance(found, Why):
+            moves.append(moves_of(found.located, len(calibration.parameters)))
+    speed_mps = float(np.mean(calibration.speed_seen_mps))
+    theta, ground = upright(calibration.parameters), calibration.ground
+    spectra = steady_spectra(calibration.reading, Drive(IDEAL_S, speed_mps))
+    most_kg = max(vehicle.payload_range_kg[1], calibration.payload_seen_kg[1])
+    for part, place in product(IDEAL_PARTS, IDEAL_PLACES):
+        payload_kg = part * most_kg
+        share_pct = front_share_pct(vehicle, payload_kg, place * vehicle.wheelbase_m)
+        point = Point.of(theta, Load(payload_kg, share_pct))
+        at = answer_at(Whittle(expected_of(spectra, point, ground), ground), point)
+        moved = np.zeros((2, len(calibration.parameters)))
+        moved[:, : len(PARAMETERS)] = np.diag([1.0, 100.0]) @ at.moves
+        moves.append(moved)
+    return directions_of(moves, calibration.covariance)
 
 
 def _counted(progress: Callable[[int, int], None] | None, n_steps: int) -> Callable[[], None]:
@@ -158,8 +196,8 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         names=names_of(found.x),
         parameters=found.x,
         covariance=found.covariance,
-        payload_inflation=UNTESTED_INFLATION,
-        front_share_inflation=UNTESTED_INFLATION,
+        directions=np.zeros((len(found.x), 0)),
+        model_std=(0.0, 0.0, 0.0),
         misfit_limit=MISFIT_MARGIN * max((one for one in misfits if isfinite(one)), default=nan),
         acceleration_rms_mps2=float(np.median([k.spectra.acceleration_rms_mps2 for k in known])),
         pitch_rate_rms_radps=float(np.median([k.spectra.pitch_rate_rms_radps for k in known])),
@@ -172,7 +210,6 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         track_width_m=vehicle.track_width_m,
         sensor_left_m=vehicle.sensor_offset_left_m,
         sensor_left_std_m=vehicle.sensor_offset_left_std_m,
-        payload_length_m=vehicle.payload_length_m,
         least_slack=known[0].whittle.ground.least_slack,
         usual_stroke_mps=reading.usual_stroke_mps,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),

@@ -1,8 +1,8 @@
-"""How far intervals are widened, and what misfit is still believed: what was left out of a fit shows it."""
+"""How large the model's own error is, and what misfit is still believed: what was left out of a fit shows it."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
-from typing import Self
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 
@@ -11,11 +11,8 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 class Limits:
     """What runs, or siblings, left out showed; fields as in CrossSpectrumCalibration."""
 
-    payload_inflation: float
-    payload_inflation_per_reach: float
-    front_share_inflation: float
-    front_share_inflation_per_reach: float
-    cg_left_inflation: float
+    model_std: tuple[float, float, float]
+    model_per_reach: tuple[float, float]
     misfit_limit: float
     most_position_score: float
     most_noise_score: float
@@ -28,7 +25,7 @@ class Limits:
     @classmethod
     def widest(cls, limits: Sequence["Limits"]) -> Self:
         """Of several, each as wide as the widest."""
-        return cls(**{one.name: max(getattr(each, one.name) for each in limits) for one in fields(cls)})
+        return cls(**{one.name: _widest([getattr(each, one.name) for each in limits]) for one in fields(cls)})
 
     def on(self, calibration: CrossSpectrumCalibration, *, is_tested: bool) -> CrossSpectrumCalibration:
         """``calibration`` with these in place of what nobody tested; of what was, the wider.
@@ -38,4 +35,11 @@ class Limits:
         own = Limits.of(calibration)
         widest = Limits.widest([self, own])
         limits = widest if is_tested else replace(self, misfit_limit=widest.misfit_limit)
-        return replace(calibration, **asdict(limits))
+        return replace(calibration, **{one.name: getattr(limits, one.name) for one in fields(limits)})
+
+
+def _widest(several: Sequence[Any]) -> Any:
+    """The largest number, or the largest of each place of tuples."""
+    if isinstance(several[0], tuple):
+        return tuple(max(place) for place in zip(*several, strict=True))
+    return max(several)

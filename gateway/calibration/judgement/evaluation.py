@@ -15,6 +15,7 @@ from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.core.weights import NOT_CALIBRATED, Unsprung, weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
+from gateway.posterior import Source
 from gateway.records import F64, Why
 
 Target = Literal["payload", "front_share"]
@@ -248,13 +249,18 @@ def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: st
             run.name,
             run.payload_kg,
             run.front_share_pct,
-            weighed(estimate(batch, calibrated, estimator), calibrated.vehicle, calibrated.unsprung),
+            weighed(_beside_known(estimate(batch, calibrated, estimator)), calibrated.vehicle, calibrated.unsprung),
             _noted_cg_left_m(run, calibrated.vehicle),
             calibrated.unsprung,
         )
         for run in runs
         for batch in run.batches
     ]
+
+
+def _beside_known(found: Estimate) -> Estimate:
+    """Known loads were placed by the stated front share of the empty vehicle: its error is in both and drops out."""
+    return found if found.posterior is None else found.answered(found.posterior.without(Source.EMPTY_SHARE))
 
 
 def _noted_cg_left_m(run: KnownRun, vehicle: Vehicle) -> float:

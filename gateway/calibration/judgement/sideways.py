@@ -1,14 +1,15 @@
 """Errors of where the load lies sideways, and of the loads of single wheels that follow from it."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Final
 
 import numpy as np
 
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import Sideways, Unsprung, weights_of
+from gateway.core.weights import Unsprung, weights_of
 from gateway.estimate import Estimate, Quantity
+from gateway.posterior import exactly
 from gateway.records import F64
 
 WHEELS: Final = ("front_left", "front_right", "rear_left", "rear_right")
@@ -75,9 +76,9 @@ class Carried:
         How the axles divide a sideways moment no campaign says, nor some what is unsprung: the truth takes both as the
         estimate does, so that their errors are in neither.
         """
-        known = replace(Sideways.of(self.estimate), cg_left=Quantity(self.cg_left_m, 0.0))
-        share = Quantity(self.front_share_pct, 0.0)
-        true = weights_of(vehicle, Quantity(self.payload_kg, 0.0), share, sideways=known, unsprung=self.unsprung)
+        roll_share = Quantity(self.estimate.roll_share_front, 0.0)
+        truth = exactly(self.payload_kg, self.front_share_pct, self.cg_left_m)
+        true = weights_of(vehicle, truth, roll_share, self.unsprung)
         told = self.estimate.weights
         off_kg = [getattr(told, wheel).kg - getattr(true, wheel).kg for wheel in WHEELS]
         return np.array(off_kg) / true.gross.kg * 100.0

@@ -76,7 +76,7 @@ def with_siblings_left_out(
     if not errors:
         raise LineError("no batch of a sibling left out could be weighed: their drives hold too little steady driving")
     return TestedLine(
-        replace(line, limits=limits_shown_by(errors, max(misfits))),
-        float(np.sqrt(np.mean([one.payload_kg**2 for one in errors]))),
-        float(np.sqrt(np.mean([one.front_share_pct**2 for one in errors]))),
+        replace(line, limits=limits_shown_by(errors, max(misfits), line.empty_mass_kg)),
+        float(np.sqrt(np.mean([one.error[0] ** 2 for one in errors]))),
+        float(np.sqrt(np.mean([one.error[1] ** 2 for one in errors]))),
     )

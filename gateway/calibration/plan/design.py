@@ -19,9 +19,9 @@ import numpy as np
 
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.calibration.plan.loads import PlacedLoad
-from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
+from gateway.core.cross_spectrum.located import answer_at
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, Ground, upright
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import Vehicle
@@ -63,7 +63,7 @@ class Design:
         return np.asarray(np.linalg.inv(np.linalg.inv(covariance) + self._information[load]), float)
 
     def spread(self, covariance: F64) -> Spread:
-        """How well the targets would be weighed in batches of five minutes, before any inflation."""
+        """How well the targets would be weighed in batches of five minutes, of the batch and the calibration alone."""
         payload_var, share_var = self._variances(covariance).mean(axis=0)
         return Spread(float(np.sqrt(payload_var)), 100.0 * float(np.sqrt(share_var)))
 
@@ -86,18 +86,10 @@ class Design:
         return variances
 
     def _weighed(self, load: PlacedLoad) -> tuple[F64, F64]:
-        """A batch's own variances (2,), and how (payload, share) move with each parameter (2, p).
-
-        With x the fitted and t the other parameters, x moves by -C_xx I_xt for each t.
-        """
+        """A batch's own variances (2,), and by how much (payload, share) move with each parameter (2, p)."""
         whittle, point = self._seen(load, Drive(BATCH_S, self._drive.speed_mps), 1.0)
-        n = len(PARAMETERS)
-        information = whittle.curvature(point, list(range(n + 2))).information
-        fitted = [*DRIFTING, n, n + 1]
-        own = np.linalg.inv(information[np.ix_(fitted, fitted)] + np.pad(DRIFT_PRECISION, (0, 2)))
-        moves = np.zeros((2, n))
-        moves[:, STEADY] = -(own @ information[np.ix_(fitted, STEADY)])[-2:]
-        return np.diag(own)[-2:], moves
+        at = answer_at(whittle, point)
+        return np.diag(at.covariance)[-2:], at.moves
 
     def _seen(self, load: PlacedLoad, drive: Drive, weight: float) -> tuple[Whittle, Point]:
         point = Point.of(self._theta, load.load)

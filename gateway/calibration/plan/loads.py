@@ -9,7 +9,7 @@ import numpy as np
 from gateway.core.calibrated import RANGE_MARGIN
 from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.core.weights import weights_of
-from gateway.estimate import Quantity
+from gateway.posterior import exactly
 
 DRIVEN_PARTS: Final = (0.25, 0.5, 0.75, 1.0)  # of the largest payload
 DRIVEN_PLACES: Final = (0.15, 0.35, 0.55, 0.75, 1.0)  # of the wheelbase, behind the front axle
@@ -87,7 +87,7 @@ def _within_limits(vehicle: Vehicle, loads: Iterable[tuple[float, float]]) -> tu
 
 def _is_allowed(vehicle: Vehicle, load: PlacedLoad) -> bool:
     """Limits are of the whole vehicle; one whose weight is not known is not checked."""
-    weights = weights_of(vehicle, Quantity(load.payload_kg, 0.0), Quantity(load.front_share_pct, 0.0))
+    weights = weights_of(vehicle, exactly(load.payload_kg, load.front_share_pct))
     return not any(weight.is_over_limit for _, weight in weights.items())
 
 

@@ -3,26 +3,33 @@
     plan_first(vehicle)                   nothing driven yet: a first campaign, from priors alone
     plan_next(outcome, vehicle)           after a calibration: the runs that would teach most, one after the other
 
-Runs are chosen by gateway.calibration.plan.design. What it expects is stated as the service would state
-it: standard deviations of five-minute batches over the loads the vehicle carries, inflation included.
+Runs are chosen by gateway.calibration.plan.design. What it expects is what the service will state: standard deviations
+of five-minute batches over the loads the vehicle carries, with every source of error.
 """
 
+import math
 from dataclasses import asdict, dataclass
+from itertools import product
 from typing import Any, Final
 
 import numpy as np
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.half_car import Inherited, prior_of
-from gateway.calibration.half_car.inflation import UNTESTED as UNTESTED_INFLATION
+from gateway.calibration.half_car import Inherited, Prior, prior_of
+from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
+from gateway.calibration.half_car.model_error import model_error
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.plan.design import Design
+from gateway.calibration.plan.design import BATCH_S, Design
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
 from gateway.calibration.plan.sideways import SidewaysLoad, sideways_load
+from gateway.core.cargo import shape_prior
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.ideal_drive import Drive
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS
-from gateway.core.vehicle import Vehicle
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, upright
+from gateway.core.cross_spectrum.predicted import predicted
+from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError
+from gateway.posterior import Source
 from gateway.records import F64
 from gateway.units import NS_PER_S
 
@@ -93,7 +100,7 @@ class LoadPlan:
 def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST, inherited: Inherited | None = None) -> LoadPlan:
     """A first campaign: empty, then what the priors of any vehicle, or of its line, let expect the most of."""
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=False)
-    planner = _Planner(vehicle, prior.mean, FIRST_DRIVE)
+    planner = _Planner(vehicle, prior.mean, FIRST_DRIVE, _beside_calibration(_of_prior(prior, vehicle), vehicle, FIRST_DRIVE))
     unloaded = empty(vehicle)
     known = planner.after(prior.covariance, unloaded)
     first = Advice(unloaded, planner.expected(known, (unloaded,)))
@@ -119,8 +126,7 @@ def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadP
         )
     runs = [one.identification for one in outcome.split]
     drive = usual_drive(runs)
-    inflation = known.payload_inflation, known.front_share_inflation
-    planner = _Planner(vehicle, known.parameters, drive, inflation)
+    planner = _Planner(vehicle, known.parameters, drive, _beside_calibration(known, vehicle, drive))
     of_half_car = known.covariance[: len(PARAMETERS), : len(PARAMETERS)]  # what was learned of roll weighs no load
     driven = tuple(PlacedLoad(load.payload_kg, None, load.front_share_pct) for load in known.known_loads)
     return LoadPlan(
@@ -148,20 +154,52 @@ def usual_drive(runs: list[KnownRun]) -> Drive:
     return Drive(float(np.median(durations_s)), float(np.median(speeds_mps)))
 
 
+def _beside_calibration(known: CrossSpectrumCalibration, vehicle: Vehicle, drive: Drive) -> F64:
+    """(2,) mean variances of payload (kg) and front share (%) beside a batch's own and the calibration's."""
+    prior = shape_prior(vehicle, *known.known_shape)
+    most_kg = vehicle.payload_range_kg[1]
+    loads = [empty(vehicle).load]
+    for part, place in product((0.5, 1.0), (0.35, 0.8)):
+        payload_kg = part * most_kg
+        loads.append(Load(payload_kg, front_share_pct(vehicle, payload_kg, place * vehicle.wheelbase_m)))
+    stated = [predicted(known, prior, load, Drive(BATCH_S, drive.speed_mps)) for load in loads]
+    return np.mean([np.diag(one.without(Source.CALIBRATION).shared)[:2] for one in stated], axis=0)
+
+
+def _of_prior(prior: Prior, vehicle: Vehicle) -> CrossSpectrumCalibration:
+    """A calibration that knows nothing but what is usual: its model error is that of other vans."""
+    theta = upright(prior.mean)
+    usual = model_error((), vehicle.empty_mass_kg)
+    return CrossSpectrumCalibration(
+        empty_mass_kg=vehicle.empty_mass_kg,
+        empty_front_share_pct=vehicle.empty_front_share_pct,
+        wheelbase_m=vehicle.wheelbase_m,
+        band_hz=BAND_HZ,
+        n_segment=N_SEGMENT,
+        names=PARAMETERS,
+        parameters=theta,
+        covariance=np.zeros((len(theta), len(theta))),
+        directions=np.zeros((len(theta), 0)),
+        model_std=usual.std,
+        model_per_reach=usual.per_reach,
+        misfit_limit=math.inf,
+        acceleration_rms_mps2=1.0,
+        pitch_rate_rms_radps=1.0,
+        payload_seen_kg=vehicle.payload_range_kg,
+        front_share_seen_pct=vehicle.front_share_range_pct,
+        speed_seen_mps=(FIRST_DRIVE.speed_mps, FIRST_DRIVE.speed_mps),
+    )
+
+
 class _Planner:
     """A design together with how its spread is stated."""
 
-    def __init__(
-        self,
-        vehicle: Vehicle,
-        theta: F64,
-        drive: Drive,
-        inflation: tuple[float, float] = (UNTESTED_INFLATION, UNTESTED_INFLATION),
-    ) -> None:
+    def __init__(self, vehicle: Vehicle, theta: F64, drive: Drive, beside: F64) -> None:
+        """``beside`` (2,) are the variances of payload (kg) and front share (%) that no known load narrows."""
         self._loads = drivable_loads(vehicle)
         self._targets = weighed_loads(vehicle)
         self._design = Design(vehicle, theta, drive, self._targets)
-        self._inflation = inflation
+        self._beside = beside
 
     def advice(self, covariance: F64, driven: Loads, n_runs: int) -> tuple[Advice, ...]:
         """The most useful run, then the most useful after that one, and so on."""
@@ -186,7 +224,7 @@ class _Planner:
         """As the service would state it."""
         spread = self._design.spread(covariance)
         return Expected(
-            payload_std_kg=self._inflation[0] * spread.payload_std_kg,
-            front_share_std_pct=self._inflation[1] * spread.front_share_std_pct,
+            payload_std_kg=math.sqrt(spread.payload_std_kg**2 + float(self._beside[0])),
+            front_share_std_pct=math.sqrt(spread.front_share_std_pct**2 + float(self._beside[1])),
             reach_share=share_within_reach(self._targets, (*driven, *new)),
         )

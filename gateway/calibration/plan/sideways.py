@@ -7,7 +7,7 @@ from typing import Final
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads
 from gateway.core.vehicle import Vehicle, cg_left_m
-from gateway.core.weights import Sideways, weights_of
+from gateway.core.weights import weights_of
 from gateway.estimate import Quantity
 
 LEAST_CG_LEFT_M: Final = 0.03  # of the sprung mass: what a load somewhere near the middle may do by chance
@@ -49,6 +49,6 @@ def _has_sideways(runs: Sequence[KnownRun], vehicle: Vehicle) -> bool:
 def _is_allowed(vehicle: Vehicle, placed: SidewaysLoad) -> bool:
     """Limits of single wheels; those of axles and gross weight hold already."""
     at_m = cg_left_m(vehicle, placed.load.payload_kg, placed.payload_left_m)
-    beside = Sideways(cg_left=Quantity(at_m, 0.0), roll_share_front=EVEN)
-    payload, share = Quantity(placed.load.payload_kg, 0.0), Quantity(placed.load.front_share_pct, 0.0)
-    return not any(weight.is_over_limit for _, weight in weights_of(vehicle, payload, share, sideways=beside).items())
+    load = exactly(placed.load.payload_kg, placed.load.front_share_pct, at_m)
+    weights = weights_of(vehicle, load, Quantity(EVEN, 0.0))
+    return not any(weight.is_over_limit for _, weight in weights.items())

@@ -16,8 +16,7 @@ def verdicts_of(
 ) -> Iterator[Says]:
     """Of a whole batch that counted, and of the load epoch it belongs to (core.fusion).
 
-    The load's weights follow from what its batches found together as the batch's own follow from its numbers; errors
-    are taken to be as correlated as the batch's.
+    The load's weights follow from the posterior of its batches as the batch's own follow from its posterior.
     """
     load, n_batches = as_of_load(estimate), 1 if estimate.epoch is None else estimate.epoch.n_batches
     weights = weighed(load, vehicle, unsprung).weights if vehicle else estimate.weights
@@ -41,9 +40,9 @@ def verdicts_of(
 def as_of_load(estimate: Estimate) -> Estimate:
     """The estimate with what all batches of its load found together, where that is known."""
     epoch = estimate.epoch
-    if epoch is None:
+    if epoch is None or epoch.posterior is None:
         return estimate
-    return replace(estimate, payload=epoch.payload, front_share=epoch.front_share, cg_left=epoch.cg_left)
+    return estimate.answered(epoch.posterior)
 
 
 def beyond_probability(share: Quantity, most_pct: float) -> float:

@@ -20,14 +20,15 @@ class CrossSpectrumCalibration:
     """What known-load drives taught, as plain numbers and arrays.
 
     parameters (n,) and covariance (n, n) follow ``names`` (parameters.PARAMETERS, then ROLL_PARAMETERS where a roll
-    rate was read; logarithms where these are positive quantities). The inflations widen standard deviations, the first
-    two by so much more per_reach as a load lies beyond ``known_loads`` (reach.beyond); misfit_limit is the largest
-    likelihood ratio per degree of freedom that is still believed; the two amplitudes are root mean squares within the
-    band. usual_log_amplitude: see model.reading. gravity_mps2 is what the accelerometer read on average; None where
-    the file does not say. The two scores are the largest that are believed of a sensor that nobody touched
-    (sensor_change). As stated, the sensor sits sensor_left_m left of the centre line, and what is carried usually
-    reaches payload_length_m along the floor. least_slack: see parameters.Ground. usual_stroke_mps: see
-    model.reading; None too where no roll rate was read.
+    rate was read; logarithms where these are positive quantities). directions (n, k) is the part of a root of the
+    covariance that moves loads: independent causes of unit variance. model_std is the error of the model itself, of
+    payload (kg), front share (%) and lateral place (m), as runs left out of the fit showed it; the first two grow by
+    model_per_reach as a load lies beyond ``known_loads`` (reach.beyond). misfit_limit is the largest likelihood ratio
+    per degree of freedom that is still believed; the two amplitudes are root mean squares within the band.
+    usual_log_amplitude: see model.reading. gravity_mps2 is what the accelerometer read on average; None where the file
+    does not say. The two scores are the largest that are believed of a sensor that nobody touched (sensor_change). As
+    stated, the sensor sits sensor_left_m left of the centre line. least_slack: see parameters.Ground.
+    usual_stroke_mps: see model.reading; None too where no roll rate was read.
     """
 
     empty_mass_kg: float
@@ -38,8 +39,8 @@ class CrossSpectrumCalibration:
     names: tuple[str, ...]
     parameters: F64
     covariance: F64
-    payload_inflation: float
-    front_share_inflation: float
+    directions: F64
+    model_std: tuple[float, float, float]
     misfit_limit: float
     acceleration_rms_mps2: float
     pitch_rate_rms_radps: float
@@ -48,17 +49,14 @@ class CrossSpectrumCalibration:
     speed_seen_mps: tuple[float, float]
     warnings: tuple[str, ...] = ()
     known_loads: tuple[Load, ...] = ()
-    payload_inflation_per_reach: float = 0.0
-    front_share_inflation_per_reach: float = 0.0
+    model_per_reach: tuple[float, float] = (0.0, 0.0)
     usual_log_amplitude: float | None = None
     gravity_mps2: float | None = None
     most_position_score: float = SCORE
     most_noise_score: float = SCORE
     track_width_m: float | None = None
-    cg_left_inflation: float = 1.0
     sensor_left_m: float = 0.0
     sensor_left_std_m: float = UNKNOWN_OFFSET_STD_M
-    payload_length_m: float | None = None
     least_slack: float = LEAST_SLACK
     usual_stroke_mps: tuple[float, float] | None = None
 
@@ -67,6 +65,12 @@ class CrossSpectrumCalibration:
         """The vehicle as stated, in the core's terms."""
         share = self.empty_front_share_pct / 100.0
         return Ground(self.empty_mass_kg, share, self.wheelbase_m, self.track_width_m, self.least_slack)
+
+    @property
+    def known_shape(self) -> tuple[float, float]:
+        """Squared radius of gyration of the known loads in pitch (m2), and the standard deviation of its logarithm."""
+        entry = INDEX["payload_gyration_m2"]
+        return float(np.exp(self.parameters[entry])), float(np.sqrt(self.covariance[entry, entry]))
 
     @property
     def unsprung(self) -> Unsprung:

@@ -92,13 +92,37 @@ def tension_of(off: F64) -> float:
     return float(off @ _NATURAL_PRECISION @ off)
 
 
-def drift_covariance(found: F64, moves: F64) -> F64:
-    """What nature adds to the covariance ``found`` (k, k) of the drifting parameters and the load: (k, k) again.
+def _factor(covariance: F64) -> F64:
+    """(k, r) whose columns are independent causes of unit variance, of a positive semi-definite (k, k)."""
+    values, vectors = np.linalg.eigh(covariance)
+    kept = values > 1e-12 * values.max()
+    factor: F64 = vectors[:, kept] * np.sqrt(values[kept])
+    return factor
 
-    ``moves`` (k, s) is by how much these move with each of the STEADY parameters. A parameter that drifts
-    further than the search believed pulls the answer by the share that the prior holds of it: found times precision
-    (S. F. Schmidt's consider covariance, Adv. Control Syst. 3, 1966).
+
+_IS_PACKING: Final = np.array([name.startswith("payload_") for name in DRIFT_STD])
+_BEYOND_BELIEVED: Final = _NATURE_OF_DRIFTING - _BELIEVED
+_DAY_OF_STEADY: Final = _factor(_NATURE_OF_STEADY)
+_DAY_OF_DRIFTING: Final = _factor(np.where(np.outer(~_IS_PACKING, ~_IS_PACKING), _BEYOND_BELIEVED, 0.0))
+_PACKING_OF_DRIFTING: Final = _factor(np.where(np.outer(_IS_PACKING, _IS_PACKING), _BEYOND_BELIEVED, 0.0))
+
+
+def day_columns(found: F64, moves: F64) -> F64:
+    """(6, k) by how much one day's springs, tyres and dampers move the drifting parameters and the load.
+
+    ``found`` (k, k) is the covariance of these in the search, ``moves`` (k, s) by how much they move with each of the
+    STEADY parameters. A parameter that drifts further than the search believed pulls the answer by the share that the
+    prior holds of it: found times precision (S. F. Schmidt's consider covariance, Adv. Control Syst. 3, 1966).
     """
-    pulls = found[:, : len(DRIFTING)] @ DRIFT_PRECISION
-    added: F64 = moves @ _NATURE_OF_STEADY @ moves.T + pulls @ (_NATURE_OF_DRIFTING - _BELIEVED) @ pulls.T
-    return added
+    return np.concatenate([(moves @ _DAY_OF_STEADY).T, (_pulls(found) @ _DAY_OF_DRIFTING).T])
+
+
+def packing_columns(found: F64) -> F64:
+    """(1, k) likewise of how firmly this load stands on its floor."""
+    columns: F64 = (_pulls(found) @ _PACKING_OF_DRIFTING).T
+    return columns
+
+
+def _pulls(found: F64) -> F64:
+    pulls: F64 = found[:, : len(DRIFTING)] @ DRIFT_PRECISION
+    return pulls

@@ -1,21 +1,21 @@
 """The cross-spectral estimator: payload and front share from both sensors together, phase included.
 
-    by_cross_spectrum(batch, calibration, blank) -> Estimate
+    by_cross_spectrum(batch, calibration, prior, blank) -> Estimate
 
-Both sensors ride on one vehicle over one road, so their ratio at each frequency and speed does not
-depend on the road. The half-car calibrated by known-load drives is held against the batch's
-cross-spectra; payload and share are what fits best, together with small changes of dampers and of
-the wheelbase delay, and with how firmly the payload stands on the floor. The posterior gives the
-interval, widened by what left-out runs showed in calibration and by how vehicles change from day to
-day. docs/method.md has the derivation.
+Both sensors ride on one vehicle over one road, so their ratio at each frequency and speed does not depend on the road.
+The half-car calibrated by known-load drives is held against the batch's cross-spectra; payload and share are what fits
+best, together with small changes of dampers and of the wheelbase delay, and with how firmly the payload stands on the
+floor. Several shapes of the load are tried. The posterior carries its error by its sources (gateway.posterior).
+docs/method.md has the derivation.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from gateway.core.cargo import ShapePrior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import MOST_TENSION
 from gateway.core.cross_spectrum.lateral.told import with_place
@@ -23,9 +23,10 @@ from gateway.core.cross_spectrum.located import Located, locate
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.core.cross_spectrum.reach import beyond
-from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_std
-from gateway.core.fusion import CG_LEFT_OWN_STD_M, FRONT_SHARE_OWN_STD_PCT, PAYLOAD_OWN_STD_KG
-from gateway.estimate import Estimate, Quantity
+from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_of
+from gateway.core.cross_spectrum.shape import EVIDENCE
+from gateway.estimate import Estimate
+from gateway.posterior import PAYLOAD, Posterior, Source
 from gateway.records import F64, Batch, Why
 
 COHERENCE_BAND_HZ: Final = (1.4, 4.5)
@@ -39,20 +40,54 @@ MOST_LAG_CHANGE_S: Final = 0.002  # beyond it, roll is taken out once more, at t
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
 
 
-def by_cross_spectrum(batch: Batch, calibration: CrossSpectrumCalibration, blank: Estimate) -> Estimate:
-    """``blank`` with payload, front share and diagnostics of the batch, or with the reason why not."""
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """What a batch's spectra show: the most probable load, how far it lies beyond the known ones (reach), how much more
+    the model errs away from the calibration's speeds and roads (unseen, 1 or more), and all of it as a posterior.
+    """
+
+    spectra: CrossSpectra
+    located: Located
+    reach: float
+    unseen: float
+    posterior: Posterior
+
+
+def by_cross_spectrum(
+    batch: Batch, calibration: CrossSpectrumCalibration, prior: ShapePrior | None, blank: Estimate
+) -> Estimate:
+    """``blank`` with payload, front share and diagnostics of the batch, or with the reason why not.
+
+    ``prior`` is what is believed of a load's shape; None: it is that of the known loads.
+    """
+    found = weigh(batch, calibration, prior)
+    if isinstance(found, Why):
+        return replace(blank, rejected=(found,))
+    diagnosed = replace(blank, diagnostics=_diagnostics(found, calibration))
+    why = disbelieved(found, calibration)
+    if why is not None:
+        return replace(diagnosed, rejected=(why,))
+    answer = diagnosed.answered(found.posterior)
+    located = found.located
+    return with_place(answer, located.point, calibration) if located.sideways else answer
+
+
+def weigh(batch: Batch, calibration: CrossSpectrumCalibration, prior: ShapePrior | None) -> Weighed | Why:
+    """The most probable load of a batch, however badly it fits, or why nothing could be held against the model."""
     spectra = cross_spectra_of([batch], calibration.reading)
     why = _unfit(batch, spectra, calibration) or _off_its_speeds(batch, calibration) or _unlike(batch, calibration)
     if spectra is None or why is not None:
-        return replace(blank, rejected=(why or Why.TOO_SHORT,))
-    located = locate(spectra, calibration)
+        return why or Why.TOO_SHORT
+    unseen = _unseen(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
+    evidence = EVIDENCE / unseen**2
+    located = locate(spectra, calibration, prior, evidence)
     lag_s = float(located.point.theta[INDEX["gyro_lag_s"]])
     if located.sideways is not None and abs(lag_s - calibration.parameters[INDEX["gyro_lag_s"]]) > MOST_LAG_CHANGE_S:
         spectra = cross_spectra_of([batch], calibration.reading.with_gyro_late_by(lag_s)) or spectra
-        located = locate(spectra, calibration)
-    inflation = _unseen_inflation(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
-    by_gain = located.gain_moves * gain_std(batch.gravity_mps2, calibration.gravity_mps2)
-    return _judged(blank, spectra, located, inflation, by_gain, calibration)
+        located = locate(spectra, calibration, prior, evidence)
+    reach = beyond(located.point.load, calibration.known_loads, calibration.empty_mass_kg)
+    gain = gain_of(batch.gravity_mps2, calibration.gravity_mps2)
+    return Weighed(spectra, located, reach, unseen, posterior_of(located, calibration, unseen, reach, gain))
 
 
 def _unfit(batch: Batch, spectra: CrossSpectra | None, calibration: CrossSpectrumCalibration) -> Why | None:
@@ -79,87 +114,116 @@ def _off_its_speeds(batch: Batch, calibration: CrossSpectrumCalibration) -> Why 
 
 
 def _unlike(batch: Batch, calibration: CrossSpectrumCalibration) -> Why | None:
-    """Gravity tells a gain that changed, or an axis that was tilted."""
+    """Gravity shows a gain that changed, or an axis that was tilted."""
     usual_mps2 = calibration.gravity_mps2
     if usual_mps2 is None or abs(batch.gravity_mps2 - usual_mps2) <= MOST_GRAVITY_CHANGE_MPS2:
         return None
     return Why.SENSOR_CHANGED
 
 
-def _judged(
-    blank: Estimate,
-    spectra: CrossSpectra,
+def posterior_of(
     located: Located,
-    unseen: float,
-    by_gain: F64,
     calibration: CrossSpectrumCalibration,
-) -> Estimate:
-    """``unseen`` widens what is away from the calibration's speeds and roads; ``by_gain`` (2,) is of the sensor."""
+    unseen: float,
+    reach: float,
+    gain: tuple[float, float],
+) -> Posterior:
+    """The load in kg and percent, with the lateral place where roll shows it, and every error by its source.
+
+    ``gain`` is the logarithm of the accelerometer's gain and its standard deviation.
+    """
+    side, outward = located.sideways, _outward(located)
     load = located.point.load
-    reach = beyond(load, calibration.known_loads, calibration.empty_mass_kg)
-    of_payload = calibration.payload_inflation * (1.0 + calibration.payload_inflation_per_reach * reach)
-    of_share = calibration.front_share_inflation * (1.0 + calibration.front_share_inflation_per_reach * reach)
-    wider = np.array([of_payload, of_share])
-    covariance = wider[:, None] * (unseen**2 * located.load_covariance + located.rival_covariance) * wider
-    not_inflated = located.drift_covariance + np.outer(by_gain, by_gain)
-    covariance += not_inflated
-    payload_std_kg, share_std = (float(std) for std in np.sqrt(np.diag(covariance)))
-    own_payload_std_kg, own_share_std = (float(std) for std in np.sqrt(np.diag(located.own_covariance)))
-    diagnostics = {
-        "reach": reach,
+    mean = np.array([load.payload_kg, load.front_share_pct, *([side.cg_left_m] if side else [])])
+    mean -= outward @ located.gain_moves * gain[0]
+    own = outward @ located.own @ outward.T
+    moves = moves_of(located, len(calibration.parameters))
+    if side is not None:
+        own[2, 2] += side.own_variance
+    by_calibration = moves @ calibration.directions
+    left_over = moves @ calibration.covariance @ moves.T - by_calibration @ by_calibration.T
+    left_over += outward @ located.rival_covariance @ outward.T
+    grown = np.array([*(1.0 + per_reach * reach for per_reach in calibration.model_per_reach), 1.0])
+    of_model = np.diag((np.array(calibration.model_std) * unseen * grown)[: len(mean)])
+    return Posterior(
+        mean=mean,
+        own=own,
+        sources={
+            Source.CALIBRATION: by_calibration.T,
+            **{name: columns @ outward.T for name, columns in located.columns.items()},
+            Source.SENSOR: gain[1] * (outward @ located.gain_moves)[None],
+            Source.MODEL: np.vstack([of_model, _root(left_over)]),
+        },
+        tails=located.tails,
+    )
+
+
+def _outward(located: Located) -> F64:
+    """(d, 2) payload in kg, front share in percent and lateral place by payload and share as the model has them."""
+    outward = np.diag([1.0, 100.0])
+    return outward if located.sideways is None else np.vstack([outward, located.sideways.moves_with_load])
+
+
+def moves_of(located: Located, n_parameters: int) -> F64:
+    """(d, n) by how much the answer (kg, %, m) moves with each parameter of a calibration."""
+    outward = _outward(located)
+    moves = np.zeros((len(outward), n_parameters))
+    moves[:, : located.moves.shape[1]] = outward @ located.moves
+    if located.sideways is not None:
+        moves[2] += located.sideways.moves
+    return moves
+
+
+def _root(covariance: F64) -> F64:
+    """(d, d) columns whose squares add up to ``covariance`` (d, d), but for what rounding left below zero."""
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    root: F64 = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    return root
+
+
+def _diagnostics(found: Weighed, calibration: CrossSpectrumCalibration) -> dict[str, float]:
+    spectra, located, theta = found.spectra, found.located, found.located.point.theta
+    return {
+        "reach": found.reach,
         "misfit": located.misfit,
         "n_segments": float(spectra.n_total),
         "amplitude_ratio": math.exp(spectra.log_amplitude_mean),
         "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
         "damper_rear_ratio": _ratio(located, calibration, "damper_rear_nspm"),
-        "delay_scale": float(located.point.theta[INDEX["delay_scale"]]),
-        "payload_drift_std_kg": math.sqrt(not_inflated[0, 0]),
-        "front_share_drift_std_pct": 100.0 * math.sqrt(not_inflated[1, 1]),
-        PAYLOAD_OWN_STD_KG: own_payload_std_kg,
-        FRONT_SHARE_OWN_STD_PCT: 100.0 * own_share_std,
+        "delay_scale": float(theta[INDEX["delay_scale"]]),
         "tension": located.tension,
         "sensor_position_score": located.scores.position,
         "sensor_noise_score": located.scores.noise,
-        "payload_mode_hz": math.exp(located.point.theta[INDEX["payload_mode_hz"]]),
-        "payload_damping_ratio": math.exp(located.point.theta[INDEX["payload_damping_ratio"]]),
+        "payload_gyration_m2": math.exp(theta[INDEX["payload_gyration_m2"]]),
+        "payload_mode_hz": math.exp(theta[INDEX["payload_mode_hz"]]),
+        "payload_damping_ratio": math.exp(theta[INDEX["payload_damping_ratio"]]),
         "delay_s": spectra.delay_mean_s,
         "delay_std_s": spectra.delay_std_s,
     }
-    if located.sideways is not None:
-        diagnostics[CG_LEFT_OWN_STD_M] = math.sqrt(located.sideways.own_variance)
-    why = _disbelieved(located, payload_std_kg, reach, calibration)
-    if why is not None:
-        return replace(blank, rejected=(why,), diagnostics=diagnostics)
-    answer = replace(
-        blank,
-        payload=Quantity.normal(load.payload_kg, payload_std_kg),
-        front_share=Quantity.normal(load.front_share_pct, 100.0 * share_std),
-        correlation=float(covariance[0, 1]) / (payload_std_kg * share_std),
-        diagnostics=diagnostics,
-    )
-    return with_place(answer, located.point, located.sideways, covariance, calibration) if located.sideways else answer
 
 
-def _disbelieved(
-    located: Located, payload_std_kg: float, reach: float, calibration: CrossSpectrumCalibration
-) -> Why | None:
-    """Beyond the known loads the half-car itself errs: what looks like another sensor there is no proof of one."""
+def disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why | None:
+    """Why an answer is not believed.
+
+    Beyond the known loads the half-car itself errs: what looks like another sensor there is no proof of one.
+    """
+    located = found.located
     if located.is_reversed:
         return Why.WRONG_SIGN
     if not located.misfit <= calibration.misfit_limit:
         return Why.MODEL_MISFIT
     is_moved = located.sideways is not None and located.sideways.is_mount_changed
     if is_moved or located.scores.is_changed(calibration):
-        return Why.SENSOR_CHANGED if is_moved or reach == 0.0 else Why.MODEL_MISFIT
+        return Why.SENSOR_CHANGED if is_moved or found.reach == 0.0 else Why.MODEL_MISFIT
     if located.tension > MOST_TENSION:
         return Why.MODEL_MISFIT
-    if not payload_std_kg <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:
+    if not found.posterior.std(PAYLOAD) <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:
         return Why.AMBIGUOUS if located.is_ambiguous else Why.TOO_UNCERTAIN
     return None
 
 
-def _unseen_inflation(speed_mps: float, shaken_mps2: float, calibration: CrossSpectrumCalibration) -> float:
-    """How much wider an interval gets away from what calibration saw; 1 within its speeds on roads as rough.
+def _unseen(speed_mps: float, shaken_mps2: float, calibration: CrossSpectrumCalibration) -> float:
+    """How much more the model errs away from what calibration saw; 1 within its speeds on roads as rough.
 
     ``shaken_mps2`` is the batch's vertical acceleration (root mean square within the band).
     """

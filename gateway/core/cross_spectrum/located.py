@@ -1,15 +1,23 @@
-"""The load that a batch's spectra tell: the best point of the posterior, and what is uncertain about it."""
+"""The load that a batch's spectra show: the best point of the posterior, and by how much each cause moves it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
+from gateway.core.cargo import ShapePrior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY, drift_covariance, tension_of
+from gateway.core.cross_spectrum.drift import (
+    DRIFT_PRECISION,
+    DRIFTING,
+    STEADY,
+    day_columns,
+    packing_columns,
+    tension_of,
+)
 from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ, Sideways, sought_sideways, told_sideways
-from gateway.core.cross_spectrum.lateral.unseen import sideways_covariance
+from gateway.core.cross_spectrum.lateral.unseen import sideways_columns
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Curvature, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll, level, upright
@@ -17,7 +25,8 @@ from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.cross_spectrum.packing import Packing, packings
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
-from gateway.core.cross_spectrum.spread import as_carried, spread_covariance
+from gateway.core.cross_spectrum.shape import EVIDENCE, Shaped, shaped
+from gateway.posterior import NORMAL_TAILS, Source
 from gateway.records import F64
 
 START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
@@ -25,35 +34,37 @@ LEAST_START_SHARE: Final = 0.33
 STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rate bends
 COARSE: Final = 0.5  # of evidence, which tells peaks apart
 FINE: Final = 1e-3
+OF_SHAPES: Final = 0.02  # of evidence, likewise of shapes
 MOST_RIVALRY: Final = 1.0
 """Of all other variance: where peaks that compete are most of what is uncertain, that is why."""
 START_POSITION_SHARES: Final = (0.25, 0.5, 0.9)  # of the wheelbase
 
-_GYRATION: Final = STEADY.index(INDEX["payload_gyration_m2"])
+_GYRATION: Final = INDEX["payload_gyration_m2"]
 
 
 @dataclass(frozen=True, slots=True)
 class Located:
-    """The best point of a batch with its covariance of (payload in kg, front share 0..1), not yet inflated.
+    """The most probable load of a batch, and what is uncertain about it; a load is payload (kg) and front share (0..1).
 
-    own_covariance is the part of it that no other batch shares: what its length and road leave. drift_covariance is
-    what a change of the vehicle since its calibration adds, gain_moves (2,) by how much the load moves with the
-    accelerometer's gain: no inflation is due on these, but on rival_covariance, what peaks add that compete. Without a
-    roll rate drift_covariance holds too what a load does that lies sideways. tension is how far what drifts lies off
+    own (2, 2) is the covariance that no other batch shares: what its length and road leave. moves (2, p) is by how much
+    the load moves with each of the half-car's parameters, columns (k, 2) by how much with a standard deviation of the
+    causes of each source, gain_moves (2,) with the logarithm of the accelerometer's gain. rival_covariance is what
+    peaks add that compete. tails are those of the error from the load's shape. tension is how far what drifts lies off
     its calibration (drift.tension_of). sideways is None without a roll rate.
     """
 
     point: Point
-    load_covariance: F64
-    own_covariance: F64
-    drift_covariance: F64
+    own: F64
+    moves: F64
+    columns: Mapping[Source, F64]
+    tails: tuple[float, float]
     gain_moves: F64
+    rival_covariance: F64
     misfit: float
     tension: float
     scores: SensorScores
     is_reversed: bool
     is_ambiguous: bool
-    rival_covariance: F64
     sideways: Sideways | None = None
 
 
@@ -66,25 +77,32 @@ class _Peak:
     rivals: F64 = field(default_factory=lambda: np.zeros((2, 2)))  # what others add to its covariance
 
 
-def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Located:
+def locate(
+    spectra: CrossSpectra,
+    calibration: CrossSpectrumCalibration,
+    prior: ShapePrior | None = None,
+    evidence: float = EVIDENCE,
+) -> Located:
     """The most probable load of ``spectra`` under a flat prior on payload and share.
 
-    How much each axle moves goes with the load, so that it is told anew at each answer, and the load sought on from
-    there. With a roll rate the load is first sought as if it lay on the centre line; then roll tells where it lies, and
-    the load is sought once more from there. Where the roll rate is lost, the sensor reads roll all the same: it is
-    taken to sit where calibration has it, with the load on the centre line. How long it lies is never sought (spread).
+    ``prior`` is what is believed of its shape and ``evidence`` how much the batch counts against it; without a prior
+    the load has the shape of the known ones. How much each axle moves depends on the load: we recompute the stroke
+    speeds at each solution and continue the search from it. With a roll rate the load is first sought as if it lay on
+    the centre line; then roll shows where it lies, and the search continues from there. Where the roll rate is lost,
+    the sensor still reads roll: it is taken to sit where calibration has it, with the load on the centre line.
     """
-    calibration = as_carried(calibration)
     if spectra.roll is None or not has_roll(calibration.parameters):
         whittle, peak = _best(spectra.without_roll, calibration)
-        located = _told(whittle, peak, calibration, 0.0)
+        shape = _shaped(whittle, peak, calibration, 0.0, prior, evidence)
+        located = _located(whittle, peak, shape, calibration, 0.0)
 
         def weigh(other: CrossSpectra) -> F64:
             sought = _sought(Whittle(other, calibration.ground), peak.found.x, peak.packing, calibration, 0.0, COARSE)
             return sought.x[-2:]
 
-        unseen = sideways_covariance(whittle.spectra, located.point, calibration, weigh)
-        return replace(located, drift_covariance=located.drift_covariance + unseen)
+        as_known = _point(peak.found.x, calibration, 0.0)
+        unseen = sideways_columns(whittle.spectra, as_known, calibration, weigh)
+        return replace(located, columns={**located.columns, Source.SIDEWAYS: unseen})
     placed = replace(calibration, parameters=level(calibration.parameters))
     _, peak = _best(spectra.without_roll, replace(calibration, parameters=upright(calibration.parameters)))
     moving = _moving(spectra, peak.found.x, placed)
@@ -92,39 +110,109 @@ def locate(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> Loca
     rolling = Whittle(moving.within(ROLL_BAND_HZ), calibration.ground)
     place = sought_sideways(rolling, _point(peak.found.x, placed, 0.0))
     peak = replace(peak, found=_sought(whittle, peak.found.x, peak.packing, placed, place.cg_left_m))
-    place = sought_sideways(rolling, _point(peak.found.x, placed, place.cg_left_m))
-    located = _told(whittle, peak, placed, place.cg_left_m)
-    return replace(located, sideways=told_sideways(rolling, place, located.point, placed.covariance))
+    shape = _shaped(whittle, peak, placed, place.cg_left_m, prior, evidence)
+    placed = _as_shaped(placed, shape)
+    x = peak.found.x if shape is None else shape.x
+    place = sought_sideways(rolling, _point(x, placed, place.cg_left_m))
+    located = _located(whittle, peak, shape, placed, place.cg_left_m)
+    return replace(located, sideways=told_sideways(rolling, place, located.point))
 
 
-def _told(whittle: Whittle, peak: _Peak, calibration: CrossSpectrumCalibration, cg_left_m: float) -> Located:
-    found = peak.found
-    point = _point(found.x, calibration, cg_left_m)
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """What holds at the answer of a search: the curvature of all parameters and the load, the posterior covariance of
+    what was sought (FITTED: drifting parameters and load), by how much it moves with each of the STEADY parameters
+    (steady), and by how much the load alone moves with all of them (moves, (2, p)).
+    """
+
+    whole: Curvature
+    covariance: F64
+    steady: F64
+    moves: F64
+
+
+def answer_at(whittle: Whittle, point: Point) -> Answer:
+    """The fitted x moves by -C I_xt for each of the other parameters t, C being its covariance."""
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
-    # the fitted x moves by -C I_xt for each of the other parameters t
-    moves = -found.covariance @ whole.information[np.ix_(FITTED, STEADY)]
+    covariance = np.linalg.inv(whole.information[np.ix_(FITTED, FITTED)] + np.pad(DRIFT_PRECISION, (0, 2)))
+    steady = -covariance @ whole.information[np.ix_(FITTED, STEADY)]
+    moves = np.zeros((2, len(PARAMETERS)))
+    moves[:, STEADY] = steady[-2:]
+    return Answer(whole, covariance, steady, moves)
+
+
+def _shaped(
+    whittle: Whittle,
+    peak: _Peak,
+    calibration: CrossSpectrumCalibration,
+    cg_left_m: float,
+    prior: ShapePrior | None,
+    evidence: float,
+) -> Shaped | None:
+    """The load under every shape that it may have; None where that is known."""
+    if prior is None:
+        return None
+
+    def sought(log_s: float, start: F64) -> Found:
+        return _sought(whittle, start, peak.packing, _with_gyration(calibration, log_s), cg_left_m, OF_SHAPES)
+
+    here = float(calibration.parameters[_GYRATION]), peak.found
+    return shaped(prior, calibration.wheelbase_m, here, sought, evidence)
+
+
+def _with_gyration(calibration: CrossSpectrumCalibration, log_s: float) -> CrossSpectrumCalibration:
+    parameters = calibration.parameters.copy()
+    parameters[_GYRATION] = log_s
+    return replace(calibration, parameters=parameters)
+
+
+def _as_shaped(calibration: CrossSpectrumCalibration, shape: Shaped | None) -> CrossSpectrumCalibration:
+    return calibration if shape is None else _with_gyration(calibration, shape.log_s)
+
+
+def _located(
+    whittle: Whittle, peak: _Peak, shape: Shaped | None, calibration: CrossSpectrumCalibration, cg_left_m: float
+) -> Located:
+    calibration = _as_shaped(calibration, shape)
+    x = peak.found.x if shape is None else np.r_[shape.x[:-2], shape.load]
+    point = _point(x, calibration, cg_left_m)
+    at = answer_at(whittle, point)
+    whole, found, moves = at.whole, at.covariance, at.moves
+    columns = {Source.DAY: day_columns(found, at.steady)[:, -2:], Source.LOAD_LENGTH: packing_columns(found)[:, -2:]}
+    if shape is not None:
+        moves[:, _GYRATION] = 0.0  # of this load, not of the known ones
+        columns |= _of_shape(shape, columns[Source.LOAD_LENGTH])
     misfit = whittle.misfit(point)
     parameters = calibration.parameters.copy()
     parameters[DRIFTING] = peak.packing.drifting
-    expected = replace(calibration, parameters=parameters)
-    load_covariance = _load_covariance(found, moves, calibration)
-    drifted = drift_covariance(found.covariance, moves)[-2:, -2:]
-    drifted += spread_covariance(moves[-2:, _GYRATION], point.payload_kg, calibration)
-    covariance = load_covariance + drifted
+    own = found[-2:, -2:]
+    rivalled = own + sum((each.T @ each for each in columns.values()), np.zeros((2, 2)))
     return Located(
         point=point,
-        load_covariance=load_covariance,
-        own_covariance=found.covariance[-2:, -2:],
-        drift_covariance=drifted,
-        gain_moves=gain_moves(whole, whittle, point, found.covariance)[-2:],
-        misfit=misfit,
-        tension=min(tension_of(found.x[:-2] - one.drifting) for one in packings(calibration.parameters)),
-        scores=scores_of(whole, point, found.covariance, expected),
-        is_reversed=_is_reversed(whittle, point, misfit, calibration),
-        is_ambiguous=bool(np.any(np.diag(peak.rivals) > MOST_RIVALRY * np.diag(covariance))),
+        own=own,
+        moves=moves,
+        columns=columns,
+        tails=NORMAL_TAILS if shape is None else shape.tails,
+        gain_moves=gain_moves(whole, whittle, point, found)[-2:],
         rival_covariance=peak.rivals,
+        misfit=misfit,
+        tension=min(tension_of(x[:-2] - one.drifting) for one in packings(calibration.parameters)),
+        scores=scores_of(whole, point, found, replace(calibration, parameters=parameters)),
+        is_reversed=_is_reversed(whittle, point, misfit, calibration),
+        is_ambiguous=bool(np.any(np.diag(peak.rivals) > MOST_RIVALRY * np.diag(rivalled))),
     )
+
+
+def _of_shape(shape: Shaped, packing: F64) -> dict[Source, F64]:
+    """Columns of what the load's shape leaves open: what this vehicle's loads have in common, and this load's own.
+
+    Errors of a Gaussian posterior are (1 - K) times those of its prior, K being its gain, and what the evidence adds;
+    of the former alone the part of a habit is common.
+    """
+    goods = shape.column * np.sqrt(shape.goods_part)
+    own = shape.column * np.sqrt(1.0 - shape.goods_part)
+    return {Source.GOODS: goods[None], Source.LOAD_LENGTH: np.vstack([own, packing])}
 
 
 def _is_reversed(whittle: Whittle, point: Point, misfit: float, calibration: CrossSpectrumCalibration) -> bool:
@@ -214,9 +302,3 @@ def _starting_loads(calibration: CrossSpectrumCalibration) -> list[tuple[float, 
             front_kg = share * empty_kg + (1.0 - position) * payload_kg
             loads.append((payload_kg, front_kg / (empty_kg + payload_kg)))
     return loads
-
-
-def _load_covariance(found: Found, moves: F64, calibration: CrossSpectrumCalibration) -> F64:
-    """Covariance (2, 2) of payload and share: the batch's own, and what calibration left open."""
-    covariance = found.covariance + moves @ calibration.covariance[np.ix_(STEADY, STEADY)] @ moves.T
-    return covariance[-2:, -2:]

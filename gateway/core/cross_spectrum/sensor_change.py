@@ -32,8 +32,11 @@ def weighed(point: Point) -> list[int]:
 MOST_GRAVITY_CHANGE_MPS2: Final = 0.35
 """Offsets of such sensors move by 0.1 m/s2 (standard deviation) from day to day; so much is a gain off by 3.6 %."""
 
-GAIN_STD: Final = 0.007
-"""Of the ratio of both sensors' gains over 30 K: 0.02 % per kelvin each (data sheets of MPU-6050, BMI160)."""
+TEMPERATURE_STD_K: Final = 15.0  # of the sensor between its calibration and any other day of the year; chosen
+GAIN_PER_K: Final = 2e-4  # of each sensor (data sheets of MPU-6050, BMI160)
+OFFSET_PER_K_MPS2: Final = 0.01  # 1 mg (likewise)
+GAIN_STD: Final = TEMPERATURE_STD_K * GAIN_PER_K * 2.0**0.5
+"""Of the logarithm of the ratio of both sensors' gains."""
 
 STEP: Final = 1e-3
 
@@ -76,8 +79,14 @@ def gain_moves(whole: Curvature, whittle: Whittle, point: Point, covariance: F64
     return moves
 
 
-def gain_std(gravity_mps2: float, calibrated_mps2: float | None) -> float:
-    """Standard deviation of the logarithm of the gain: data sheets, and what gravity shows to have changed at most."""
+def gain_of(gravity_mps2: float, calibrated_mps2: float | None) -> tuple[float, float]:
+    """Logarithm of the accelerometer's gain over that in calibration, and its standard deviation.
+
+    Gravity shows the gain and the offset together; the data sheets say how much of a change is the gain's.
+    """
     if calibrated_mps2 is None:
-        return GAIN_STD
-    return float(np.hypot(GAIN_STD, np.log(gravity_mps2 / calibrated_mps2)))
+        return 0.0, GAIN_STD
+    of_gain, of_offset = GAIN_PER_K, OFFSET_PER_K_MPS2 / calibrated_mps2
+    believed = of_gain**2 / (of_gain**2 + of_offset**2)
+    log_gain = float(np.log(gravity_mps2 / calibrated_mps2))
+    return believed * log_gain, float(np.sqrt(GAIN_STD**2 - believed * (TEMPERATURE_STD_K * GAIN_PER_K) ** 2))

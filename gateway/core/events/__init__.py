@@ -4,7 +4,7 @@ Made of estimates alone (their numbers, their times, the way they went), purely:
 the same. docs/events.md says how well they are found.
 """
 
-from gateway.core.events.change import Rules
+from gateway.core.change import Rules
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.core.events.ledger import HORIZON, Ledger
 

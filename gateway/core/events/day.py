@@ -4,13 +4,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from gateway.core.events.change import Rules, change_of
+from gateway.core.change import Rules, change_of
 from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json, rounded
 from gateway.core.events.halts import Halt, Link, clocks_of, halts_of, links_of
 from gateway.core.events.load import Load, Weighing, weighings_of
 from gateway.core.events.loads import Loads, loads_of, sides_of
-from gateway.estimate import NOWHERE, Estimate, Quantity
+from gateway.estimate import NOWHERE, Estimate
 from gateway.estimate_json.way import place_to_json
+from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD
 from gateway.records import iso_utc
 
 
@@ -41,17 +42,6 @@ class Day:
     def found(self) -> Loads:
         return loads_of(self.weighings, self.links, self.rules)
 
-    @cached_property
-    def zero(self) -> Quantity:
-        """What the newest batch that counted has taken off for its tare; one that was refused takes nothing off."""
-        counted = next((one for one in reversed(self.estimates) if one.counted), None)
-        return Quantity(0.0, 0.0) if counted is None or counted.tare is None else counted.tare.payload
-
-    def payload_of(self, load: Load) -> Quantity:
-        """As it is told: less the zero that is in use now."""
-        measured = load.payload_kg.quantity
-        return Quantity.normal(measured.number - self.zero.number, measured.std).widened(self.zero.std)
-
     def events(self) -> list[Entry]:
         """One entry for each link, however unlikely a change there is; without a revision."""
         found = self.found.probabilities
@@ -71,7 +61,7 @@ class Day:
             "vehicle_id": newest.vehicle_id,
             "t_start": iso_utc(begin_ns),
             "t_end": iso_utc(end_ns),
-            **quantity_json(change_of(before, after, self.rules), "change", "kg", 1),
+            **quantity_json(change_of(before.measured, after.measured), "change", "kg", 1),
             "probability": round(probability, 4),
             "is_withdrawn": False,
             "place": place_to_json(place),
@@ -82,14 +72,11 @@ class Day:
         return Entry(EntryKind.EVENT, str(record["id"]), end_ns, record, link.clock)
 
     def _load_json(self, load: Load) -> dict[str, Any]:
-        share, cg_left = load.front_share_pct.quantity, load.cg_left_m and load.cg_left_m.quantity
-        told: dict[str, Any] = quantity_json(self.payload_of(load), "payload", "kg", 1)
-        told |= {"front_share_pct": rounded(share.number, 2), "front_share_std_pct": rounded(share.std, 2)}
-        told |= {
-            "cg_left_m": cg_left and rounded(cg_left.number, 4),
-            "cg_left_std_m": cg_left and rounded(cg_left.std, 4),
-        }
-        return told | {"n_batches": load.n_batches}
+        payload, share, cg_left = (load.shown.quantity(i) for i in (PAYLOAD, FRONT_SHARE, CG_LEFT))
+        record: dict[str, Any] = quantity_json(payload, "payload", "kg", 1)
+        record |= {"front_share_pct": rounded(share.number, 2), "front_share_std_pct": rounded(share.std, 2)}
+        record |= {"cg_left_m": rounded(cg_left.number, 4), "cg_left_std_m": rounded(cg_left.std, 4)}
+        return record | {"n_batches": load.n_batches}
 
 
 def _stop_json(halt: Halt) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import Final
 
+from gateway.core.change import ROLLING
 from gateway.core.events.load import Weighing
 from gateway.estimate import NOWHERE, UNWATCHED, Estimate, Place, Watched
 from gateway.units import NS_PER_S
@@ -24,7 +25,6 @@ PRIORS: Final[dict[tuple[bool, bool | None], float]] = {
     (False, False): 0.001,
 }
 """Judgement, not measurement: a delivery vehicle stops to load or to rest about as often, and does it by its doors."""
-ROLLING: Final = 0.001  # between two batches without a stop
 SLACK_NS: Final = NS_PER_S // 10  # batches and stops that touch do so within this
 _CANDIDATE_SHARE: Final = 0.3  # of the most likely stop's prior
 

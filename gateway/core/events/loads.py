@@ -8,13 +8,10 @@ further batch sharpens both sides of a change, and what looked like one may turn
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
 
-from gateway.core.events.change import Rules, probability
+from gateway.core.change import EVEN, Rules, probability
 from gateway.core.events.halts import Link
 from gateway.core.events.load import Load, Weighing, load_of
-
-EVEN: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,4 +58,4 @@ def _within(
 def _between(before: Load, after: Load, weighings: Sequence[Weighing], links: Sequence[Link], rules: Rules) -> float:
     if weighings[before.last].by != weighings[after.first].by:
         return 1.0
-    return probability(before, after, links[before.last].prior, rules)
+    return probability(before.measured, after.measured, links[before.last].prior, rules)

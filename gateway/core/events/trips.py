@@ -17,6 +17,7 @@ from gateway.core.events.halts import SLACK_NS, follows
 from gateway.core.events.load import Load
 from gateway.estimate import NOWHERE, Estimate, Quantity, Way
 from gateway.estimate_json.way import place_to_json
+from gateway.posterior import PAYLOAD
 from gateway.records import iso_utc
 from gateway.units import NS_PER_S
 
@@ -137,7 +138,7 @@ def _carried(day: Day, pieces: Sequence[_Piece]) -> dict[str, Any]:
     payload = tonne_km = Quantity()
     empty = overloaded = math.nan
     if weighed_m > 0.0:
-        told = [(distance_m, day.payload_of(load)) for distance_m, load in weighed if load is not None]
+        told = [(distance_m, load.shown.quantity(PAYLOAD)) for distance_m, load in weighed if load is not None]
         kg_m = sum(distance_m * quantity.number for distance_m, quantity in told)
         kg_m_std = sum(distance_m * quantity.std for distance_m, quantity in told)
         payload = Quantity.normal(kg_m / weighed_m, kg_m_std / weighed_m)
@@ -161,7 +162,7 @@ def _is_overloaded(day: Day, batch: Estimate, load: Load | None) -> bool | None:
     gross = batch.weights.gross
     if load is None or gross.limit_kg is None or not gross.is_known:
         return None
-    return gross.kg - batch.payload.number + day.payload_of(load).number > gross.limit_kg
+    return gross.kg - batch.payload.number + load.shown.quantity(PAYLOAD).number > gross.limit_kg
 
 
 def _arrival_ns(batches: Sequence[Estimate]) -> int:

@@ -5,6 +5,7 @@ distance from the calibrated speeds are bounded. Beyond the indexes that calibra
 and its interval the wider the worse the guess is, so that it would hold any load: the indexes are bounded too.
 """
 
+import math
 from dataclasses import replace
 from typing import Final
 
@@ -12,7 +13,8 @@ import numpy as np
 
 from gateway.core.ratio_index.index import RatioIndexCalibration, indexes_of
 from gateway.core.ratio_index.regression import RegressionModel
-from gateway.estimate import UNKNOWN, Estimate, Quantity
+from gateway.estimate import UNKNOWN, Z95, Estimate, Quantity
+from gateway.posterior import Posterior, Source
 from gateway.records import Batch, Why
 
 SPEED_MARGIN: Final = 0.15  # how far a batch's mean speed may lie outside those calibrated, as a share
@@ -34,12 +36,22 @@ def by_ratio_index(batch: Batch, calibration: RatioIndexCalibration, blank: Esti
     models = [model for model in (calibration.payload, calibration.front_share) if model is not None]
     if any(model.extrapolates(ra, rg, INDEX_MARGIN) for model in models):
         return replace(indexed, rejected=(Why.OUT_OF_RANGE,))
-    return replace(
+    answer = replace(
         indexed,
         payload=_predicted(calibration.payload, ra, rg),
         front_share=_predicted(calibration.front_share, ra, rg),
     )
+    return replace(answer, posterior=_posterior(answer.payload, answer.front_share))
 
 
-def _predicted(model: RegressionModel | None, ra: float, rg: float) -> Quantity:
-    return Quantity(*model.predict(ra, rg)) if model else UNKNOWN
+def _posterior(payload: Quantity, front_share: Quantity) -> Posterior | None:
+    """Half of each variance is taken to be the batch's own, half the regression's; None without a payload.
+
+    Standard deviations are those of the normal error whose 95 % interval is as wide as Student's.
+    """
+    known = [one for one in (payload, front_share) if math.isfinite(one.number)]
+    if not math.isfinite(payload.number):
+        return None
+    mean = np.array([one.number for one in known])
+    std = np.array([0.5 * (one.interval95[1] - one.interval95[0]) / Z95 for one in known])
+    return Posterior(mean, np.diag(0.5 * std**2), {Source.MODEL: np.diag(np.sqrt(0.5) * std)})

@@ -4,22 +4,18 @@ weighed(estimate, vehicle, unsprung)    # as it leaves; ``unsprung`` is what cal
 """
 
 from gateway.core.weights.limits import RELEASE_SHARE, Limits, is_over_limit, over_limit_probability
-from gateway.core.weights.on_the_road import weighed, weights_of
-from gateway.core.weights.place import Place, place_of
+from gateway.core.weights.on_the_road import Place, place_of, weighed, weights_of
 from gateway.core.weights.room import Light, Nearness, Room, nearness, rooms_of
-from gateway.core.weights.sideways import NOWHERE, Sideways
 from gateway.core.weights.unsprung import NOT_CALIBRATED, Unsprung, unsprung_kg
 
 __all__ = [
     "NOT_CALIBRATED",
-    "NOWHERE",
     "RELEASE_SHARE",
     "Light",
     "Limits",
     "Nearness",
     "Place",
     "Room",
-    "Sideways",
     "Unsprung",
     "is_over_limit",
     "nearness",

@@ -1,35 +1,40 @@
-"""What a vehicle weighs as a whole, on each axle and on each wheel, from an estimate and its empty figures."""
+"""What a vehicle weighs as a whole, on each axle and on each wheel, and where its payload lies."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from gateway.core.vehicle import Vehicle
-from gateway.core.weights.errors import Errors
-from gateway.core.weights.sideways import NOWHERE, Sideways
-from gateway.core.weights.unsprung import NOT_CALIBRATED, Unsprung
-from gateway.estimate import Estimate, Lack, Quantity, Weight, Weights
+import numpy as np
 
-_BY_PAYLOAD: Final = 1  # the first so many make the gross weight
-_BY_AXLES: Final = 2  # and these the loads of axles
+from gateway.core.vehicle import Vehicle, left_share_pct
+from gateway.core.weights.unsprung import NOT_CALIBRATED, Unsprung
+from gateway.estimate import UNKNOWN, Estimate, Lack, Quantity, Weight, Weights
+from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, Source
+
+ROLL_UNKNOWN: Final = Quantity()
 
 
 def weighed(estimate: Estimate, vehicle: Vehicle | None, unsprung: Unsprung = NOT_CALIBRATED) -> Estimate:
     """``estimate`` with the weights on the road that follow from it; without a vehicle none is known."""
     if vehicle is None:
-        return replace(estimate, weights=Weights())
-    sideways = Sideways.of(estimate)
-    told = weights_of(vehicle, estimate.payload, estimate.front_share, estimate.correlation, sideways, unsprung)
-    return replace(estimate, weights=told)
+        return replace(estimate, weights=Weights(), left_share=UNKNOWN)
+    roll_share = Quantity(estimate.roll_share_front, estimate.roll_share_front_std)
+    weights = weights_of(vehicle, estimate.posterior, roll_share, unsprung)
+    return replace(estimate, weights=weights, left_share=_left_share(vehicle, estimate.posterior))
+
+
+def _left_share(vehicle: Vehicle, posterior: Posterior | None) -> Quantity:
+    if posterior is None or posterior.size <= CG_LEFT or vehicle.track_width_m is None:
+        return UNKNOWN
+    share_pct = left_share_pct(float(posterior.mean[CG_LEFT]), vehicle.track_width_m)
+    return posterior.linear(share_pct, [0.0, 0.0, 100.0 / vehicle.track_width_m])
 
 
 def weights_of(
     vehicle: Vehicle,
-    payload: Quantity,
-    front_share: Quantity,
-    correlation: float = 0.0,
-    sideways: Sideways = NOWHERE,
+    posterior: Posterior | None,
+    roll_share: Quantity = ROLL_UNKNOWN,
     unsprung: Unsprung = NOT_CALIBRATED,
 ) -> Weights:
     """Gross weight, axle loads and wheel loads of ``vehicle`` with a payload aboard, standing on level ground.
@@ -38,25 +43,26 @@ def weights_of(
 
         F_front = D m + u_front,    F_rear = (1 - D) m + u_rear,    G = F_front + F_rear
 
-    A centre of gravity y left of the centre line adds the moment m g y, of which the front axle takes phi, as its
-    springs and anti-roll bar resist roll (Gillespie, Fundamentals of Vehicle Dynamics, ch. 6: roll moment
-    distribution). With w the track width, left wheels bear more by, and right ones less by
+    A centre of gravity y left of the centre line adds the moment m g y, of which the front axle takes phi, the
+    ``roll_share``, as its springs and anti-roll bar resist roll (Gillespie, Fundamentals of Vehicle Dynamics, ch. 6:
+    roll moment distribution). With w the track width, left wheels bear more by, and right ones less by
 
         front: phi m y / w,    rear: (1 - phi) m y / w
 
-    How far the body leans under it is left out. Errors of L and D have this ``correlation``, those of y with them the
-    ones of ``sideways``; where one is NaN they count as independent, as phi's does. Empty figures count as exact. An
-    unsprung mass that was not stated follows from the kerb weight of its axle, and without this is the one that
-    calibration found, ``unsprung``, with its error, which counts as independent of all others: it moves an axle by
-    kilograms, and payload and share hardly. What lacks something is unknown and says what (``Weight.lacks``).
+    How far the body leans under it is left out. Each weight is J (L, D, y) to first order, and its variance J S J' of
+    the posterior's covariance S; phi's error counts as independent. Empty figures count as exact. An unsprung mass that
+    was not stated follows from the kerb weight of its axle, and without this is the one that calibration found,
+    ``unsprung``, with its error, which counts as independent of all others: it moves an axle by kilograms, and payload
+    and share hardly. What lacks something is unknown and says what (``Weight.lacks``).
     """
-    known = _Known(vehicle, payload, front_share, correlation, sideways)
-    below, roll_share = unsprung.unless_stated(vehicle), sideways.roll_share_front
-    front = _Axle(known, share=known.share, sign=1.0, roll_share=roll_share, unsprung=below.front)
-    rear = _Axle(known, share=1.0 - known.share, sign=-1.0, roll_share=1.0 - roll_share, unsprung=below.rear)
+    below = unsprung.unless_stated(vehicle)
+    known = _Known.of(vehicle, posterior, roll_share)
+    front = _Axle(known, share=known.share, sign=1.0, roll_share=roll_share.number, unsprung=below.front)
+    rear = _Axle(known, share=1.0 - known.share, sign=-1.0, roll_share=1.0 - roll_share.number, unsprung=below.rear)
     gross_kg = known.sprung_kg + below.front.number + below.rear.number
+    is_estimated = below.is_estimated
     return Weights(
-        gross=known.weight(gross_kg, [1.0], below.both.std, vehicle.gross_limit_kg, is_estimated=below.is_estimated),
+        gross=known.weight(gross_kg, [1.0], below.both.std, vehicle.gross_limit_kg, is_estimated=is_estimated),
         front_axle=front.whole(vehicle.front_axle_limit_kg),
         rear_axle=rear.whole(vehicle.rear_axle_limit_kg),
         front_left=front.wheel(1.0, vehicle.front_wheel_limit_kg),
@@ -66,39 +72,54 @@ def weights_of(
     )
 
 
+@dataclass(frozen=True, slots=True)
 class _Known:
-    """What an estimate and a vehicle say together, and how sure it is."""
+    """What an estimate and a vehicle say together; NaN where unknown. ``share`` is 0..1."""
 
-    def __init__(
-        self, vehicle: Vehicle, payload: Quantity, front_share: Quantity, correlation: float, sideways: Sideways
-    ) -> None:
-        self.sprung_kg = vehicle.empty_mass_kg + payload.number
-        self.share = front_share.number / 100.0
-        self.track_m = math.nan if vehicle.track_width_m is None else vehicle.track_width_m
-        self.cg_left_m = sideways.cg_left.number
-        self._errors = Errors(payload, front_share, correlation, sideways)
-        self._is_sideways = sideways.is_known
+    posterior: Posterior | None
+    sprung_kg: float
+    share: float
+    cg_left_m: float
+    track_m: float
+    roll_share: Quantity
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, posterior: Posterior | None, roll_share: Quantity) -> "_Known":
+        mean = np.full(3, np.nan)
+        if posterior is not None:
+            mean[: posterior.size] = posterior.mean
+        payload_kg, share_pct, cg_left_m = mean.tolist()
+        track_m = math.nan if vehicle.track_width_m is None else vehicle.track_width_m
+        return cls(posterior, vehicle.empty_mass_kg + payload_kg, share_pct / 100.0, cg_left_m, track_m, roll_share)
 
     def weight(
-        self, kg: float, slopes: Sequence[float], unsprung_std_kg: float, limit_kg: float | None, *, is_estimated: bool
+        self,
+        kg: float,
+        slopes: Sequence[float],
+        independent_std_kg: float,
+        limit_kg: float | None,
+        *,
+        is_estimated: bool,
     ) -> Weight:
-        """``slopes`` by what was estimated, in the order of Errors: as many as this weight follows from.
+        """``slopes`` by payload (kg), front share (0..1) and lateral place (m), as many as this weight follows from.
 
         ``is_estimated`` is of the unsprung mass: errors of two axles may cancel in it, and yet it was not stated.
         """
-        if math.isnan(kg):
+        if math.isnan(kg) or self.posterior is None:
             return Weight(limit_kg=limit_kg, lacks=self._lack(len(slopes)))
-        std_kg = math.hypot(self._errors.std(slopes), unsprung_std_kg)
-        return Weight(kg, std_kg, limit_kg, None, is_unsprung_estimated=is_estimated)
+        per_percent = [slope / (100.0 if i == FRONT_SHARE else 1.0) for i, slope in enumerate(slopes)]
+        found = self.posterior.linear(kg, per_percent, independent_std_kg)
+        return Weight(kg, found.std, limit_kg, None, is_estimated, found.interval95)
 
     def _lack(self, n_slopes: int) -> Lack:
-        """Why a weight is unknown that follows from the first so many, the first cause first."""
-        is_wheel = n_slopes > _BY_AXLES
-        if not math.isfinite(self.sprung_kg) or (n_slopes > _BY_PAYLOAD and not math.isfinite(self.share)):
+        """Why a weight is unknown that follows from the first so many quantities, the first cause first."""
+        is_wheel = n_slopes > CG_LEFT
+        if not math.isfinite(self.sprung_kg) or (n_slopes > FRONT_SHARE and not math.isfinite(self.share)):
             return Lack.ESTIMATE
         if is_wheel and math.isnan(self.track_m):
             return Lack.TRACK_WIDTH
-        return Lack.ROLL_RATE if is_wheel and not self._is_sideways else Lack.UNSPRUNG_MASS
+        is_sideways = math.isfinite(self.cg_left_m) and math.isfinite(self.roll_share.number)
+        return Lack.ROLL_RATE if is_wheel and not is_sideways else Lack.UNSPRUNG_MASS
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,15 +146,61 @@ class _Axle:
         """``side`` is 1 to the left, -1 to the right."""
         sprung_kg, per_track = self.known.sprung_kg, side / self.known.track_m
         moment = per_track * self.known.cg_left_m  # in sprung masses
+        by_roll_share_kg = sprung_kg * moment * self.known.roll_share.std
         return self.known.weight(
             0.5 * (self.share * sprung_kg + self.unsprung.number) + self.roll_share * sprung_kg * moment,
             [
                 0.5 * self.share + self.roll_share * moment,
                 0.5 * self.sign * sprung_kg,
                 self.roll_share * sprung_kg * per_track,
-                self.sign * sprung_kg * moment,
             ],
-            0.5 * self.unsprung.std,
+            math.hypot(0.5 * self.unsprung.std, by_roll_share_kg),
             limit_kg,
             is_estimated=self.unsprung.std > 0.0,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where the payload's centre of gravity is, behind the front axle, and its standard deviation.
+
+    Left of the centre line likewise, NaN where nothing tells; ``correlation`` is of both errors.
+    """
+
+    position_m: float
+    std_m: float
+    left_m: float = math.nan
+    left_std_m: float = math.nan
+    correlation: float = math.nan
+
+
+def place_of(vehicle: Vehicle, posterior: Posterior) -> Place | None:
+    """Where the payload lies; None where there may be none, and so no place to tell.
+
+    With s the share, s0 the empty share, M the empty mass and l the wheelbase, moments about the front axle give
+
+        d = l (1 - F / L),    F = s (M + L) - s0 M,    the part of L that rests on the front axle,
+
+    the inverse of equation (3) of Bottelli et al. With y and y0 the centres of gravity left of the centre line of
+    the whole and of the empty vehicle, moments about that line give y_L = ((M + L) y - M y0) / L. Errors are of
+    first order. What the empty share adds to the error of s is in s0 too, and drops out.
+    """
+    payload = posterior.quantity(PAYLOAD)
+    if posterior.size <= FRONT_SHARE or not payload.interval95[0] > 0.0:
+        return None
+    posterior = posterior.without(Source.EMPTY_SHARE)
+    load_kg, share = payload.number, float(posterior.mean[FRONT_SHARE]) / 100.0
+    total_kg, empty_share = vehicle.empty_mass_kg + load_kg, vehicle.empty_front_share
+    front_share_of_load = (share * total_kg - empty_share * vehicle.empty_mass_kg) / load_kg
+    along = [vehicle.wheelbase_m * slope for slope in ((front_share_of_load - share) / load_kg, -total_kg / load_kg / 100.0)]
+    position_m = vehicle.wheelbase_m * (1.0 - front_share_of_load)
+    std_m = posterior.linear(position_m, along).std
+    if posterior.size <= CG_LEFT:
+        return Place(position_m, std_m)
+    cg_left_m = float(posterior.mean[CG_LEFT])
+    left_m = (total_kg * cg_left_m - vehicle.empty_mass_kg * vehicle.empty_cg_left_m) / load_kg
+    across = [(cg_left_m - left_m) / load_kg, 0.0, total_kg / load_kg]
+    left_std_m = posterior.linear(left_m, across).std
+    is_both = std_m * left_std_m > 0.0
+    correlation = posterior.covariance_of(along, across) / (std_m * left_std_m) if is_both else math.nan
+    return Place(position_m, std_m, left_m, left_std_m, correlation)

@@ -52,7 +52,9 @@ def rooms_of(weights: Weights) -> tuple[Room, ...]:
 def _rooms(weights: Weights) -> Iterator[Room]:
     for place, weight in weights.items():
         if place in LOADED_PLACES and weight.limit_kg is not None and weight.is_known:
-            yield Room(place, weight.limit_kg, Quantity.normal(weight.limit_kg - weight.kg, weight.std_kg))
+            low_kg, high_kg = weight.interval95_kg
+            left_kg = (weight.limit_kg - high_kg, weight.limit_kg - low_kg)
+            yield Room(place, weight.limit_kg, Quantity(weight.limit_kg - weight.kg, weight.std_kg, left_kg))
 
 
 @dataclass(frozen=True, slots=True)

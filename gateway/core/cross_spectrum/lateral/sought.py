@@ -41,16 +41,16 @@ FREE: Final = [INDEX[name] for name in FREE_STD]
 
 @dataclass(frozen=True, slots=True)
 class Sideways:
-    """The centre of gravity's place left of the centre line (m), of all that is sprung, with its variance (m2); not yet
-    inflated, and under a load that is known.
+    """The place (m) of the centre of gravity of all that is sprung, left of the centre line, under a load that is known.
 
-    own_variance is the batch's own part of it. moves_with_load (2,) is by how much it moves with payload (m/kg) and
-    front share (m per 0..1). is_mount_changed: the sensor is not where, or not turned as, it was calibrated.
+    own_variance (m2) is what the batch's length and road leave. moves (n,) is by how much the place moves with each
+    parameter of the vehicle, moves_with_load (2,) with payload (m/kg) and front share (m per 0..1). is_mount_changed:
+    the sensor is not where, or not turned as, it was calibrated.
     """
 
     cg_left_m: float
-    variance: float
     own_variance: float
+    moves: F64
     moves_with_load: F64
     is_mount_changed: bool
 
@@ -87,19 +87,16 @@ def sought_sideways(rolling: Whittle, point: Point) -> Place:
     )
 
 
-def told_sideways(rolling: Whittle, place: Place, point: Point, covariance: F64) -> Sideways:
-    """How sure the place is; ``covariance`` (n, n) is that of theta in calibration."""
+def told_sideways(rolling: Whittle, place: Place, point: Point) -> Sideways:
+    """How sure the place is, and what it moves with."""
     there, n, found = _at(point, place.found.x), len(point.theta), place.found
     whole = rolling.curvature(there, range(n + 3))
-    information = whole.information
-    moves = -found.covariance[-1] @ information[_free(there)]
-    others = [i for i in range(n) if i not in FREE and i not in DRIFTING]
-    left_open = float(moves[others] @ covariance[np.ix_(others, others)] @ moves[others])
-    own_variance = float(found.covariance[-1, -1])
+    moves = -found.covariance[-1] @ whole.information[_free(there)]
+    moves[[*FREE, *DRIFTING]] = 0.0
     return Sideways(
         cg_left_m=place.cg_left_m,
-        variance=own_variance + left_open,
-        own_variance=own_variance,
+        own_variance=float(found.covariance[-1, -1]),
+        moves=moves[:n],
         moves_with_load=moves[n : n + 2],
         is_mount_changed=any(
             abs(_off(INDEX[name], whole, found, _free(there))) > most for name, most in MOST_MOUNT_CHANGE.items()

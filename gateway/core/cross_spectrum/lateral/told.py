@@ -7,11 +7,9 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.lateral.sought import Sideways
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.model.parameters import INDEX, rolling_car
 from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, roll_share_front
-from gateway.core.vehicle import left_share_pct
 from gateway.estimate import Estimate, Quantity
 from gateway.records import F64
 
@@ -21,27 +19,10 @@ _STIFFNESSES: Final = tuple(
 _STEP: Final = 1e-3
 
 
-def with_place(
-    answer: Estimate, point: Point, sideways: Sideways, covariance: F64, calibration: CrossSpectrumCalibration
-) -> Estimate:
-    """``answer`` with the centre of gravity's lateral place; ``covariance`` (2, 2) is of payload (kg) and front share
-    (0..1), as wide as it is stated.
-    """
-    with_load = covariance @ sideways.moves_with_load
-    own = sideways.variance * calibration.cg_left_inflation**2
-    std_m = math.sqrt(own + float(sideways.moves_with_load @ with_load))
-    correlation = with_load / (np.sqrt(np.diag(covariance)) * std_m)
-    track_width_m = calibration.track_width_m or math.nan
+def with_place(answer: Estimate, point: Point, calibration: CrossSpectrumCalibration) -> Estimate:
+    """``answer`` with how the axles share a sideways moment under the load of ``point``."""
     stiffness = _roll_share_front(point, calibration)
-    return replace(
-        answer,
-        cg_left=Quantity.normal(sideways.cg_left_m, std_m),
-        left_share=Quantity.normal(left_share_pct(sideways.cg_left_m, track_width_m), 100.0 * std_m / track_width_m),
-        roll_share_front=stiffness.number,
-        roll_share_front_std=stiffness.std,
-        payload_cg_left_correlation=float(correlation[0]),
-        front_share_cg_left_correlation=float(correlation[1]),
-    )
+    return replace(answer, roll_share_front=stiffness.number, roll_share_front_std=stiffness.std)
 
 
 def _roll_share_front(point: Point, calibration: CrossSpectrumCalibration) -> Quantity:

@@ -24,7 +24,6 @@ from gateway.core.cross_spectrum.model.parameters import (
 )
 from gateway.core.cross_spectrum.model.slopes import solved_at
 from gateway.core.cross_spectrum.model.usual_roll import TRACK_PER_WHEELBASE, usual_roll
-from gateway.core.cross_spectrum.unseen_load import unseen_covariance
 from gateway.records import F64
 
 PAYLOAD_LEFT_PER_TRACK: Final = 0.95 / 3.0 / 1.96
@@ -33,10 +32,13 @@ deviation has the same 95 % interval; the even spread's own, 1 / (3 sqrt 3), wou
 """
 
 
-def sideways_covariance(
+MOST_FEEDBACK: Final = 0.5  # beyond, proportion no longer holds; chosen, it doubles the standard deviation
+
+
+def sideways_columns(
     spectra: CrossSpectra, point: Point, calibration: CrossSpectrumCalibration, weigh: Callable[[CrossSpectra], F64]
 ) -> F64:
-    """(2, 2) of payload (kg) and front share (0..1), from a place across the vehicle that is not seen.
+    """(k, 2) by how much payload (kg) and front share (0..1) move with a place across the vehicle that is not seen.
 
     ``point`` is the answer to ``spectra``, and ``weigh`` finds payload and share (2,) in others not far from it. It is
     handed what the sensors would read with the load a standard deviation to either side: half of what the two answers
@@ -54,12 +56,18 @@ def sideways_covariance(
         return weigh(spectra.showing(expected_of_driven(by, model, spectra)))
 
     if not payload_kg:
-        return np.zeros((2, 2))
+        return np.zeros((1, 2))
     left, right = weighed_at(cg_left_std_m), weighed_at(-cg_left_std_m)
-    covariance = unseen_covariance(0.5 * (left - right), payload_kg)
+    columns = [0.5 * (left - right)]
     if has_roll(calibration.parameters):
-        covariance += unseen_covariance(0.5 * (left + right) - (point.payload_kg, point.front_share), payload_kg)
-    return covariance
+        columns.append(0.5 * (left + right) - (point.payload_kg, point.front_share))
+    return np.array([_of_true_load(moved, payload_kg) for moved in columns])
+
+
+def _of_true_load(moved: F64, payload_kg: float) -> F64:
+    """``moved`` (2,) under the load that truly lies so: where the answer fell short of it, it moves by more."""
+    feedback = min(abs(float(moved[0])) / payload_kg, MOST_FEEDBACK)
+    return moved / (1.0 - feedback)
 
 
 def _rolling(theta: F64, calibration: CrossSpectrumCalibration, width_m: float) -> F64:

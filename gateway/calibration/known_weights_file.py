@@ -1,0 +1,161 @@
+"""known_weights.json: every weight that somebody made known, the newest last, and what became of it.
+
+It lies beside the database, apart from the calibration file, which no known weight changes. What they teach is computed
+from the list (core.known_weights), so that each can be taken back. Written by the service alone, in one step.
+"""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from gateway.calibration.file.calibration_file import content_id
+from gateway.calibration.file.parts import Part
+from gateway.core.known_weights import Knowledge, KnownWeightKind, Observation
+from gateway.errors import ConfigurationError
+from gateway.estimate_json import posterior_from_json
+from gateway.files.kept import KeptFiles
+from gateway.records import ns_of
+from gateway.stated_weight import StatedWeight
+from gateway.toml_file import describe_faults
+
+FILE_NAME: Final = "known_weights.json"
+MOST_KNOWN_WEIGHTS: Final = 200  # the oldest that were taken back are forgotten beyond
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Ending(Part):
+    """When, by whom and why a known weight was taken back."""
+
+    at: str
+    by: str
+    why: Literal["withdrawn", "back_to_factory"] = "withdrawn"
+
+
+class Confirmation(Part):
+    """Who confirmed a known weight that its estimate contradicted, and when."""
+
+    at: str
+    by: str
+
+
+class KnownWeight(Part):
+    """One known weight: what was stated, the load it is of as it was measured, and what it makes known of that load.
+
+    ``id`` is the hash of all but its confirmation and its end.
+    """
+
+    id: str
+    kind: KnownWeightKind
+    at: str
+    by: str
+    note: str | None = None
+    vehicle_id: str | None = None
+    calibration_id: str
+    estimator: str
+    t_start: str = Field(description="of the load's first batch")
+    t_end: str = Field(description="of its last batch")
+    batch_ids: tuple[str, ...] = Field(min_length=1, description="the newest of the batches it rests on, newest last")
+    n_batches: int = Field(ge=1)
+    posterior: dict[str, Any] = Field(description="the load as measured, before any known weight")
+    stated: StatedWeight | None = Field(None, description="what the scale or the note said; null: it was empty")
+    payload_kg: Finite
+    payload_std_kg: float = Field(gt=0.0, allow_inf_nan=False)
+    front_share_pct: Finite | None = Field(None, description="null: nobody stated where the load lies")
+    front_share_std_pct: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+    confirmed: Confirmation | None = None
+    ended: Ending | None = None
+
+    def content_id(self) -> str:
+        """What ``id`` has to be."""
+        return content_id(self.model_dump(mode="json", exclude={"id", "confirmed", "ended"}))
+
+    @property
+    def observation(self) -> Observation:
+        """The same in the core's terms."""
+        truth, std = [self.payload_kg], [self.payload_std_kg]
+        if self.front_share_pct is not None and self.front_share_std_pct is not None:
+            truth.append(self.front_share_pct)
+            std.append(self.front_share_std_pct)
+        return Observation(
+            id=self.id,
+            t_ns=ns_of(self.t_end),
+            calibration_id=self.calibration_id,
+            estimator=self.estimator,
+            posterior=posterior_from_json(self.posterior),
+            truth=np.array(truth),
+            truth_covariance=np.diag(np.square(std)),
+        )
+
+    @property
+    def is_held(self) -> bool:
+        """True where its estimate contradicts it and nobody has confirmed it: it teaches nothing yet."""
+        return self.ended is None and self.confirmed is None and self.observation.is_contradicted
+
+    @property
+    def teaches(self) -> bool:
+        """Whether estimates take it into account."""
+        return self.ended is None and not self.is_held
+
+
+class KnownWeights(Part):
+    """All that is remembered, oldest first."""
+
+    format: Literal["springscale-known-weights"] = "springscale-known-weights"
+    version: Literal[1] = 1
+    entries: tuple[KnownWeight, ...] = ()
+
+    def of(self, calibration_id: str | None, estimator: str) -> tuple[KnownWeight, ...]:
+        """Those that teach something of this calibration and estimator."""
+        wanted = (calibration_id, estimator)
+        return tuple(one for one in self.entries if (one.calibration_id, one.estimator) == wanted and one.teaches)
+
+    def knowledge(self, calibration_id: str | None, estimator: str) -> Knowledge | None:
+        """What they teach together; None: nothing."""
+        return Knowledge.of([one.observation for one in self.of(calibration_id, estimator)])
+
+    def with_entry(self, entry: KnownWeight) -> "KnownWeights":
+        """With one more; those that stand are never forgotten."""
+        ended = [one.id for one in self.entries if one.ended is not None]
+        forgotten = set(ended[: max(0, len(self.entries) + 1 - MOST_KNOWN_WEIGHTS)])
+        kept = tuple(one for one in self.entries if one.id not in forgotten)
+        return self.model_copy(update={"entries": (*kept, entry)})
+
+    def changed(self, entry_id: str, **update: Any) -> "KnownWeights":
+        """With one entry confirmed or ended."""
+        entries = tuple(one.model_copy(update=update) if one.id == entry_id else one for one in self.entries)
+        return self.model_copy(update={"entries": entries})
+
+
+def load_known_weights(path: Path) -> KnownWeights:
+    """The file's entries, none where there is no file yet. Raises ConfigurationError for a file that is none."""
+    try:
+        return known_weights_of(KeptFiles(path.parent).read(path.name), path)
+    except FileNotFoundError:
+        return KnownWeights()
+    except OSError as fault:
+        raise ConfigurationError(f"{path}: cannot be read: {fault.strerror or fault}") from None
+
+
+def known_weights_of(content: bytes, path: Path | str) -> KnownWeights:
+    """What such a file holds. Raises ConfigurationError, naming ``path``, where it cannot be believed."""
+    try:
+        held = KnownWeights.model_validate_json(content)
+    except ValidationError as fault:
+        raise ConfigurationError(f"{describe_faults(path, fault)}: {_MEND}") from None
+    changed = [entry.id for entry in held.entries if entry.id != entry.content_id()]
+    if changed:
+        raise ConfigurationError(f"{path}: known weight {changed[0]} was changed after it was written: {_MEND}")
+    return held
+
+
+def save_known_weights(path: Path, held: KnownWeights) -> None:
+    """Replace the file in one step; on disk when this returns. Raises OSError, and then the old file stands."""
+    text = json.dumps(held.model_dump(mode="json"), indent=1, allow_nan=False, ensure_ascii=False)
+    KeptFiles(path.parent).write(path.name, (text + "\n").encode())
+
+
+_MEND: Final = "restore it, or remove it to go on without known weights"

@@ -1,0 +1,90 @@
+"""How likely it is that the load changed between two groups of batches, and by how much: the one detector of changes.
+
+What batches of one load share hides no change (gateway.posterior), so that without a change the difference x of two
+groups, of payload, front share and lateral place, is N(0, V0) with the covariance of their own errors. With a change of
+d kg, d ~ N(0, s^2), the payload differs by d, and what is moved moves the centre of gravity by g_f d and g_y d for a
+place nobody knows, so that x ~ N((d, 0, 0), V1 + diag(0, (g_f d)^2, (g_y d)^2)), V1 being the covariance of two loads'
+difference. The Bayes factor is the ratio of the densities,
+
+    B = int N(d; 0, s^2) N(x; (d, 0, 0), V(d)) dd / N(x; 0, V0),
+
+and the probability of a change p B / (1 - p + p B) with p what it was before (Kass & Raftery, Bayes factors,
+J. Am. Stat. Assoc. 90 (1995) 773-795, equations 1 and 2).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import expit, logit
+
+from gateway.core.vehicle import Vehicle
+from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, difference
+from gateway.quantity import Quantity
+from gateway.records import F64
+
+SPREAD_SHARE: Final = 0.25  # of the payload range: what is loaded or unloaded at a stop, one standard deviation
+PLACE_ALONG_SHARE: Final = 0.3  # of the wheelbase: where it lies, about the centre of gravity
+PLACE_ACROSS_M: Final = 0.3
+LEAST_RANGE_KG: Final = 100.0
+ROLLING: Final = 0.001  # how likely a change is between two batches without a stop
+EVEN: Final = 0.5
+_NODES: Final = np.linspace(-6.0, 6.0, 241)  # standard deviations about the difference found
+_STEP: Final = float(_NODES[1] - _NODES[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What a vehicle's size says of loads: how much they change at a stop, and what an empty one is."""
+
+    range_kg: float = 1000.0
+    mass_kg: float = 2000.0
+
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> "Rules":
+        """By the campaign's vehicle."""
+        low, high = vehicle.payload_range_kg
+        return cls(max(high - low, LEAST_RANGE_KG), vehicle.empty_mass_kg + 0.5 * (low + high))
+
+    @property
+    def spread_kg(self) -> float:
+        return SPREAD_SHARE * self.range_kg
+
+
+def probability(before: Posterior, after: Posterior, prior: float, rules: Rules) -> float:
+    """That the load changed between them, 0 to 1; ``prior`` is what it was before anything was weighed.
+
+    By logarithms of odds: after a round of short hops the prior is 1 to the last digit, and its odds are no number.
+    """
+    return float(expit(logit(prior) + _log_bayes_factor(before, after, rules)))
+
+
+def change_of(before: Posterior, after: Posterior) -> Quantity:
+    """By how many kg the load changed, the two being different loads."""
+    mean, covariance = difference(before, after, is_one_load=False)
+    return Quantity.normal(float(mean[PAYLOAD]), math.sqrt(float(covariance[PAYLOAD, PAYLOAD])))
+
+
+def _log_bayes_factor(before: Posterior, after: Posterior, rules: Rules) -> float:
+    x, unchanged = difference(before, after, is_one_load=True)
+    _, changed = difference(before, after, is_one_load=False)
+    d = x[PAYLOAD] + math.sqrt(changed[PAYLOAD, PAYLOAD]) * _NODES
+    covariances = np.repeat(changed[None], len(d), axis=0)
+    for i, by_kg in ((FRONT_SHARE, 100.0 * PLACE_ALONG_SHARE), (CG_LEFT, PLACE_ACROSS_M)):
+        if i < len(x):
+            covariances[:, i, i] += (by_kg / rules.mass_kg * d) ** 2
+    off = np.repeat(x[None], len(d), axis=0)
+    off[:, PAYLOAD] -= d
+    of_change = _log_normal(d[:, None], np.full((len(d), 1, 1), rules.spread_kg**2))
+    log_step = math.log(_STEP) + 0.5 * math.log(changed[PAYLOAD, PAYLOAD])
+    with_change = np.logaddexp.reduce(of_change + _log_normal(off, covariances) + log_step)
+    return float(with_change - _log_normal(x[None], unchanged[None])[0])
+
+
+def _log_normal(x: F64, covariance: F64) -> F64:
+    """(m,) logarithms of the densities at x (m, d) of N(0, covariance (m, d, d))."""
+    _, log_determinant = np.linalg.slogdet(2.0 * math.pi * covariance)
+    scaled = np.linalg.solve(covariance, x[..., None])[..., 0]
+    logs: F64 = -0.5 * (np.sum(x * scaled, axis=-1) + log_determinant)
+    return logs

@@ -1,0 +1,172 @@
+"""What known weights teach: a vehicle weighed empty, on a scale, or by its delivery note conditions the sources of error.
+
+    knowledge = Knowledge.of(observations, now_ns)
+    known = knowledge.applied(posterior, t_ns)
+
+The error of an estimate is its own error plus the columns of its sources times their unknown z ~ N(0, I)
+(gateway.posterior). A load that is known makes the error of its estimate known, up to what is its own, and so says
+something of z: a Kalman update (R. E. Kalman, J. Basic Eng. 82, 1960). Every later estimate then becomes
+
+    mean + S E[z],    own + S Cov[z] S'
+
+The day's sources forget, as temperature and wear do. What lasts for one load is part of the observation's noise. The
+state is computed from the list of observations whenever it is asked for, so that taking one back restores the numbers
+to the last bit.
+"""
+
+import hashlib
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from gateway.posterior import ONE_LOAD, PAYLOAD, Posterior, Source
+from gateway.records import F64
+from gateway.units import NS_PER_S
+
+DAY_MEMORY_S: Final = 3.0 * 86_400.0  # over which what is known of the day's sources falls to 1/e; chosen
+CONTRADICTED: Final = 3.0  # standard deviations between a known weight and its estimate: somebody has to confirm it
+
+
+class KnownWeightKind(StrEnum):
+    """How the load became known."""
+
+    EMPTY = "empty"
+    TICKET = "ticket"
+    AXLE_PADS = "axle_pads"
+    DELIVERY_NOTE = "delivery_note"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """A known load: what was weighed, as measured (posterior), and its true payload (kg) and front share (%), the first
+    one or both, with the covariance (k, k) of their errors. It belongs to one calibration and one estimator.
+    """
+
+    id: str
+    t_ns: int
+    calibration_id: str
+    estimator: str
+    posterior: Posterior
+    truth: F64
+    truth_covariance: F64
+
+    @property
+    def off(self) -> F64:
+        """(k,) by how much the estimate exceeds the truth."""
+        return self.posterior.mean[: len(self.truth)] - self.truth
+
+    @property
+    def distance(self) -> float:
+        """Of the known payload from its estimate, in standard deviations of both errors."""
+        variance = float(self.posterior.covariance[PAYLOAD, PAYLOAD] + self.truth_covariance[PAYLOAD, PAYLOAD])
+        return abs(float(self.off[PAYLOAD])) / math.sqrt(variance)
+
+    @property
+    def is_contradicted(self) -> bool:
+        """True where the estimate under which it was made speaks against it."""
+        return self.distance > CONTRADICTED
+
+
+_LASTING: Final = tuple(name for name in Source if name not in ONE_LOAD)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Knowledge:
+    """E[z] (n,) and Cov[z] (n, n) of the sources that outlast a load, after the last observation at t_ns.
+
+    ``slots`` says where each source's columns are. ``id`` is the hash of what it was learned from.
+    """
+
+    id: str
+    calibration_id: str
+    estimator: str
+    slots: Mapping[Source, slice]
+    mean: F64
+    covariance: F64
+    t_ns: int
+
+    @classmethod
+    def of(cls, observations: Sequence[Observation]) -> "Knowledge | None":
+        """What these teach, in the order of their times; None where there is none.
+
+        Raises ValueError where they are not all of one calibration and one estimator.
+        """
+        observations = sorted(observations, key=lambda one: (one.t_ns, one.id))
+        if not observations:
+            return None
+        if len({(one.calibration_id, one.estimator) for one in observations}) > 1:
+            raise ValueError("known weights of several calibrations cannot be taken together")
+        slots = _slots(observations)
+        n = max((each.stop for each in slots.values()), default=0)
+        digest = hashlib.sha256("|".join(one.id for one in observations).encode()).hexdigest()
+        first = observations[0]
+        known = cls(
+            digest[:16], first.calibration_id, first.estimator, slots, np.zeros(n), np.eye(n), first.t_ns
+        )
+        for one in observations:
+            known = known._at(one.t_ns)._having_seen(one)
+        return known
+
+    def is_for(self, calibration_id: str | None, estimator: str) -> bool:
+        """Whether estimates by this calibration and estimator have these sources."""
+        return (self.calibration_id, self.estimator) == (calibration_id, estimator)
+
+    def applied(self, posterior: Posterior, t_ns: int) -> Posterior:
+        """``posterior`` of a batch at t_ns with what is known of its sources.
+
+        Columns of lasting sources become S L with L L' = Cov[z]: they still stand for causes that all batches share.
+        """
+        now = self._at(t_ns)
+        columns = now._columns(posterior)
+        root = np.linalg.cholesky(now.covariance + 1e-12 * np.eye(len(now.mean)))
+        learned = root.T @ columns
+        known = {name: learned[place] for name, place in self.slots.items()}
+        return replace(posterior, mean=posterior.mean - columns.T @ now.mean, sources={**posterior.sources, **known})
+
+    def _at(self, t_ns: int) -> "Knowledge":
+        """What is still known later: the day's part decays towards what any day may be."""
+        place = self.slots.get(Source.DAY)
+        kept = math.exp(-max(0.0, (t_ns - self.t_ns) / NS_PER_S) / DAY_MEMORY_S)
+        if place is None or kept == 1.0:
+            return self
+        decay = np.ones(len(self.mean))
+        decay[place] = kept
+        covariance = decay[:, None] * self.covariance * decay
+        covariance[place, place] += (1.0 - kept**2) * np.eye(place.stop - place.start)
+        return replace(self, mean=decay * self.mean, covariance=covariance, t_ns=t_ns)
+
+    def _having_seen(self, one: Observation) -> "Knowledge":
+        k = len(one.truth)
+        columns = self._columns(one.posterior)[:, :k]
+        of_load = one.posterior.without(*_LASTING).covariance[:k, :k]
+        across = self.covariance @ columns
+        gain = np.linalg.solve(columns.T @ across + of_load + one.truth_covariance, across.T).T
+        mean = self.mean + gain @ (one.off - columns.T @ self.mean)
+        covariance = self.covariance - gain @ across.T
+        return replace(self, mean=mean, covariance=0.5 * (covariance + covariance.T))
+
+    def _columns(self, posterior: Posterior) -> F64:
+        """(n, d) of all lasting sources, in the order of z."""
+        columns = np.zeros((len(self.mean), posterior.size))
+        for name, place in self.slots.items():
+            own = posterior.sources.get(name)
+            if own is not None:
+                n = min(len(own), place.stop - place.start)
+                columns[place.start : place.start + n] = own[:n]
+        return columns
+
+
+def _slots(observations: Iterable[Observation]) -> dict[Source, slice]:
+    slots: dict[Source, slice] = {}
+    begin = 0
+    observations = list(observations)
+    for name in _LASTING:
+        n = max((len(one.posterior.sources[name]) for one in observations if name in one.posterior.sources), default=0)
+        if n:
+            slots[name] = slice(begin, begin + n)
+            begin += n
+    return slots
