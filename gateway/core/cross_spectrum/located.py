@@ -11,6 +11,7 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import (
     DRIFT_PRECISION,
     DRIFTING,
+    NATURE_OF_STEADY,
     STEADY,
     day_columns,
     packing_columns,
@@ -25,7 +26,7 @@ from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.cross_spectrum.packing import Packing, packings
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
-from gateway.core.cross_spectrum.shape import EVIDENCE, Shaped, shaped
+from gateway.core.cross_spectrum.shape import EVIDENCE, Node, Shaped, shaped
 from gateway.posterior import NORMAL_TAILS, Source
 from gateway.records import F64
 
@@ -34,6 +35,10 @@ LEAST_START_SHARE: Final = 0.33
 STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rate bends
 COARSE: Final = 0.5  # of evidence, which tells peaks apart
 FINE: Final = 1e-3
+FIRM_HZ: Final = 25.0
+"""A load that rings on its mount below this turns there too, which no model here knows: the evidence of its shape counts
+less, as the square of the ratio. Chosen.
+"""
 OF_SHAPES: Final = 0.02  # of evidence, likewise of shapes
 MOST_RIVALRY: Final = 1.0
 """Of all other variance: where peaks that compete are most of what is uncertain, that is why."""
@@ -94,7 +99,7 @@ def locate(
     if spectra.roll is None or not has_roll(calibration.parameters):
         whittle, peak = _best(spectra.without_roll, calibration)
         shape = _shaped(whittle, peak, calibration, 0.0, prior, evidence)
-        located = _located(whittle, peak, shape, calibration, 0.0)
+        located = _located(whittle, peak, shape, calibration, 0.0, evidence)
 
         def weigh(other: CrossSpectra) -> F64:
             sought = _sought(Whittle(other, calibration.ground), peak.found.x, peak.packing, calibration, 0.0, COARSE)
@@ -114,32 +119,84 @@ def locate(
     placed = _as_shaped(placed, shape)
     x = peak.found.x if shape is None else shape.x
     place = sought_sideways(rolling, _point(x, placed, place.cg_left_m))
-    located = _located(whittle, peak, shape, placed, place.cg_left_m)
+    located = _located(whittle, peak, shape, placed, place.cg_left_m, evidence)
     return replace(located, sideways=told_sideways(rolling, place, located.point))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """What holds at the answer of a search: the curvature of all parameters and the load, the posterior covariance of
-    what was sought (FITTED: drifting parameters and load), by how much it moves with each of the STEADY parameters
-    (steady), and by how much the load alone moves with all of them (moves, (2, p)).
+    """What holds at the peak of a search, once the parameters that it held fixed have moved as far as batch and prior
+    let them (one Gauss-Newton step of the STEADY parameters t, those sought moving along).
+
+    whole is the curvature of all parameters and the load, covariance that of what was sought (FITTED: drifting
+    parameters and load). cost is that of the peak less what the step gained, and half the logarithm of how much the
+    batch narrowed t: minus the logarithm of the evidence, t integrated out. shift (k,) is the step of what was sought,
+    steady (k, s) by how much that moves with an error of each t that the prior leaves, after the step; own (k, k) what
+    the batch's noise adds by it.
     """
 
     whole: Curvature
     covariance: F64
+    cost: float
+    shift: F64
     steady: F64
-    moves: F64
+    own: F64
+
+    @property
+    def moves(self) -> F64:
+        """(2, p) by how much the load moves with each of the half-car's parameters."""
+        moves = np.zeros((2, len(PARAMETERS)))
+        moves[:, STEADY] = self.steady[-2:]
+        return moves
 
 
-def answer_at(whittle: Whittle, point: Point) -> Answer:
-    """The fitted x moves by -C I_xt for each of the other parameters t, C being its covariance."""
+def answer_at(
+    whittle: Whittle,
+    point: Point,
+    calibration: CrossSpectrumCalibration,
+    expected: F64,
+    evidence: float,
+    *,
+    is_shape_known: bool = True,
+) -> Answer:
+    """``expected`` (k,) are the drifting parameters that the prior expects; a shape that is sought is no error of t.
+
+    With g and I the gradient and information of t at the peak and S their prior covariance, the step is
+    -w (w I + S^-1)^-1 g, w being how much the batch's evidence counts.
+    """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
     covariance = np.linalg.inv(whole.information[np.ix_(FITTED, FITTED)] + np.pad(DRIFT_PRECISION, (0, 2)))
-    steady = -covariance @ whole.information[np.ix_(FITTED, STEADY)]
+    pull = whole.gradient[FITTED].copy()
+    off = (point.theta[DRIFTING]) - expected
+    pull[: len(DRIFTING)] += DRIFT_PRECISION @ off
+    free = np.arange(len(STEADY)) if is_shape_known else np.delete(np.arange(len(STEADY)), STEADY.index(_GYRATION))
+    t = np.array(STEADY)[free]
+    along = -covariance @ whole.information[np.ix_(FITTED, t)]  # what was sought moves by -C I_xt with each t
+    gradient = whole.gradient[t] + along.T @ pull
+    information = whole.information[np.ix_(t, t)] + along.T @ whole.information[np.ix_(FITTED, t)]
+    prior = calibration.covariance[np.ix_(t, t)] + NATURE_OF_STEADY[np.ix_(free, free)]
+    narrowing = np.eye(len(t)) + evidence * prior @ information
+    posterior = np.linalg.solve(narrowing, prior)
+    step = -evidence * posterior @ gradient
+    gained = 0.5 * float(gradient @ step) + 0.5 * float(np.linalg.slogdet(narrowing)[1]) / evidence
+    steady = np.zeros((len(along), len(STEADY)))
+    steady[:, free] = along @ np.linalg.inv(narrowing)  # S_posterior S^-1
+    by_noise = along @ posterior * evidence
+    at_peak = whittle.cost(point) + 0.5 * float(off @ DRIFT_PRECISION @ off)
+    return Answer(whole, covariance, at_peak + gained, along @ step, steady, by_noise @ information @ by_noise.T)
+
+
+def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
+    """(2, 2) covariance of a load that is sought with all STEADY parameters held, and (2, p) by how much it then moves
+    with each of the half-car's parameters.
+    """
+    n = len(point.theta)
+    information = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1]).information
+    covariance = np.linalg.inv(information[np.ix_(FITTED, FITTED)] + np.pad(DRIFT_PRECISION, (0, 2)))
     moves = np.zeros((2, len(PARAMETERS)))
-    moves[:, STEADY] = steady[-2:]
-    return Answer(whole, covariance, steady, moves)
+    moves[:, STEADY] = -(covariance @ information[np.ix_(FITTED, STEADY)])[-2:]
+    return covariance[-2:, -2:], moves
 
 
 def _shaped(
@@ -153,12 +210,18 @@ def _shaped(
     """The load under every shape that it may have; None where that is known."""
     if prior is None:
         return None
+    expected = peak.packing.drifting
 
-    def sought(log_s: float, start: F64) -> Found:
-        return _sought(whittle, start, peak.packing, _with_gyration(calibration, log_s), cg_left_m, OF_SHAPES)
+    def weighed_as(log_s: float, start: F64) -> Node:
+        of_shape = _with_gyration(calibration, log_s)
+        found = _sought(whittle, start, peak.packing, of_shape, cg_left_m, OF_SHAPES)
+        point = _point(found.x, of_shape, cg_left_m)
+        at = answer_at(whittle, point, of_shape, expected, evidence, is_shape_known=False)
+        return Node(found.x, at.cost, found.x + at.shift, float(np.sqrt(at.covariance[-2, -2])))
 
-    here = float(calibration.parameters[_GYRATION]), peak.found
-    return shaped(prior, calibration.wheelbase_m, here, sought, evidence)
+    mode_hz = float(np.exp(peak.found.x[DRIFTING.index(INDEX["payload_mode_hz"])]))
+    start = float(calibration.parameters[_GYRATION]), peak.found.x
+    return shaped(prior, calibration.wheelbase_m, start, weighed_as, evidence * min(1.0, (mode_hz / FIRM_HZ) ** 2))
 
 
 def _with_gyration(calibration: CrossSpectrumCalibration, log_s: float) -> CrossSpectrumCalibration:
@@ -172,26 +235,34 @@ def _as_shaped(calibration: CrossSpectrumCalibration, shape: Shaped | None) -> C
 
 
 def _located(
-    whittle: Whittle, peak: _Peak, shape: Shaped | None, calibration: CrossSpectrumCalibration, cg_left_m: float
+    whittle: Whittle,
+    peak: _Peak,
+    shape: Shaped | None,
+    calibration: CrossSpectrumCalibration,
+    cg_left_m: float,
+    evidence: float,
 ) -> Located:
     calibration = _as_shaped(calibration, shape)
+    drifting = peak.packing.drifting
     x = peak.found.x if shape is None else np.r_[shape.x[:-2], shape.load]
     point = _point(x, calibration, cg_left_m)
-    at = answer_at(whittle, point)
-    whole, found, moves = at.whole, at.covariance, at.moves
+    at = answer_at(whittle, point, calibration, drifting, evidence, is_shape_known=shape is None)
+    if shape is None:
+        x = x + np.r_[np.zeros(len(DRIFTING)), at.shift[-2:]]
+        point = _point(x, calibration, cg_left_m)
+    whole, found = at.whole, at.covariance
     columns = {Source.DAY: day_columns(found, at.steady)[:, -2:], Source.LOAD_LENGTH: packing_columns(found)[:, -2:]}
     if shape is not None:
-        moves[:, _GYRATION] = 0.0  # of this load, not of the known ones
         columns |= _of_shape(shape, columns[Source.LOAD_LENGTH])
     misfit = whittle.misfit(point)
     parameters = calibration.parameters.copy()
-    parameters[DRIFTING] = peak.packing.drifting
-    own = found[-2:, -2:]
+    parameters[DRIFTING] = drifting
+    own = found[-2:, -2:] + at.own[-2:, -2:]
     rivalled = own + sum((each.T @ each for each in columns.values()), np.zeros((2, 2)))
     return Located(
         point=point,
         own=own,
-        moves=moves,
+        moves=at.moves,
         columns=columns,
         tails=NORMAL_TAILS if shape is None else shape.tails,
         gain_moves=gain_moves(whole, whittle, point, found)[-2:],
