@@ -4,7 +4,7 @@ from dataclasses import asdict, astuple
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from gateway.calibration.file.parts import Array, Part, check_shapes
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, ROLL_PARAMETERS
@@ -62,11 +62,8 @@ class EvidencePart(Part):
 class LimitsPart(Part):
     """What runs or siblings left out showed; see CrossSpectrumPart."""
 
-    payload_inflation: float = Field(gt=0.0)
-    payload_inflation_per_reach: float = Field(ge=0.0)
-    front_share_inflation: float = Field(gt=0.0)
-    front_share_inflation_per_reach: float = Field(ge=0.0)
-    cg_left_inflation: float = Field(gt=0.0)
+    model_std: tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
+    model_per_reach: tuple[NonNegativeFloat, NonNegativeFloat]
     misfit_limit: float = Field(gt=0.0)
     most_position_score: float = Field(gt=0.0)
     most_noise_score: float = Field(gt=0.0)

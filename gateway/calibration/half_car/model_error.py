@@ -16,11 +16,12 @@ from scipy.special import stdtrit
 from gateway.quantity import Z95
 from gateway.records import F64
 
-USUAL_PAYLOAD_SHARE: Final = 0.008  # of the empty mass
-USUAL_FRONT_SHARE_PCT: Final = 0.15
+USUAL_PAYLOAD_SHARE: Final = 0.004  # of the empty mass
+USUAL_FRONT_SHARE_PCT: Final = 0.1
 USUAL_CG_LEFT_M: Final = 0.002
 """Model errors of simulated vans that serve no other purpose (`benchmarks.accuracy budget`)."""
-USUAL_PER_REACH: Final = 3.0  # how fast the error grows beyond the known loads: it doubles within a third of the empty mass
+USUAL_PER_REACH: Final = 1.0  # how fast the error grows beyond the known loads: it doubles within an empty mass
+USUAL_REACH: Final = 0.1  # of runs at the edge of a campaign, in parts of the empty mass
 PRIOR_RUNS: Final = 6  # so many runs would outweigh what other vans showed
 LEAST_PART: Final = 0.25  # of the usual variance: a campaign of one road and one speed shows less than there is
 
@@ -54,12 +55,10 @@ def model_error(runs: Sequence[RunError], empty_mass_kg: float) -> ModelError:
         pooled = max((PRIOR_RUNS * variance + sum(within)) / (PRIOR_RUNS + len(within)), LEAST_PART * variance)
         heavier = float(stdtrit(PRIOR_RUNS + len(within), 0.975)) / Z95
         stds.append(heavier * float(np.sqrt(pooled)))
-        beyond = [
-            max(0.0, (one.error[i] ** 2 - one.predicted[i]) / pooled - 1.0) / one.reach**2
-            for one in known
-            if one.reach > 0.0
-        ]
-        grown.append(float(np.sqrt((PRIOR_RUNS * USUAL_PER_REACH**2 + sum(beyond)) / (PRIOR_RUNS + len(beyond)))))
+        excess = [max(0.0, (one.error[i] ** 2 - one.predicted[i]) / pooled - 1.0) for one in known if one.reach > 0.0]
+        reach2 = [one.reach**2 for one in known if one.reach > 0.0]
+        weight = PRIOR_RUNS * USUAL_REACH**2
+        grown.append(float(np.sqrt((weight * USUAL_PER_REACH**2 + sum(excess)) / (weight + sum(reach2)))))
     return ModelError((stds[0], stds[1], stds[2]), (grown[0], grown[1]))
 
 

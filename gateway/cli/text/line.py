@@ -36,7 +36,8 @@ def _limits(held: LineFile) -> Iterator[str]:
         share = f"{errors.front_share_rms_pct:.2f} percentage points rms"
         yield f"siblings left out: payload {errors.payload_rms_kg:.1f} kg rms, front share {share}"
     limits = held.line.limits
-    yield f"{'widened by':28}{limits.payload_inflation:.2f} payload, {limits.front_share_inflation:.2f} front share"
+    payload_kg, share_pct, _ = limits.model_std
+    yield f"{'error of the model':28}{payload_kg:.1f} kg, {share_pct:.2f} percentage points (standard deviations)"
     yield f"{'misfit believed up to':28}{limits.misfit_limit:.2f}"
 
 
