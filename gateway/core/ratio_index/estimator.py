@@ -59,7 +59,3 @@ def _posterior(payload: Quantity, front_share: Quantity) -> Posterior | None:
     mean = np.array([one.number for one in known])
     std = np.array([0.5 * (one.interval95[1] - one.interval95[0]) / Z95 for one in known])
     return Posterior(mean, np.diag(0.5 * std**2), {Source.MODEL: np.diag(np.sqrt(0.5) * std)})
-
-
-def _predicted(model: RegressionModel | None, ra: float, rg: float) -> Quantity:
-    return Quantity(*model.predict(ra, rg)) if model else UNKNOWN
