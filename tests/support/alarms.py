@@ -13,7 +13,7 @@ from gateway.core.weights import weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.service.alarm_desk import AlarmDesk
-from gateway.service.tare_desk import Subject
+from gateway.service.subject import Subject
 from gateway.store import Store
 from gateway.web import Board
 from support.days import at, batch
