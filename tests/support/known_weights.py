@@ -133,7 +133,9 @@ class KnownWeightBench:
 
     def ticket(self, i: int, payload_kg: float, **stated: Any) -> dict[str, Any]:
         """A payload that is known of the i-th load of the store."""
-        return self._entry(self.service.add(KnownWeightKind.TICKET, "workshop", None, self.stated(i, payload_kg, **stated)))
+        return self._entry(
+            self.service.add(KnownWeightKind.TICKET, "workshop", None, self.stated(i, payload_kg, **stated))
+        )
 
     @staticmethod
     def stated(i: int, payload_kg: float, **stated: Any) -> StatedWeight:

@@ -333,7 +333,12 @@ def test_the_log_tells_of_every_change(bench: KnownWeightBench, caplog: pytest.L
     bench.service.take_back("office", made["id"])
     assert names(caplog) == [Event.WEIGHT_KNOWN, Event.WEIGHT_CONFIRMED, Event.WEIGHT_TAKEN_BACK]
     said = fields_of(caplog, Event.WEIGHT_KNOWN)
-    assert (said["known_weight_id"], said["kind"], said["by"], said["is_held"]) == (made["id"], "ticket", "workshop", True)
+    assert (said["known_weight_id"], said["kind"], said["by"], said["is_held"]) == (
+        made["id"],
+        "ticket",
+        "workshop",
+        True,
+    )
 
 
 def test_the_list_as_it_stood_at_any_time_is_known(bench: KnownWeightBench) -> None:
