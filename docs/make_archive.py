@@ -52,7 +52,7 @@ batch.window_s = 300.0                  # any key of [batch] in the settings
 id = "van-17"                           # its logs are in s3://fleet-logs/2026/van-17, and below
 vin = "WF0XXXTTGXJK12345"
 calibration = "van-17/vehicle.json"
-tare = "van-17/tare.json"               # as its gateway keeps it
+known_weights = "van-17/known_weights.json"  # as its gateway keeps it
 until = 2026-06-12                      # the day on which its springs were changed
 
 [[vehicles]]

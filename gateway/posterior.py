@@ -181,7 +181,7 @@ def fused(parts: Sequence[Posterior]) -> Posterior:
     return Posterior(mean, 0.5 * (own + own.T), sources, (tails[0], tails[1]))
 
 
-def _padded(matrix: F64, size: int) -> F64:
+def _padded(matrix: np.ndarray, size: int) -> F64:
     whole = np.zeros((size, size))
     whole[: len(matrix), : len(matrix)] = matrix
     return whole

@@ -50,7 +50,7 @@ PROVENANCE: Final[Mapping[str, str]] = {
     "software": "the version of springscale and the hash of the code that weighs",
     "job": "hash of everything that the row follows from; also the name of its file and receipt",
 }
-"""Columns that no estimate has; `calibration_id` and `tare_id` are among the estimate's own."""
+"""Columns that no estimate has; `calibration_id` and `known_weights_id` are among the estimate's own."""
 
 _LEFT_OUT: Final = frozenset({"spectra", "provisional", "way"})  # large; never true of a whole batch; of many parts
 

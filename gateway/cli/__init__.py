@@ -16,7 +16,7 @@ from gateway.errors import SpringscaleError
 
 _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",
-    "calibration": "Show, compare and check calibration files; re-zero a running service.",
+    "calibration": "Show, compare and check calibration files; state known weights to a running service.",
     "check-config": "Check a configuration, without opening the bus.",
     "commission": "Calibrate a running service's vehicle from its axle weights and an empty drive.",
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",

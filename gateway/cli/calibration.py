@@ -1,4 +1,4 @@
-"""springscale calibration: look at calibration files, compare and check them; re-zero a running service."""
+"""springscale calibration: look at calibration files, compare and check them; state known weights to a service."""
 
 import sys
 from dataclasses import asdict
@@ -18,8 +18,7 @@ from gateway.calibration.file import (
     load_calibration,
 )
 from gateway.calibration.file.check import Verdict
-from gateway.cli.asked.tare import tare_commands
-from gateway.cli.asked.ticket import ticket_commands
+from gateway.cli.asked.known_weights import tare_commands, ticket_commands
 from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.text.axle_weights import vehicle_block
 from gateway.cli.text.calibration import calibration_text
@@ -29,7 +28,7 @@ from gateway.stated import DIVISION_KG
 
 @click.group("calibration")
 def calibration() -> None:
-    """Look at calibration files, compare and check them; re-zero a running service (tare)."""
+    """Look at calibration files, compare and check them; state known weights to a running service (tare, ticket)."""
 
 
 calibration.add_command(tare_commands)
@@ -116,11 +115,10 @@ def sprung(
 
 def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:
     """What reading the file has already proved."""
-    version = f"version {held.version}" if held.migrated_from is None else "an older version, migrated"
     members = held.line.members if held.line else ()
     return (
         Check("content", Verdict.GOOD, f"matches its id {held.id}"),
-        Check("shape", Verdict.GOOD, version),
+        Check("shape", Verdict.GOOD, f"version {held.version}"),
         Check("model", Verdict.GOOD, f"known to this springscale: {', '.join(held.estimators) or 'no estimator'}"),
         *(Check("line", Verdict.GOOD, f"inherited from {member}, kept in this file") for member in members),
     )

@@ -116,7 +116,7 @@ class Flow:
     def _with_knowledge(self, found: Estimate, epoch: LoadEpoch | None) -> Estimate:
         knowledge = self.knowledge
         if knowledge is None or not knowledge.is_for(found.calibration_id, found.estimator):
-            return replace(found, epoch=epoch and epoch_of(epoch.posterior, epoch.n_batches))
+            return replace(found, epoch=None if epoch is None else epoch_of(epoch.posterior, epoch.n_batches))
 
         def known(posterior: Posterior) -> Posterior:
             return knowledge.applied(posterior, found.t_end_ns)
@@ -125,7 +125,7 @@ class Flow:
         answer = replace(
             found.answered(known(found.posterior)), measured=found.posterior, known_weights_id=knowledge.id
         )
-        return replace(answer, epoch=epoch and epoch_of(known(epoch.posterior), epoch.n_batches))
+        return replace(answer, epoch=None if epoch is None else epoch_of(known(epoch.posterior), epoch.n_batches))
 
     def _fused(self, batch: Batch, found: Estimate) -> LoadEpoch | None:
         """The load epoch that this batch belongs to; a new drive or a long stop opens a new one."""

@@ -118,13 +118,17 @@ class Knowledge:
     def applied(self, posterior: Posterior, t_ns: int) -> Posterior:
         """``posterior`` of a batch at t_ns with what is known of its sources.
 
-        Columns of lasting sources become S L with L L' = Cov[z]: they still stand for causes that all batches share.
+        Columns of lasting sources become R S with R R = Cov[z]: they still stand for causes that all batches share. R
+        is the symmetric root, the one closest to the identity, so that each column keeps most of its own source.
         """
         now = self._at(t_ns)
         columns = now._columns(posterior)
-        root = np.linalg.cholesky(now.covariance + 1e-12 * np.eye(len(now.mean)))
-        learned = root.T @ columns
-        known = {name: learned[place] for name, place in self.slots.items()}
+        values, vectors = np.linalg.eigh(now.covariance)
+        learned = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T @ columns
+        known = {}
+        for name, place in self.slots.items():
+            never_seen = posterior.sources.get(name, learned[:0])[place.stop - place.start :]
+            known[name] = np.concatenate([learned[place], never_seen])
         return replace(posterior, mean=posterior.mean - columns.T @ now.mean, sources={**posterior.sources, **known})
 
     def _at(self, t_ns: int) -> "Knowledge":

@@ -27,7 +27,6 @@ from gateway.service.parts import (
     ring_log_of,
     source_of,
     store_of,
-    tickets_of,
     uplink_of,
     webhook_of,
 )
@@ -35,7 +34,7 @@ from gateway.service.pipeline import Pipeline
 from gateway.service.proving import Proving
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
-from gateway.service.tare_desk import Subject, TareDesk
+from gateway.service.subject import Subject
 from gateway.service.web_server import WebServer
 from gateway.setup import Setup
 from gateway.status import State
@@ -111,16 +110,13 @@ class Gateway:
         )
         self.uplink = uplink_of(forwarding.broker, setup, self.store, with_places=with_places)
         self.webhook = webhook_of(forwarding.webhook, self.store, with_places=with_places)
-        self.tare = TareDesk(
+        self.proving = Proving(
             settings.store.directory,
+            settings.verification,
             subject,
             self.pipeline,
+            self.store,
             stale_after_s=settings.web.stale_after_s,
-            on_event=self.store.write_event,
-        )
-        tickets = tickets_of(settings, self.commissioning, self.keeper, subject, self.store)
-        self.proving = Proving(
-            settings.store.directory, settings.verification, subject, self.store, self.tare.zeros, tickets
         )
         self.broadcaster = broadcaster_of(settings.broadcast, self.board)
         parts = (self.keeper, self.proving, self.ring_log, self.broadcaster, self.uplink, self.webhook)
@@ -146,13 +142,12 @@ class Gateway:
             self.status,
             calibrated=setup.calibrated,
             tokens=token_file,
-            tare=self.tare,
+            known_weights=self.proving.known_weights,
             commissioning=self.commissioning,
             known_loads=known_loads,
             record=self.ring_log,
             verification=self.proving.verification,
             trend=self.proving.trend,
-            tickets=tickets,
             alarms=self.alarms,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
@@ -165,7 +160,7 @@ class Gateway:
 
     def _warnings(self) -> tuple[str, ...]:
         """What is broken beside the weighing, as people read it."""
-        parts = (self._tokens, self.tare, self._reload, self.keeper, self.ring_log, self.broadcaster)
+        parts = (self._tokens, self._reload, self.keeper, self.ring_log, self.broadcaster)
         faults = [part.fault for part in parts if part is not None]
         faults += (self.pipeline.roll_rate_fault, *self.proving.faults, self.commissioning.fault)
         return tuple(fault for fault in faults if fault)

@@ -16,10 +16,8 @@ from gateway.core.flow import Flow
 from gateway.errors import StoreError
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
-from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle, Worker, why_not_allowed
+from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle, why_not_allowed
 from gateway.service.keeper import BatchKeeper
-from gateway.service.proving import TicketDesk
-from gateway.service.tare_desk import Subject
 from gateway.setup import Setup
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings, uplink_settings
@@ -127,22 +125,6 @@ def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow
     )
     flow.on_batch, keeper.listener = keeper.keep, desk
     return desk
-
-
-def tickets_of(
-    settings: Settings, commissioning: Commissioning, keeper: BatchKeeper, subject: Subject, store: Store
-) -> TicketDesk:
-    directory = settings.store.directory
-    return TicketDesk(
-        commissioning.book,
-        Jobs(directory, settings.commissioning, settings.batch.for_core()),
-        keeper.shelf,
-        subject,
-        store.reader().estimates,
-        on_event=store.write_event,
-        make_worker=lambda on_result: Worker(directory / "refit", on_result),
-        why_not_allowed=why_not_allowed(settings),
-    )
 
 
 def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:

@@ -13,7 +13,7 @@ from typing import Final
 from gateway.bus.live import Inbox
 from gateway.bus.signals import Decoder
 from gateway.core.flow import Flow
-from gateway.core.tare import Weighed
+from gateway.core.fusion import WeighedLoad
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
@@ -57,7 +57,7 @@ class Pipeline:
         self.n_frames = 0  # frames whose estimates, if any, are handed over
         self.progress = 0  # grows with every turn of the loop: what the watchdog follows
         self._silent_s = 0.0
-        self._weighed_at: tuple[Weighed | None, float] = (None, 0.0)
+        self._weighed_at: tuple[WeighedLoad | None, float] = (None, 0.0)
         self._inbox = inbox
         self._store = store
         self._board = board

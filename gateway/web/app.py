@@ -31,16 +31,14 @@ from gateway.web.routes import (
     CommissioningDesk,
     FrameLog,
     KnownLoads,
+    KnownWeightService,
     NoAlarmDesk,
     NoCommissioningDesk,
     NoFrameLog,
-    NoTareDesk,
-    NoTicketDesk,
+    NoKnownWeights,
     NoTrend,
     NoVerificationDesk,
     Scales,
-    TareDesk,
-    TicketDesk,
     TrendDesk,
     VerificationDesk,
     alarms_router,
@@ -52,13 +50,12 @@ from gateway.web.routes import (
     health_router,
     j1939_router,
     known_loads_router,
+    known_weights_router,
     metrics_registry,
     reasons_router,
     record_router,
     rfms_router,
     spectra_router,
-    tare_router,
-    tickets_router,
     trend_router,
     vehicle_router,
     verification_router,
@@ -80,13 +77,12 @@ def create_app(
     settings: WebSettings | None = None,
     calibrated: CalibratedVehicle | None = None,
     tokens: TokenFile | None = None,
-    tare: TareDesk | None = None,
+    known_weights: KnownWeightService | None = None,
     commissioning: CommissioningDesk | None = None,
     known_loads: KnownLoads | None = None,
     record: FrameLog | None = None,
     verification: VerificationDesk | None = None,
     trend: TrendDesk | None = None,
-    tickets: TicketDesk | None = None,
     alarms: AlarmDesk | None = None,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
@@ -122,10 +118,9 @@ def create_app(
     app.include_router(reasons_router())
     app.include_router(vehicle_router(status, calibrated))
     app.include_router(spectra_router(board, calibrated))
-    app.include_router(tare_router(tare or NoTareDesk()))
+    app.include_router(known_weights_router(known_weights or NoKnownWeights()))
     app.include_router(verification_router(verification or NoVerificationDesk()))
     app.include_router(trend_router(trend or NoTrend()))
-    app.include_router(tickets_router(tickets or NoTicketDesk()))
     app.include_router(commissioning_router(commissioning or NoCommissioningDesk()))
     app.include_router(export_router(reader))
     app.include_router(events_router(reader))

@@ -7,15 +7,17 @@ from typing import Any
 
 from gateway.core.alarms import AlarmRules
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.fusion import epoch_of
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import weighed
-from gateway.estimate import Epoch, Estimate, Quantity
+from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.service.alarm_desk import AlarmDesk
-from gateway.service.tare_desk import Subject
+from gateway.service.subject import Subject
 from gateway.store import Store
 from gateway.web import Board
 from support.days import at, batch
+from support.estimates import posterior_of
 
 VAN = Vehicle(
     "van",
@@ -38,17 +40,13 @@ def of_load(
     share_pct: float = 50.0,
     n_batches: int = 1,
     std_kg: float = 14.0,
+    cg_left_m: float | None = None,
 ) -> Estimate:
     """The n-th batch of five minutes, and what ``n_batches`` of its load found together."""
-    found = batch(5.0 * n, 5.0 * (n + 1), kg, share_pct)
-    together = Quantity.normal(kg if load_kg is None else load_kg, std_kg if n_batches == 1 else 0.8 * std_kg)
-    found = replace(
-        found,
-        payload=Quantity.normal(kg, std_kg),
-        correlation=0.0,
-        epoch=Epoch(together, Quantity.normal(share_pct, 0.5), n_batches),
-    )
-    return weighed(found, VAN)
+    found = batch(5.0 * n, 5.0 * (n + 1), kg, share_pct).answered(posterior_of(kg, share_pct, std_kg, 0.5, cg_left_m))
+    together_kg, together_std_kg = kg if load_kg is None else load_kg, std_kg if n_batches == 1 else 0.8 * std_kg
+    together = posterior_of(together_kg, share_pct, together_std_kg, 0.5, cg_left_m)
+    return weighed(replace(found, epoch=epoch_of(together, n_batches)), VAN)
 
 
 SUBJECT = Subject(CalibratedVehicle("sha256:1", VAN, (0.0, 900.0), (40.0, 60.0)), "cross_spectrum", "van-17")

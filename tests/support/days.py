@@ -2,18 +2,28 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from gateway.core.events import Entry, Ledger, Rules
-from gateway.estimate import UNWATCHED, Estimate, Place, Quantity, Stop, Watched, Way, Weight, Weights
+from gateway.estimate import UNWATCHED, Estimate, Place, Stop, Watched, Way, Weight, Weights
+from gateway.posterior import Posterior, Source
 from gateway.records import Why
 from gateway.units import NS_PER_S
 
 T0_NS = 1_790_000_000_000_000_000
 RULES = Rules(range_kg=1000.0, mass_kg=2000.0)
 OWN_KG, SHARED_KG = 8.0, 12.0
+OWN_PCT, SHARED_PCT = 0.25, 0.43
 
 
 def at(minutes: float) -> int:
     return T0_NS + round(minutes * 60 * NS_PER_S)
+
+
+def posterior(kg: float, share_pct: float = 50.0, own_kg: float = OWN_KG) -> Posterior:
+    """With an error of the day that is the same in every batch."""
+    of_day = np.diag([SHARED_KG, SHARED_PCT])
+    return Posterior(np.array([kg, share_pct]), np.diag([own_kg**2, OWN_PCT**2]), {Source.DAY: of_day})
 
 
 def batch(
@@ -33,13 +43,7 @@ def batch(
     if kg is None:
         return replace(bare, rejected=(Why.TOO_SHORT,))
     gross = Weight(2000.0 + kg, 20.0, 2500.0, None)
-    return replace(
-        bare,
-        payload=Quantity.normal(kg, (OWN_KG**2 + SHARED_KG**2) ** 0.5),
-        front_share=Quantity.normal(share_pct, 0.5),
-        diagnostics={"payload_own_std_kg": OWN_KG, "front_share_own_std_pct": 0.25},
-        weights=Weights(gross=gross),
-    )
+    return replace(bare, weights=Weights(gross=gross)).answered(posterior(kg, share_pct))
 
 
 def day(*kg_of_leg: float | None, batches: int = 1, door: bool | None = None) -> list[Estimate]:

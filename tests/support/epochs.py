@@ -3,11 +3,13 @@
 from dataclasses import replace
 from pathlib import Path
 
-from gateway.core.fusion import fused, summary
-from gateway.estimate import Estimate, Quantity
+from gateway.core.change import Rules
+from gateway.core.fusion import epoch_of, fused_epoch
+from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.store import Store
 from gateway.units import NS_PER_S
+from support.estimates import posterior_of
 from support.patience import PATIENCE_S
 
 START_NS = 1_790_000_000_000_000_000
@@ -30,12 +32,11 @@ def drive_of(
             t_start_ns=start_ns + i * WINDOW_NS,
             t_end_ns=start_ns + (i + 1) * WINDOW_NS,
             estimator=estimator,
-            payload=Quantity.normal(payload_kg, 5.0),
-            front_share=Quantity.normal(share_pct, 0.3),
             calibration_id=calibration_id,
-        )
-        epoch = fused(epoch, batch)
-        found.append(replace(batch, epoch=summary(epoch)))
+        ).answered(posterior_of(payload_kg, share_pct, 5.0, 0.3))
+        epoch = fused_epoch(epoch, batch, Rules())
+        assert epoch is not None
+        found.append(replace(batch, epoch=epoch_of(epoch.posterior, epoch.n_batches)))
     return found
 
 

@@ -5,12 +5,23 @@ from typing import Any
 
 import numpy as np
 
-from gateway.estimate import Correction, Epoch, Estimate, Quantity, Weight, Weights
+from gateway.budget import budget_of
+from gateway.estimate import Epoch, Estimate, Quantity, Weight, Weights
 from gateway.estimate_json import estimate_to_json
+from gateway.posterior import Posterior, Source
 from gateway.records import Spectra, Why, json_line
 from gateway.units import NS_PER_S
 
 WINDOW_NS = 300 * NS_PER_S
+
+
+def posterior_of(
+    payload_kg: float, share_pct: float, std_kg: float, share_std_pct: float, cg_left_m: float | None = None
+) -> Posterior:
+    """Half of each variance is the batch's own, half the error of the model; no correlations."""
+    mean = np.array([payload_kg, share_pct, *([] if cg_left_m is None else [cg_left_m])])
+    std = np.array([std_kg, share_std_pct, 0.004])[: len(mean)]
+    return Posterior(mean, np.diag(0.5 * std**2), {Source.MODEL: np.diag(np.sqrt(0.5) * std)})
 
 
 def make_estimate(n: int, *rejected: Why, with_spectra: bool = False, is_provisional: bool = False) -> Estimate:
@@ -29,17 +40,22 @@ def make_estimate(n: int, *rejected: Why, with_spectra: bool = False, is_provisi
         rejected=rejected,
         is_provisional=is_provisional,
         spectra=Spectra(*(np.linspace(0.1 * k, 1.0, 4) for k in range(5))) if with_spectra else None,
+        posterior=posterior_of(payload_kg, 50.5, 6.0, 0.2) if has_answer else None,
         vehicle_id="van-17",
     )
 
 
 def with_everything(n: int) -> Estimate:
-    """The n-th batch with an epoch, a tare, weights, a place to the side, and what its estimator says of its own."""
+    """The n-th batch with an epoch, known weights, a budget, weights, a place to the side, and diagnostics."""
     found = make_estimate(n)
+    known = posterior_of(100.0 + n, 50.5, 6.0, 0.2, 0.021)
     return replace(
         found,
         epoch=Epoch(Quantity(101.0 / 3.0, 4.0), Quantity(50.2, 0.1), 3, Quantity(0.01, 0.003)),
-        tare=Correction("sha256:cd", Quantity(12.4, 1.0), Quantity(0.1, 0.2), found.payload, found.front_share),
+        posterior=known,
+        measured=posterior_of(112.4 + n, 50.6, 9.0, 0.3, 0.021),
+        known_weights_id="cd34",
+        error_budget=budget_of(known, is_shape_said=False),
         weights=Weights(gross=Weight(1711.3, 6.1, 2000.0, None), front_axle=Weight(1006.1, 5.4, 1000.0, None)),
         cg_left=Quantity.normal(0.021, 0.004),
         shares={"gap": 0.01, "too_slow": 1.0 / 3.0},

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.alarms import LIMIT_KG, VAN, of_load
 from support.days import T0_NS, at, batch
+from support.estimates import posterior_of
 
 from gateway.core.alarms import (
     CAUSE_NAMES,
@@ -27,6 +28,7 @@ from gateway.core.alarms import (
 )
 from gateway.core.alarms.alarm import NO_ESTIMATE, REFUSED, SILENT
 from gateway.core.alarms.weighing import beyond_probability
+from gateway.core.fusion import epoch_of
 from gateway.errors import AlarmRefusedError
 from gateway.estimate import Estimate, Quantity
 from gateway.records import Why, json_line
@@ -72,7 +74,7 @@ def test_a_load_that_becomes_sure_slowly_is_confirmed_at_once() -> None:
     near = LIMIT_KG + 15.0
     sure = of_load(3, near, n_batches=4)
     assert sure.epoch is not None
-    sure = replace(sure, epoch=replace(sure.epoch, payload=Quantity.normal(near, 8.0)))
+    sure = replace(sure, epoch=epoch_of(posterior_of(near, 50.0, 8.0, 0.5), 4))
     assert told(watching(), of_load(0, near), sure) == [("overload.gross", "final")]
 
 
@@ -103,7 +105,7 @@ def test_without_a_limit_nothing_is_too_much_and_what_stood_is_over() -> None:
 def test_a_weight_that_nobody_knows_changes_nothing() -> None:
     watch = watching()
     assert told(watch, of_load(0, LIMIT_KG + 60.0))
-    assert told(watch, replace(of_load(1, 0.0), payload=Quantity(), epoch=None)) == []
+    assert told(watch, replace(of_load(1, 0.0), payload=Quantity(), posterior=None, epoch=None)) == []
     assert told(watch, batch(10.0, 15.0, None)) == []
     assert [alarm.cause for alarm in watch.active()] == [GROSS]
 
@@ -113,10 +115,7 @@ def test_an_early_look_raises_no_alarm() -> None:
 
 
 def test_a_side_that_bears_too_much() -> None:
-    lying_left = Quantity.normal(0.15, 0.01)  # 60 % of a track of 1.5 m
-    found = replace(of_load(0, 300.0), cg_left=lying_left)
-    assert found.epoch is not None
-    found = replace(found, epoch=replace(found.epoch, cg_left=lying_left))
+    found = of_load(0, 300.0, cg_left_m=0.15)  # 60 % of a track of 1.5 m
     watch = watching()
     (alarm,) = watch.weigh(found, VAN)
     assert (alarm.cause.name, alarm.state) == ("imbalance.left_right", AlarmState.EARLY)

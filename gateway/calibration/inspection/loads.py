@@ -161,8 +161,10 @@ class _Labelled:
         """Run i by a half-car that has not seen the runs left out: the load, and its (payload, share) deviations."""
         others = [k for n, k in enumerate(self.known) if n not in left_out]
         refitted = fit_half_car(others, self._prior, self._prior.start(0.0, 0.0))  # the fit of all knows the label
-        located = locate(self.known[i].spectra, half_car_calibration(others, self.vehicle, refitted))
-        return located.point, np.sqrt(np.diag(located.load_covariance))
+        calibration = half_car_calibration(others, self.vehicle, refitted)
+        located = locate(self.known[i].spectra, calibration)
+        by_calibration = located.moves @ calibration.covariance @ located.moves.T
+        return located.point, np.sqrt(np.diag(located.own + located.rival_covariance + by_calibration))
 
 
 def _swap_findings(all_runs: _Labelled, i: int, j: int, evidence: float) -> Iterator[tuple[int, Finding]]:

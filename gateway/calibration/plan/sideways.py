@@ -9,6 +9,7 @@ from gateway.calibration.plan.loads import PlacedLoad, drivable_loads
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.core.weights import weights_of
 from gateway.estimate import Quantity
+from gateway.posterior import exactly
 
 LEAST_CG_LEFT_M: Final = 0.03  # of the sprung mass: what a load somewhere near the middle may do by chance
 TRACK_PART: Final = 0.25  # of the track width: as far to one side as a heavy load mostly goes between wheel arches

@@ -44,6 +44,10 @@ def by_ratio_index(batch: Batch, calibration: RatioIndexCalibration, blank: Esti
     return replace(answer, posterior=_posterior(answer.payload, answer.front_share))
 
 
+def _predicted(model: RegressionModel | None, ra: float, rg: float) -> Quantity:
+    return Quantity(*model.predict(ra, rg)) if model else UNKNOWN
+
+
 def _posterior(payload: Quantity, front_share: Quantity) -> Posterior | None:
     """Half of each variance is taken to be the batch's own, half the regression's; None without a payload.
 

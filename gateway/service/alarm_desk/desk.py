@@ -26,7 +26,7 @@ from gateway.estimate_json import estimate_from_json
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.service.alarm_desk.conditions import Silence, drift_says
-from gateway.service.tare_desk import Subject
+from gateway.service.subject import Subject
 from gateway.status import AlarmsStatus, Status
 from gateway.store import Store, StoreReader
 from gateway.web import Board

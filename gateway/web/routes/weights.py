@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import NOT_CALIBRATED, Place, Sideways, is_over_limit, place_of, weighed
+from gateway.core.weights import NOT_CALIBRATED, Place, is_over_limit, place_of, weighed
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.records import iso_utc
 from gateway.web.live.board import Board
@@ -60,11 +60,9 @@ class Scales:
 
     def place(self, estimate: Estimate | None) -> Place | None:
         """Where its payload lies; None where that cannot be told."""
-        e = estimate or _NONE
-        numbers = (e.payload.number, e.payload.std, e.front_share.number, e.front_share.std)
-        if self.vehicle is None or any(map(math.isnan, numbers)):
+        if self.vehicle is None or estimate is None or estimate.posterior is None:
             return None
-        return place_of(self.vehicle, e.payload, e.front_share, e.correlation, Sideways.of(e))
+        return place_of(self.vehicle, estimate.posterior)
 
 
 def weights_router(board: Board, scales: Scales) -> APIRouter:

@@ -29,7 +29,7 @@ class NoTrend:
 
 
 class PointTold(BaseModel):
-    """A week's mean, by the date of its Monday, or one tare."""
+    """A week's mean, by the date of its Monday, or one empty vehicle."""
 
     t: str
     number: float

@@ -10,7 +10,7 @@ from gateway.errors import CommissioningRefusedError
 from gateway.records import json_line
 from gateway.stated import VehicleAnswers
 from gateway.web.routes.calibration.asking import answered, json_response, who
-from gateway.web.routes.calibration.tare import UndoQuery
+from gateway.web.routes.calibration.known_weights import UndoQuery
 from gateway.web.routes.commissioning.shapes import (
     Begin,
     ChooseLine,

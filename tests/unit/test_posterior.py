@@ -1,0 +1,254 @@
+"""A posterior with its error by sources: algebra held against Monte Carlo, closed forms and laws."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.posterior import (
+    CG_LEFT,
+    FRONT_SHARE,
+    NORMAL_TAILS,
+    ONE_LOAD,
+    PAYLOAD,
+    Posterior,
+    Source,
+    difference,
+    exactly,
+    fused,
+)
+from gateway.quantity import Z95, Quantity
+from gateway.records import F64
+
+SCALE = np.array([10.0, 0.5, 0.01])  # kg, %, m
+
+
+def drawn(seed: int, size: int = 3, sources: tuple[Source, ...] = tuple(Source)) -> Posterior:
+    """Any posterior: correlated own errors, one to three columns a source."""
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((size, size + 2)) * SCALE[:size, None]
+    columns = {name: rng.standard_normal((int(rng.integers(1, 4)), size)) * SCALE[:size] for name in sources}
+    return Posterior(rng.standard_normal(size) * 10.0 * SCALE[:size], root @ root.T, columns)
+
+
+posteriors = st.builds(drawn, st.integers(0, 2**32 - 1), st.sampled_from([2, 3]))
+
+
+def samples(posterior: Posterior, z: dict[Source, F64], rng: np.random.Generator, n: int) -> F64:
+    """(n, d) as the model has it: mean, own error, and each source's z (n, k) times its columns."""
+    own = rng.multivariate_normal(np.zeros(posterior.size), posterior.own, n)
+    by_source = (z[name] @ columns for name, columns in posterior.sources.items())
+    return np.asarray(posterior.mean + own + sum(by_source, np.zeros((n, posterior.size))))
+
+
+@given(posteriors)
+def test_the_covariance_is_that_of_own_and_of_every_column(one: Posterior) -> None:
+    by_column = sum((np.outer(column, column) for columns in one.sources.values() for column in columns), one.own)
+    assert one.covariance == pytest.approx(by_column)
+    assert one.own + one.shared == pytest.approx(one.covariance)
+    variance = np.diag(one.own) + sum(one.share_of(name) ** 2 for name in one.sources)
+    assert variance == pytest.approx([one.std(i) ** 2 for i in range(one.size)])
+
+
+def test_draws_scatter_as_the_posterior_says() -> None:
+    rng = np.random.default_rng(1)
+    one = drawn(5)
+    z = {name: rng.standard_normal((200_000, len(columns))) for name, columns in one.sources.items()}
+    found = np.cov(samples(one, z, rng, 200_000).T)
+    scale = np.sqrt(np.diag(one.covariance))
+    assert found / np.outer(scale, scale) == pytest.approx(one.covariance / np.outer(scale, scale), abs=0.01)
+
+
+@given(posteriors, st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2), st.floats(0.0, 20.0))
+def test_a_linear_function_has_the_error_of_its_slopes(one: Posterior, slopes: list[float], beside: float) -> None:
+    found = one.linear(7.0, slopes, beside)
+    whole = np.r_[slopes, np.zeros(one.size - 2)]
+    assert found.number == 7.0
+    assert found.std == pytest.approx(np.sqrt(whole @ one.covariance @ whole + beside**2), abs=1e-9)
+    assert found.interval95 == pytest.approx((7.0 - Z95 * found.std, 7.0 + Z95 * found.std), abs=1e-6)
+    assert one.covariance_of(slopes, slopes) == pytest.approx(whole @ one.covariance @ whole, abs=1e-9)
+
+
+def test_a_linear_function_against_monte_carlo() -> None:
+    """The gross and the front axle weight of 1500 kg: L + M and (D / 100) (L + M)."""
+    rng = np.random.default_rng(2)
+    one = Posterior(
+        np.array([300.0, 48.0]), np.diag([36.0, 0.04]), {Source.DAY: np.array([[8.0, -0.2]]), Source.MODEL: np.eye(2)}
+    )
+    z = {name: rng.standard_normal((400_000, len(columns))) for name, columns in one.sources.items()}
+    payload, share = samples(one, z, rng, 400_000).T
+    front = one.linear(0.48 * 1500.0, [0.48, 15.0])
+    assert front.std == pytest.approx(np.std((1200.0 + payload) * share / 100.0), rel=0.01)
+    both = np.cov(1200.0 + payload, (1200.0 + payload) * share / 100.0)
+    assert one.covariance_of([1.0], [0.48, 15.0]) == pytest.approx(both[0, 1], rel=0.02)
+
+
+def test_what_hangs_on_an_unknown_place_is_unknown() -> None:
+    one = drawn(3, size=2)
+    found = one.linear(5.0, [1.0, 0.0, 2.0])
+    assert found.number == 5.0
+    assert np.isnan([found.std, *found.interval95]).all()
+    assert one.linear(5.0, [1.0, 0.0, 0.0]) == one.linear(5.0, [1.0])
+    assert np.isnan(one.quantity(CG_LEFT).number)
+    assert np.isnan(one.std(CG_LEFT))
+    assert np.isnan(one.correlation(PAYLOAD, CG_LEFT))
+
+
+SKEWED = Posterior(
+    np.array([300.0, 50.0]), np.diag([25.0, 0.01]), {Source.LOAD_LENGTH: np.array([[20.0, -0.2]])}, (1.2, 2.6)
+)
+
+
+def test_an_interval_is_as_skewed_as_the_error_of_the_shape() -> None:
+    payload = SKEWED.quantity(PAYLOAD)
+    below, above = 300.0 - payload.interval95[0], payload.interval95[1] - 300.0
+    assert (below, above) == pytest.approx((np.hypot(Z95 * 5.0, 1.2 * 20.0), np.hypot(Z95 * 5.0, 2.6 * 20.0)))
+    assert payload.std == pytest.approx(np.hypot(5.0, 20.0))
+    low, high = SKEWED.quantity(FRONT_SHARE).interval95  # falls as the payload rises: the other way round
+    assert (50.0 - low, high - 50.0) == pytest.approx((np.hypot(Z95 * 0.1, 2.6 * 0.2), np.hypot(Z95 * 0.1, 1.2 * 0.2)))
+
+
+def test_skewed_intervals_hold_what_is_skewed() -> None:
+    """A shape's error that is log-normal, of unit standard deviation, beside a normal one half as large."""
+    rng = np.random.default_rng(3)
+    shape = np.exp(0.5 * rng.standard_normal(400_000))
+    shape = (shape - shape.mean()) / shape.std()
+    low, high = np.quantile(shape, [0.025, 0.975])
+    one = Posterior(np.zeros(1), 0.25 * np.eye(1), {Source.GOODS: np.ones((1, 1))}, (-low, high))
+    error = shape + 0.5 * rng.standard_normal(400_000)
+    begin, end = one.quantity(PAYLOAD).interval95
+    assert np.mean((begin <= error) & (error <= end)) == pytest.approx(0.95, abs=0.01)
+    assert (np.mean(error < begin), np.mean(error > end)) == pytest.approx((0.025, 0.025), abs=0.012)  # tails add in quadrature only nearly
+
+
+def test_exactly_known_has_no_error() -> None:
+    assert exactly(300.0, 48.0, 0.02).quantity(CG_LEFT) == Quantity(0.02, 0.0, (0.02, 0.02))
+    assert exactly(300.0).size == 1
+    assert np.isnan(exactly(300.0, 48.0).correlation(PAYLOAD, FRONT_SHARE))
+
+
+@given(st.lists(st.integers(0, 2**32 - 1), min_size=1, max_size=5))
+def test_fusion_weighs_by_own_information(seeds: list[int]) -> None:
+    parts = [drawn(seed) for seed in seeds]
+    together = fused(parts)
+    information = [np.linalg.inv(part.own) for part in parts]
+    own = np.linalg.inv(sum(information, np.zeros((3, 3))))
+    mean = own @ sum((each @ part.mean for each, part in zip(information, parts, strict=True)), np.zeros(3))
+    assert together.own / np.outer(SCALE, SCALE) == pytest.approx(own / np.outer(SCALE, SCALE), rel=1e-5, abs=1e-8)
+    assert together.mean / SCALE == pytest.approx(mean / SCALE, rel=1e-5, abs=1e-6)
+
+
+@given(st.lists(st.tuples(st.integers(0, 2**32 - 1), st.sampled_from([2, 3])), min_size=1, max_size=5), st.randoms())
+def test_fusion_does_not_know_the_order(drawn_of: list[tuple[int, int]], random: object) -> None:
+    parts = [drawn(*each) for each in drawn_of]
+    shuffled = parts.copy()
+    random.shuffle(shuffled)  # type: ignore[attr-defined]
+    one, other = fused(parts), fused(shuffled)
+    assert one.mean == pytest.approx(other.mean, rel=1e-6, abs=1e-6)
+    assert one.covariance == pytest.approx(other.covariance, rel=1e-6, abs=1e-6)
+
+
+def test_fused_errors_against_monte_carlo() -> None:
+    """Two batches with one place known, over common z: mean and covariance as the fusion says."""
+    rng = np.random.default_rng(4)
+    n = 200_000
+    three, two = drawn(1, sources=(Source.DAY, Source.CALIBRATION)), drawn(2, 2, sources=(Source.DAY,))
+    z = {name: rng.standard_normal((n, 3)) for name in Source}
+    together = fused([three, two])
+    errors = []
+    for part in (three, two):
+        its_z = {name: z[name][:, : len(columns)] for name, columns in part.sources.items()}
+        errors.append(samples(part, its_z, rng, n) - part.mean)
+    weight_three = together.own @ np.linalg.inv(three.own)
+    weight_two = together.own @ np.pad(np.linalg.inv(two.own), (0, 1))
+    of_both = errors[0] @ weight_three.T + errors[1] @ weight_two[:, :2].T
+    scale = np.sqrt(np.diag(together.covariance))
+    found = np.cov(of_both.T) / np.outer(scale, scale)
+    assert found == pytest.approx(together.covariance / np.outer(scale, scale), abs=0.015)
+
+
+def test_fusion_needs_a_batch_and_leaves_one_alone() -> None:
+    one = drawn(9)
+    assert fused([one]) is one
+    with pytest.raises(ValueError, match="no batch"):
+        fused([])
+
+
+def test_a_batch_without_a_place_narrows_the_others_through_their_correlation() -> None:
+    three = Posterior(np.array([300.0, 50.0, 0.02]), np.array([[64.0, 0.0, 0.04], [0.0, 0.1, 0.0], [0.04, 0.0, 4e-5]]))
+    two = Posterior(np.array([310.0, 50.0]), np.diag([64.0, 0.1]))
+    together = fused([three, two])
+    assert together.mean[PAYLOAD] == pytest.approx(305.0)
+    assert together.std(CG_LEFT) < three.std(CG_LEFT)
+    assert together.mean[CG_LEFT] == pytest.approx(0.02 + 0.04 / 64.0 * 5.0)  # moves along as the errors do
+
+
+def of_sources(payload_kg: float, own_kg: float, **columns: float) -> Posterior:
+    by_source = {Source[name]: np.array([[kg, 0.0]]) for name, kg in columns.items()}
+    return Posterior(np.array([payload_kg, 50.0]), np.diag([own_kg**2, 0.01]), by_source)
+
+
+def test_what_is_common_cancels_in_a_difference_and_own_errors_add() -> None:
+    one, other = (of_sources(kg, 6.0, CALIBRATION=30.0, MODEL=8.0) for kg in (200.0, 200.0))
+    mean, covariance = difference(one, other, is_one_load=True)
+    assert mean.tolist() == [0.0, 0.0]
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(np.hypot(6.0, 6.0))
+
+
+def test_what_grows_with_the_load_stays_in_proportion_to_the_change() -> None:
+    one, other = (of_sources(kg, 6.0, CALIBRATION=0.1 * kg) for kg in (200.0, 260.0))
+    _, covariance = difference(one, other, is_one_load=False)
+    assert covariance[0, 0] == pytest.approx(2.0 * 36.0 + 6.0**2)
+
+
+@pytest.mark.parametrize("name", sorted(ONE_LOAD))
+def test_what_lasts_for_one_load_is_common_as_far_as_the_loads_are(name: Source) -> None:
+    def variance(before_kg: float, after_kg: float, *, is_one_load: bool) -> float:
+        pair = (of_sources(kg, 0.0, **{name.name: 10.0}) for kg in (before_kg, after_kg))
+        return float(difference(*pair, is_one_load=is_one_load)[1][0, 0])
+
+    assert variance(200.0, 260.0, is_one_load=True) == pytest.approx(0.0)
+    assert variance(200.0, 200.0, is_one_load=False) == pytest.approx(0.0)
+    assert variance(0.0, 200.0, is_one_load=False) == pytest.approx(200.0)
+    assert variance(100.0, 200.0, is_one_load=False) == pytest.approx(100.0)
+
+
+@given(posteriors, posteriors, st.booleans())
+def test_a_difference_is_as_sure_in_either_direction(one: Posterior, other: Posterior, is_one_load: bool) -> None:
+    there, back = (difference(*pair, is_one_load=is_one_load) for pair in ((one, other), (other, one)))
+    assert there[0] == pytest.approx(-back[0])
+    assert there[1] == pytest.approx(back[1], rel=1e-9, abs=1e-9)
+    size = min(one.size, other.size)
+    assert there[1].shape == (size, size)
+    assert np.linalg.eigvalsh(there[1] / np.outer(SCALE[:size], SCALE[:size])).min() > -1e-9
+
+
+@given(posteriors)
+def test_of_itself_nothing_is_left_but_own_errors_twice(one: Posterior) -> None:
+    assert difference(one, one, is_one_load=True)[1] == pytest.approx(2.0 * one.own)
+
+
+def test_a_source_may_be_added_to_and_taken_away() -> None:
+    one = drawn(7, sources=(Source.DAY,))
+    more = one.with_source(Source.DAY, np.ones((1, 3))).with_source(Source.MODEL, np.eye(3))
+    assert len(more.sources[Source.DAY]) == len(one.sources[Source.DAY]) + 1
+    assert more.without(Source.MODEL, Source.DAY).covariance == pytest.approx(one.own)
+    assert not one.share_of(Source.MODEL).any()
+
+
+def test_the_first_quantities_alone_are_as_they_were() -> None:
+    one = drawn(8)
+    two = one.first(2)
+    assert one.first(3) is one
+    assert two.size == 2
+    assert two.covariance == pytest.approx(one.covariance[:2, :2])
+    assert two.tails == NORMAL_TAILS
+
+
+@pytest.mark.parametrize(
+    "other",
+    [drawn(2), drawn(1, 2), drawn(1, sources=(Source.DAY,)), Posterior(drawn(1).mean, drawn(1).own), "no posterior"],
+)
+def test_equality_is_of_numbers(other: object) -> None:
+    assert drawn(1) == drawn(1)
+    assert drawn(1) != other

@@ -1,0 +1,86 @@
+"""The shape of a load as a hypothesis: held against a quadratic cost, where everything has a closed form."""
+
+from math import log
+
+import numpy as np
+import pytest
+
+from gateway.core.cargo import ShapePrior
+from gateway.core.cross_spectrum.search import Found
+from gateway.core.cross_spectrum.shape import NODES_PER_WHEELBASE2, Shaped, shaped
+from gateway.posterior import NORMAL_TAILS
+from gateway.quantity import Z95
+from gateway.records import F64
+
+WHEELBASE_M = 2.8
+MEAN, STD = log(0.06 * WHEELBASE_M**2), 0.5  # of log s before the batch
+LOG_S = np.linspace(MEAN - 2.5, MEAN + 2.5, 401)
+SLOPE = np.array([60.0, -0.01])  # kg and 0..1 for each unit of log s
+
+
+def gaussian() -> ShapePrior:
+    density = np.exp(-0.5 * ((LOG_S - MEAN) / STD) ** 2)
+    return ShapePrior(LOG_S, density / density.sum(), habit=0.5)
+
+
+def weighed(evidence: float, best: float, std: float, prior: ShapePrior | None = None) -> Shaped:
+    """A cost that is quadratic about ``best``, and a load that is linear in log s; one more number before the load."""
+
+    def sought(log_s: float, start: F64) -> Found:
+        x = np.r_[log_s - MEAN, 300.0 + SLOPE[0] * (log_s - MEAN), 0.5 + SLOPE[1] * (log_s - MEAN)]
+        return Found(x, 0.5 * ((log_s - best) / std) ** 2, np.eye(3))
+
+    start = log(NODES_PER_WHEELBASE2[2] * WHEELBASE_M**2)
+    return shaped(prior or gaussian(), WHEELBASE_M, (start, sought(start, np.zeros(3))), sought, evidence)
+
+
+def test_without_evidence_the_prior_is_left() -> None:
+    found = weighed(0.0, MEAN + 1.0, 0.3)
+    assert found.log_s == pytest.approx(MEAN, abs=0.01)
+    assert found.load == pytest.approx([300.0, 0.5], abs=0.6)
+    assert found.column == pytest.approx(STD * SLOPE, rel=0.02)
+    assert found.tails == pytest.approx(NORMAL_TAILS, rel=0.03)
+    assert found.goods_part == pytest.approx(0.5, rel=0.05)
+
+
+@pytest.mark.parametrize("evidence", [0.2, 1.0])
+def test_the_posterior_is_that_of_two_normal_distributions(evidence: float) -> None:
+    """Precisions add, the evidence's in the part that it counts."""
+    best, std = MEAN + 0.4, 0.6
+    precision = STD**-2 + evidence * std**-2
+    mean = (MEAN * STD**-2 + best * evidence * std**-2) / precision
+    found = weighed(evidence, best, std)
+    assert found.log_s == pytest.approx(mean, abs=0.02)
+    assert found.load == pytest.approx(np.array([300.0, 0.5]) + SLOPE * (mean - MEAN), rel=0.01)
+    assert found.column == pytest.approx(SLOPE / np.sqrt(precision), rel=0.04)
+    assert found.tails == pytest.approx((Z95, Z95), rel=0.05)
+    assert found.x[0] == pytest.approx(mean - MEAN, abs=0.02)
+
+
+def test_what_the_evidence_leaves_is_less_of_a_habit() -> None:
+    vague, sure = weighed(0.1, MEAN, 0.6), weighed(1.0, MEAN, 0.2)
+    assert 0.0 < sure.goods_part < vague.goods_part <= 0.5
+
+
+def test_the_column_says_how_payload_and_share_go_together() -> None:
+    found = weighed(1.0, MEAN, 0.5)
+    assert found.column[1] / found.column[0] == pytest.approx(SLOPE[1] / SLOPE[0], rel=0.01)
+
+
+def test_a_skewed_prior_gives_skewed_tails() -> None:
+    """Most loads are compact, some are much longer."""
+    compact, long = (np.exp(-0.5 * ((LOG_S - at) / 0.3) ** 2) for at in (MEAN - 0.6, MEAN + 0.9))
+    density = 0.8 * compact + 0.2 * long
+    found = weighed(0.0, MEAN, 1.0, ShapePrior(LOG_S, density / density.sum(), 0.5))
+    below, above = found.tails
+    assert above > 1.3 * below
+    drawn = np.random.default_rng(1).choice(LOG_S, 200_000, p=density / density.sum())
+    error = (drawn - drawn.mean()) / drawn.std()
+    assert (-below, above) == pytest.approx(tuple(np.quantile(error, [0.025, 0.975])), abs=0.1)
+
+
+def test_a_shape_that_is_known_leaves_nothing_open() -> None:
+    narrow = np.exp(-0.5 * ((LOG_S - MEAN) / 0.02) ** 2)
+    found = weighed(1.0, MEAN, 0.5, ShapePrior(LOG_S, narrow / narrow.sum(), 0.5))
+    assert np.abs(found.column[0]) < 0.05 * SLOPE[0]
+    assert found.log_s == pytest.approx(MEAN, abs=0.02)
