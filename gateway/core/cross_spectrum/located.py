@@ -125,14 +125,13 @@ def locate(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """What holds at the peak of a search, once the parameters that it held fixed have moved as far as batch and prior
-    let them (one Gauss-Newton step of the STEADY parameters t, those sought moving along).
+    """What holds at the peak of a search, with the STEADY parameters t that it held fixed taken into account.
 
     whole is the curvature of all parameters and the load, covariance that of what was sought (FITTED: drifting
-    parameters and load). cost is that of the peak less what the step gained, and half the logarithm of how much the
-    batch narrowed t: minus the logarithm of the evidence, t integrated out. shift (k,) is the step of what was sought,
-    steady (k, s) by how much that moves with an error of each t that the prior leaves, after the step; own (k, k) what
-    the batch's noise adds by it.
+    parameters and load). cost is minus the logarithm of the evidence by Laplace's approximation, t integrated out over
+    what calibration and nature leave open of it. One Gauss-Newton step moves t as far as the batch and one day's nature
+    let it: shift (k,) is how far what was sought moves along, steady (k, s) by how much it moves with an error of each
+    t after that step, own (k, k) what the batch's noise adds by it.
     """
 
     whole: Curvature
@@ -161,8 +160,9 @@ def answer_at(
 ) -> Answer:
     """``expected`` (k,) are the drifting parameters that the prior expects; a shape that is sought is no error of t.
 
-    With g and I the gradient and information of t at the peak and S their prior covariance, the step is
-    -w (w I + S^-1)^-1 g, w being how much the batch's evidence counts.
+    With g and I the gradient and information of t at the peak and N its covariance by nature, the step is
+    -w (w I + N^-1)^-1 g, w being how much the batch's evidence counts. What calibration left open is not moved: its
+    drives were many, and a batch is one.
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
@@ -175,16 +175,19 @@ def answer_at(
     along = -covariance @ whole.information[np.ix_(FITTED, t)]  # what was sought moves by -C I_xt with each t
     gradient = whole.gradient[t] + along.T @ pull
     information = whole.information[np.ix_(t, t)] + along.T @ whole.information[np.ix_(FITTED, t)]
-    prior = calibration.covariance[np.ix_(t, t)] + NATURE_OF_STEADY[np.ix_(free, free)]
-    narrowing = np.eye(len(t)) + evidence * prior @ information
-    posterior = np.linalg.solve(narrowing, prior)
+    nature = NATURE_OF_STEADY[np.ix_(free, free)]
+    left_open = np.eye(len(t)) + evidence * (calibration.covariance[np.ix_(t, t)] + nature) @ information
+    pulled = (calibration.covariance[np.ix_(t, t)] + nature) @ gradient
+    gained = -0.5 * evidence * float(gradient @ np.linalg.solve(left_open, pulled))
+    narrowed = 0.5 * float(np.linalg.slogdet(left_open)[1]) / evidence
+    narrowing = np.eye(len(t)) + evidence * nature @ information
+    posterior = np.linalg.solve(narrowing, nature)
     step = -evidence * posterior @ gradient
-    gained = 0.5 * float(gradient @ step) + 0.5 * float(np.linalg.slogdet(narrowing)[1]) / evidence
     steady = np.zeros((len(along), len(STEADY)))
     steady[:, free] = along @ np.linalg.inv(narrowing)  # S_posterior S^-1
     by_noise = along @ posterior * evidence
     at_peak = whittle.cost(point) + 0.5 * float(off @ DRIFT_PRECISION @ off)
-    return Answer(whole, covariance, at_peak + gained, along @ step, steady, by_noise @ information @ by_noise.T)
+    return Answer(whole, covariance, at_peak + gained + narrowed, along @ step, steady, by_noise @ information @ by_noise.T)
 
 
 def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
