@@ -174,7 +174,7 @@ class _Tried:
 
 
 def expected_of(found: CrossSpectrumCalibration, vehicle: Vehicle, speed_mps: float) -> Errors:
-    """Mean |error| (12) of Gaussian errors with the variances that the service would state, over the vehicle's loads."""
+    """Mean |error| (12) of Gaussian errors with the variances that the service would state, over all loads."""
     prior = shape_prior(vehicle, *found.known_shape)
     drive = Drive(BATCH_S, speed_mps)
     stated = [predicted(found, prior, placed.load, drive).covariance for placed in weighed_loads(vehicle)]

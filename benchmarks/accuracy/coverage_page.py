@@ -56,7 +56,7 @@ def _protocol(found: Mapping[str, Any]) -> str:
         "truth, with its own 95 % limits: batches of one run (of one van) are alike, so the limits are those of as "
         "many independent batches as scatter like the runs (the vans) do. +- is the mean of half the 95 % intervals. "
         "The interval score is their width and 40 times what the truth lies outside; in brackets what it would be, "
-        "were errors normal and intervals as wide as they should be. Loads are drawn of every length and height: boxes, "
+        "were errors normal and intervals as wide as they should be. Loads are of every length and height: boxes, "
         "parcels all over the floor, a filled bay, tall and long ones, pipes, and some with a part on the roof; nobody "
         "says which."
     )

@@ -215,12 +215,12 @@ def _line(kind: str, estimator: str, has_roll_rate: bool, batches: Sequence[Judg
         front_share_coverage_by_van=_coverage(answered, share, lambda b: b.van),
         cg_left_mean_abs_mm=_mean_abs([1000.0 * batch.cg_left_error_m for batch in placed]),
         cg_left_coverage=_coverage(placed, lambda b: b.is_cg_left_covered, lambda b: b.run),
-        payload_half_width_pct=_mean_abs([batch.payload_half_width_pct for batch in answered]),
-        payload_interval_score_pct=_mean_abs([batch.payload_score_pct for batch in answered]),
-        front_share_half_width_pct=_mean_abs([batch.front_share_half_width_pct for batch in answered]),
-        front_share_interval_score_pct=_mean_abs([batch.front_share_score_pct for batch in answered]),
-        cg_left_half_width_mm=_mean_abs([1000.0 * batch.cg_left_half_width_m for batch in placed]),
-        cg_left_interval_score_mm=_mean_abs([1000.0 * batch.cg_left_score_m for batch in placed]),
+        payload_half_width_pct=_mean_known([batch.payload_half_width_pct for batch in answered]),
+        payload_interval_score_pct=_mean_known([batch.payload_score_pct for batch in answered]),
+        front_share_half_width_pct=_mean_known([batch.front_share_half_width_pct for batch in answered]),
+        front_share_interval_score_pct=_mean_known([batch.front_share_score_pct for batch in answered]),
+        cg_left_half_width_mm=_mean_known([1000.0 * batch.cg_left_half_width_m for batch in placed]),
+        cg_left_interval_score_mm=_mean_known([1000.0 * batch.cg_left_score_m for batch in placed]),
     )
 
 
@@ -230,6 +230,11 @@ def _counted(reasons: Sequence[str]) -> dict[str, int]:
 
 def _mean_abs(errors_pct: Sequence[float]) -> float | None:
     return float(np.mean(np.abs(errors_pct))) if errors_pct else None
+
+
+def _mean_known(numbers: Sequence[float]) -> float | None:
+    """Of those that are known: an answer without an interval has no width."""
+    return _mean_abs([x for x in numbers if math.isfinite(x)])
 
 
 def _coverage(

@@ -72,7 +72,7 @@ class Carried:
 
 @dataclass(frozen=True, slots=True)
 class Weighed:
-    """A batch that counted, in percent of the rated payload: its error, half its 95 % interval, and that one's score."""
+    """A batch that counted, in percent of the rated payload: its error, half its 95 % interval, and its score."""
 
     error_pct: float
     half_width_pct: float

@@ -70,7 +70,7 @@ def delivery_page(found: Mapping[str, Any]) -> str:
             "of the rated payload; the interval score is the width of the 95 % interval and 40 times what the truth "
             "lies outside, in brackets what it would be for normal errors and intervals of the right width:",
             "",
-            "| campaign says | batches | mean abs. error | bias | +- (95 %, mean) | interval score | within 95 % interval |",
+            "| campaign says | batches | mean abs. error | bias | +- (mean) | interval score | within 95 % interval |",
             "|---|---|---|---|---|---|---|",
             *(_batches_line(words, found["said"][said]["batches"]) for said, words in SAID),
             "",
@@ -88,10 +88,10 @@ def delivery_page(found: Mapping[str, Any]) -> str:
 
 
 def _batches_line(words: str, batches: Mapping[str, Any]) -> str:
+    score = score_cell(batches["interval_score_pct"], batches["mean_abs_pct"])
     return (
         f"| {words} | {batches['n']} | {batches['mean_abs_pct']:.1f} % | {batches['bias_pct']:+.1f} % | "
-        f"{batches['half_width_pct']:.1f} % | "
-        f"{score_cell(batches['interval_score_pct'], batches['mean_abs_pct'])} | {_share(batches['n_held'], batches['n'])} |"
+        f"{batches['half_width_pct']:.1f} % | {score} | {_share(batches['n_held'], batches['n'])} |"
     )
 
 

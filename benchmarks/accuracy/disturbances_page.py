@@ -34,9 +34,9 @@ def disturbances_page(found: Mapping[str, Any]) -> str:
             "is aboard as the van may carry. Sensors sit up to 0.4 m beside the centre line, loads within 0.1 m of it, "
             "sideways 0.15 to 0.35 m; a line without a roll rate is calibrated without one too. Errors are percent of "
             "the rated payload and of 20 percentage points, over the batches that were answered. The two columns "
-            "before the widths count batches whose 95 % interval held, and those refused for a reason that is right. +- "
-            "is the mean of half the 95 % intervals; the interval score is their width and 40 times what the truth lies "
-            "outside, in brackets what it would be for normal errors and intervals of the right width.",
+            "before the widths count batches whose 95 % interval held, and those refused for a reason that is right. "
+            "+- is the mean of half the 95 % intervals; the interval score is their width and 40 times what the truth "
+            "lies outside, in brackets what it would be for normal errors and intervals of the right width.",
             "",
             "| " + " | ".join(COLUMNS) + " |",
             "|" + "---|" * len(COLUMNS),

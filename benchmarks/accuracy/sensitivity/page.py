@@ -28,8 +28,8 @@ def sensitivity_page(found: Mapping[str, Any]) -> str:
             f"{found['n_vans']} simulated vans that nothing was chosen on: calibrated on six known loads, then driven "
             "once in each of the ways of [coverage](coverage.md), each time with another load. Errors are percent of "
             "the rated payload and of 20 percentage points, over batches that were answered; held is the share of "
-            "these whose 95 % interval holds the truth, +- the mean of half these intervals, and the score that of their "
-            "width and 40 times what the truth lies outside.",
+            "these whose 95 % interval holds the truth, +- the mean of half these intervals, and the score that of "
+            "their width and 40 times what the truth lies outside.",
             "",
             *_table(WEIGHED, [_weighed_cells("as they are", "1", usual), *_rows(found["weighing"], _weighed_cells)]),
             "",

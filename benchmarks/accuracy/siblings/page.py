@@ -40,7 +40,8 @@ def siblings_page(found: Mapping[str, Any]) -> str:
             "|" + "---|" * len(COLUMNS),
             *("| " + " | ".join(_cells(row)) + " |" for row in found["rows"]),
             "",
-            "The line's own file knows nothing of the sibling, and its intervals nothing of that; a known weight of the empty vehicle mends the "
+            "The line's own file knows nothing of the sibling, and its intervals nothing of that; knowing once that "
+            "the vehicle is empty mends the "
             "zero alone. Alone, an empty drive leaves the springs' answer to load to a guess, so that the vehicle is "
             "believed near its own speeds only. The sister tells the rest.",
             "",
