@@ -116,11 +116,10 @@ def sprung(
 
 def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:
     """What reading the file has already proved."""
-    version = f"version {held.version}" if held.migrated_from is None else "an older version, migrated"
     members = held.line.members if held.line else ()
     return (
         Check("content", Verdict.GOOD, f"matches its id {held.id}"),
-        Check("shape", Verdict.GOOD, version),
+        Check("shape", Verdict.GOOD, f"version {held.version}"),
         Check("model", Verdict.GOOD, f"known to this springscale: {', '.join(held.estimators) or 'no estimator'}"),
         *(Check("line", Verdict.GOOD, f"inherited from {member}, kept in this file") for member in members),
     )

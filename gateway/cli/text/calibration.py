@@ -16,7 +16,7 @@ def calibration_text(held: CalibrationFile) -> str:
         "warnings": iter(held.warnings or ("none",)),
         "made by": _provenance(held),
     }
-    lines = [held.id, f"version {held.version}{', migrated from an older one' if held.migrated_from else ''}"]
+    lines = [held.id, f"version {held.version}"]
     lines.append(f"estimators: {', '.join(held.estimators) or 'none'}")
     for title, rows in sections.items():
         lines += ["", title, *(f"  {row}" for row in rows)]
