@@ -50,7 +50,8 @@ and [learning curve](learning_curve.md); do not edit by hand.
 Mean absolute errors over the five-minute batches that were answered, payload in percent of the vehicle's payload range
 and front share in percent of 20 percentage points; how often the 95 % intervals held the truth, the mean of their
 half-widths and their interval score (width, and 40 times what the truth lies outside; in brackets 5.86 times the mean
-error, which normal errors and intervals of the right width give); and how many batches were refused. "Published" are the figures of the paper, which measured the experiment on a real vehicle.
+error, which normal errors and intervals of the right width give); and how many batches were refused. "Published" are
+the figures of the paper, which measured the experiment on a real vehicle.
 
 **Everything of ours in this table is simulated.** The first four rows repeat the paper's tests. The next two are drives
 recorded from another simulator, written independently of this one. The others are vans on which no choice in the
