@@ -17,25 +17,29 @@ from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_
 from benchmarks.accuracy.siblings.drives import Driven, draw_line, sibling, sister
 from benchmarks.accuracy.vans import OnVan, of_each_van
 from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
-from gateway.calibration.judgement import Judged, judge
+from gateway.calibration.judgement import judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.line import Line, Sibling, Sister, line_of, with_siblings_left_out
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.tare import Tare, Zero, tared
+from gateway.core.known_weights import Knowledge, Observation
 from gateway.core.vehicle import Vehicle
+from gateway.estimate import Estimate
+from gateway.posterior import fused
 
 SEED: Final = 20280
 VANS_PER_LINE: Final = 3
 SISTERS: Final = 3
 ESTIMATOR: Final = "cross_spectrum"
 ID: Final = "in memory"
+EMPTY_STD_KG: Final = 3.0  # of an empty vehicle: driver, fuel, what lies about
+EMPTY_SHARE_STD_PCT: Final = 0.2
 
 
 class Way(StrEnum):
     """How a sibling is calibrated."""
 
     AS_IS = "the line's file as it is"
-    TARED = "the line's file and a tare"
+    WEIGHED_EMPTY = "the line's file, and known to be empty once"
     ALONE = "one empty drive, priors of any vehicle"
     LIKE_ONE = "one empty drive, like one sister"
     LIKE_ONE_TWO_DRIVES = "and a second, mixed, empty drive"
@@ -93,7 +97,7 @@ def _ways(van: Driven, first: Sister, of_one: Line, of_three: Line) -> Iterator[
     steady = van.runs[:1]
     as_is = _calibrated(first.vehicle, CrossSpectrumFit(first.calibration, {}))
     yield Way.AS_IS, _Judging(van, as_is)
-    yield Way.TARED, _Judging(van, as_is, _tare(as_is, steady, van.vehicle))
+    yield Way.WEIGHED_EMPTY, _Judging(van, as_is, known_empty(as_is, steady, van.vehicle))
     for way, runs, line in (
         (Way.ALONE, steady, None),
         (Way.LIKE_ONE, steady, of_one),
@@ -106,17 +110,17 @@ def _ways(van: Driven, first: Sister, of_one: Line, of_three: Line) -> Iterator[
 
 @dataclass(frozen=True, slots=True)
 class _Judging:
-    """A sibling by one calibration, with a tare where there is one."""
+    """A sibling by one calibration, with what a known weight taught where there is one."""
 
     van: Driven
     calibrated: CalibratedVehicle
-    tare: Tare | None = None
+    knowledge: Knowledge | None = None
 
     def __call__(self, way: Way) -> list[JudgedBatch]:
         found = []
         for trip, run in self.van.tests:
             judged = [
-                replace(one, estimate=tared(one.estimate, self.tare))
+                replace(one, estimate=_known(one.estimate, self.knowledge))
                 for one in judge([run], self.calibrated, ESTIMATOR)
             ]
             found += judged_batches(judged, self.van.vehicle, trip.kind, way, run)
@@ -128,15 +132,19 @@ def _calibrated(vehicle: Vehicle, fit: CrossSpectrumFit) -> CalibratedVehicle:
     return CalibratedVehicle(ID, vehicle, known.payload_seen_kg, known.front_share_seen_pct, None, known)
 
 
-def _tare(calibrated: CalibratedVehicle, empty: Sequence[KnownRun], vehicle: Vehicle) -> Tare | None:
-    """The mean of an empty drive as the zero; None where no batch of it is answered."""
-    answered: list[Judged] = [one for one in judge(empty, calibrated, ESTIMATOR) if one.estimate.counted]
-    if not answered:
+def _known(found: Estimate, knowledge: Knowledge | None) -> Estimate:
+    if knowledge is None or found.posterior is None:
+        return found
+    return found.answered(knowledge.applied(found.posterior, found.t_end_ns))
+
+
+def known_empty(calibrated: CalibratedVehicle, empty: Sequence[KnownRun], vehicle: Vehicle) -> Knowledge | None:
+    """What an empty drive teaches, once somebody has said that it was; None where no batch of it is answered."""
+    answered = [one.estimate for one in judge(empty, calibrated, ESTIMATOR) if one.estimate.counted]
+    posteriors = [one.posterior for one in answered if one.posterior is not None]
+    if not posteriors:
         return None
-    zero = Zero(
-        float(np.mean([one.estimate.payload.number for one in answered])),
-        float(np.mean([one.estimate.payload.std for one in answered])),
-        float(np.mean([one.estimate.front_share.number for one in answered])) - vehicle.empty_front_share_pct,
-        float(np.mean([one.estimate.front_share.std for one in answered])),
-    )
-    return Tare(ID, ID, ESTIMATOR, zero)
+    truth = np.array([0.0, vehicle.empty_front_share_pct])
+    covariance = np.diag(np.square([EMPTY_STD_KG, EMPTY_SHARE_STD_PCT]))
+    t_ns = max(one.t_end_ns for one in answered)
+    return Knowledge.of([Observation(ID, t_ns, ID, ESTIMATOR, fused(posteriors), truth, covariance)])
