@@ -94,8 +94,8 @@ def test_a_false_ticket_is_held_shown_and_moves_nothing(config: Path, logs: list
         weight = f"payload_kg=400,at={batch['t_end']}"
         made = service.told("calibration", "ticket", "add", weight)
         assert (made["state"], made["payload_kg"], made["estimated_payload_kg"]) == ("held", 400.0, 12.0)
-        (warning,) = first_answer(f"{service.gateway.url}/api/v1/status").json()["warnings"]
-        assert "a known weight of 400 kg contradicts the estimate of 12 ±" in warning
+        warnings = first_answer(f"{service.gateway.url}/api/v1/status").json()["warnings"]
+        assert any("a known weight of 400 kg contradicts the estimate of 12 ±" in warning for warning in warnings)
         service.play(logs[1])
 
     serve(config, meet)
