@@ -40,6 +40,9 @@ def test_every_field_of_an_estimate_is_a_column_but_its_spectra() -> None:
         "provisional",
         "diagnostics",
         "way",
+        "error_budget",
+        "posterior",
+        "measured_posterior",
     }
     assert list(page.DIAGNOSTICS) == list(DIAGNOSTICS)
     assert names[-len(PROVENANCE) :] == list(PROVENANCE)

@@ -17,12 +17,16 @@ from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_
 from benchmarks.accuracy.siblings.drives import Driven, draw_line, sibling, sister
 from benchmarks.accuracy.vans import OnVan, of_each_van
 from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
-from gateway.calibration.judgement import Judged, judge
+from gateway.calibration.judgement import judge
 from gateway.calibration.known_run import KnownRun
+from gateway.calibration.known_weight import load_of
 from gateway.calibration.line import Line, Sibling, Sister, line_of, with_siblings_left_out
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.tare import Tare, Zero, tared
+from gateway.core.known_weights import Knowledge, KnownWeightKind, Observation
 from gateway.core.vehicle import Vehicle
+from gateway.estimate import Estimate
+from gateway.posterior import Source, fused
+from gateway.stated_weight import StatedWeight
 
 SEED: Final = 20280
 VANS_PER_LINE: Final = 3
@@ -93,7 +97,7 @@ def _ways(van: Driven, first: Sister, of_one: Line, of_three: Line) -> Iterator[
     steady = van.runs[:1]
     as_is = _calibrated(first.vehicle, CrossSpectrumFit(first.calibration, {}))
     yield Way.AS_IS, _Judging(van, as_is)
-    yield Way.TARED, _Judging(van, as_is, _tare(as_is, steady, van.vehicle))
+    yield Way.TARED, _Judging(van, as_is, _known_empty(as_is, steady, van.vehicle))
     for way, runs, line in (
         (Way.ALONE, steady, None),
         (Way.LIKE_ONE, steady, of_one),
@@ -106,21 +110,25 @@ def _ways(van: Driven, first: Sister, of_one: Line, of_three: Line) -> Iterator[
 
 @dataclass(frozen=True, slots=True)
 class _Judging:
-    """A sibling by one calibration, with a tare where there is one."""
+    """A sibling by one calibration, with what is known of its sources where anything is."""
 
     van: Driven
     calibrated: CalibratedVehicle
-    tare: Tare | None = None
+    knowledge: Knowledge | None = None
 
     def __call__(self, way: Way) -> list[JudgedBatch]:
         found = []
         for trip, run in self.van.tests:
             judged = [
-                replace(one, estimate=tared(one.estimate, self.tare))
-                for one in judge([run], self.calibrated, ESTIMATOR)
+                replace(one, estimate=self._known(one.estimate)) for one in judge([run], self.calibrated, ESTIMATOR)
             ]
             found += judged_batches(judged, self.van.vehicle, trip.kind, way, run)
         return found
+
+    def _known(self, estimate: Estimate) -> Estimate:
+        if self.knowledge is None or estimate.posterior is None:
+            return estimate
+        return estimate.answered(self.knowledge.applied(estimate.posterior, estimate.t_end_ns))
 
 
 def _calibrated(vehicle: Vehicle, fit: CrossSpectrumFit) -> CalibratedVehicle:
@@ -128,15 +136,16 @@ def _calibrated(vehicle: Vehicle, fit: CrossSpectrumFit) -> CalibratedVehicle:
     return CalibratedVehicle(ID, vehicle, known.payload_seen_kg, known.front_share_seen_pct, None, known)
 
 
-def _tare(calibrated: CalibratedVehicle, empty: Sequence[KnownRun], vehicle: Vehicle) -> Tare | None:
-    """The mean of an empty drive as the zero; None where no batch of it is answered."""
-    answered: list[Judged] = [one for one in judge(empty, calibrated, ESTIMATOR) if one.estimate.counted]
+def _known_empty(calibrated: CalibratedVehicle, empty: Sequence[KnownRun], vehicle: Vehicle) -> Knowledge | None:
+    """What an empty drive teaches of the sources, as the service states it; None where no batch is answered."""
+    answered = [one.estimate for one in judge(empty, calibrated, ESTIMATOR) if one.estimate.posterior is not None]
     if not answered:
         return None
-    zero = Zero(
-        float(np.mean([one.estimate.payload.number for one in answered])),
-        float(np.mean([one.estimate.payload.std for one in answered])),
-        float(np.mean([one.estimate.front_share.number for one in answered])) - vehicle.empty_front_share_pct,
-        float(np.mean([one.estimate.front_share.std for one in answered])),
-    )
-    return Tare(ID, ID, ESTIMATOR, zero)
+    load = load_of(StatedWeight("", payload_kg=0.0), vehicle, calibrated.unsprung, KnownWeightKind.EMPTY)
+    assert load.front_share_pct is not None
+    assert load.front_share_std_pct is not None
+    truth = np.array([load.payload_kg, load.front_share_pct])
+    std = np.array([load.payload_std_kg, load.front_share_std_pct])
+    posterior = fused([one.posterior for one in answered if one.posterior is not None]).without(Source.EMPTY_SHARE)
+    t_ns = max(one.t_end_ns for one in answered)
+    return Knowledge.of([Observation(ID, t_ns, ID, ESTIMATOR, posterior, truth, np.diag(std**2))])
