@@ -1,4 +1,4 @@
-"""Re-zeroing a real service: bus, pipeline, web and command line together, through a restart."""
+"""Known weights of a real service: bus, pipeline, web and command line together, through a restart."""
 
 import json
 from pathlib import Path
@@ -13,6 +13,7 @@ from support.ports import first_answer
 from support.running_service import Running, configuration, counted, estimated, events, serve, stored
 
 from gateway.bus.logs import write_candump
+from gateway.calibration.known_weights_file import load_known_weights
 from gateway.cli import springscale
 from gateway.errors import SpringscaleError
 from gateway.log import Event
@@ -40,8 +41,9 @@ def logs(tmp_path: Path) -> list[Path]:
     return paths
 
 
-def test_a_tare_counts_from_the_next_batch_survives_a_restart_and_is_undone(config: Path, logs: list[Path]) -> None:
+def test_it_counts_from_the_next_batch_survives_a_restart_and_is_taken_back(config: Path, logs: list[Path]) -> None:
     made: dict[str, Any] = {}
+    known: list[str] = []
 
     def first_run(service: Running) -> None:
         refused = service.ask("calibration", "tare", "set", "--empty")
@@ -49,42 +51,59 @@ def test_a_tare_counts_from_the_next_batch_survives_a_restart_and_is_undone(conf
         assert "no_counted_batch" in str(refused.exception)
         service.play(logs[0])
         offer = told(service, "show")["offer"]
-        assert (offer["zero"]["payload_kg"], offer["zero"]["n_batches"]) == (12.0, 2)
+        assert (offer["load"]["payload_kg"], offer["load"]["n_batches"]) == (12.0, 2)
         made.update(told(service, "set", "--empty", "--note", "yard"))
-        assert "+12.0" in service.ask("calibration", "tare", "show").output
-        assert first_answer(f"{service.gateway.url}/api/v1/status").json()["tare_id"] == made["id"]
+        known.append(first_answer(f"{service.gateway.url}/api/v1/status").json()["known_weights_id"])
+        assert known[0] == told(service, "show")["known_weights_id"] is not None
         service.play(logs[1])
 
     def second_run(service: Running) -> None:
-        assert told(service, "show")["active"] == made
+        assert told(service, "show")["history"] == [made]
         service.play(logs[2])
         undone = told(service, "undo", "--factory")
-        assert undone["active"] is None
+        assert undone["known_weights_id"] is None
         assert undone["history"][0]["ended"]["why"] == "back_to_factory"
 
     serve(config, first_run)
-    tared = estimated(config, *logs[1:])  # as the service would now: with its tare
-    raw = estimated(config, *logs, options=("--no-tare",))
+    known_now = estimated(config, *logs[1:])  # as the service would now
+    raw = estimated(config, *logs, options=("--no-known-weights",))
     serve(config, second_run)
 
-    # The first drive's two batches were sent before the tare. The short rests of drives differ in their reasons: on
-    # the bus silence ended them, in a file its end.
+    # The first drive's two batches were sent before it was stated. The short rests of drives differ in their reasons:
+    # on the bus silence ended them, in a file its end.
     found = counted(stored(config))
-    assert found == [*counted(raw)[:2], *counted(tared)]
+    assert found == [*counted(raw)[:2], *counted(known_now)]
     assert len(found) == 6
-    assert all("tare_id" not in text for text in stored(config) if text not in found[2:])
+    assert all("known_weights_id" not in text for text in stored(config) if text not in found[2:])
     for record in map(json.loads, found[2:]):
-        assert (record["payload_kg"], record["raw_payload_kg"], record["tare_payload_kg"]) == (0.0, 12.0, 12.0)
-        assert record["payload_std_kg"] ** 2 == pytest.approx(
-            record["raw_payload_std_kg"] ** 2 + record["tare_payload_std_kg"] ** 2
-        )
-        assert record["tare_id"] == made["id"]
+        assert record["raw_payload_kg"] == 12.0
+        assert 0.0 < record["payload_kg"] < 9.0
+        assert record["payload_std_kg"] < record["raw_payload_std_kg"]
+        assert record["known_weights_id"] == known[0]
     assert [json.loads(text)["id"] for text in found[:2]] == made["batch_ids"]
-    assert [kind for kind in events(config) if kind.startswith("tare")] == ["tare_undone", "tare_set"]
-    assert estimated(config, *logs) == raw  # undone: the factory zero again, byte for byte
+    happened = [kind for kind in events(config) if kind.startswith("known_weight")]
+    assert happened == ["known_weight_taken_back", "known_weight_stated"]
+    assert estimated(config, *logs) == raw  # taken back: the same again, byte for byte
 
 
-def test_a_copied_tare_file_gives_the_same_numbers_elsewhere(config: Path, logs: list[Path], tmp_path: Path) -> None:
+def test_a_false_ticket_is_held_shown_and_moves_nothing(config: Path, logs: list[Path]) -> None:
+    def meet(service: Running) -> None:
+        service.play(logs[0])
+        assert service.gateway.store.flush(60.0)
+        batch = json.loads(service.gateway.store.reader().estimates().items[0])
+        weight = f"payload_kg=400,at={batch['t_end']}"
+        made = service.told("calibration", "ticket", "add", weight)
+        assert (made["state"], made["payload_kg"], made["estimated_payload_kg"]) == ("held", 400.0, 12.0)
+        warnings = first_answer(f"{service.gateway.url}/api/v1/status").json()["warnings"]
+        assert any("a known weight of 400 kg contradicts the estimate of 12 ±" in warning for warning in warnings)
+        service.play(logs[1])
+
+    serve(config, meet)
+    records = [json.loads(text) for text in counted(stored(config))]
+    assert [record["payload_kg"] for record in records] == [12.0] * 4
+
+
+def test_a_copied_file_gives_the_same_numbers_elsewhere(config: Path, logs: list[Path], tmp_path: Path) -> None:
     def meet(service: Running) -> None:
         service.play(logs[0])
         told(service, "set", "--empty")
@@ -92,30 +111,32 @@ def test_a_copied_tare_file_gives_the_same_numbers_elsewhere(config: Path, logs:
     serve(config, meet)
     here = estimated(config, logs[1])
     copy = tmp_path / "elsewhere.json"
-    (tmp_path / "state" / "tare.json").rename(copy)
+    (tmp_path / "state" / "known_weights.json").rename(copy)
     assert estimated(config, logs[1]) != here
-    assert estimated(config, logs[1], options=("--tare", str(copy))) == here
+    assert estimated(config, logs[1], options=("--known-weights", str(copy))) == here
     (tmp_path / "vehicle.json").write_text(calibration_file(payload_kg=13.0, front_share_pct=51.0).to_json())
-    arguments = ["estimate", str(logs[1]), "--config", str(config), "--tare", str(copy)]
+    arguments = ["estimate", str(logs[1]), "--config", str(config), "--known-weights", str(copy)]
     other = CliRunner().invoke(springscale, arguments)
     assert isinstance(other.exception, SpringscaleError)
-    assert "has no tare in use" in str(other.exception)
+    assert "no known weight in use" in str(other.exception)
     assert other.exception.exit_code == 2
 
 
-def test_check_config_looks_at_the_tare_too(config: Path, logs: list[Path], tmp_path: Path) -> None:
+def test_check_config_looks_at_known_weights_too(config: Path, logs: list[Path], tmp_path: Path) -> None:
     def meet(service: Running) -> None:
         service.play(logs[0])
         told(service, "set", "--empty")
 
     serve(config, meet)
     good = CliRunner().invoke(springscale, ["check-config", str(config), "--json"], catch_exceptions=False)
-    (entry,) = json.loads((tmp_path / "state" / "tare.json").read_text())["entries"]
-    assert json.loads(good.output)["tare_id"] == entry["id"]
-    (tmp_path / "state" / "tare.json").write_text("{")
+    held = load_known_weights(tmp_path / "state" / "known_weights.json")
+    knowledge = held.knowledge(held.entries[0].calibration_id, "ratio_index")
+    assert knowledge is not None
+    assert json.loads(good.output)["known_weights_id"] == knowledge.id
+    (tmp_path / "state" / "known_weights.json").write_text("{")
     fault = CliRunner().invoke(springscale, ["check-config", str(config)]).exception
     assert isinstance(fault, SpringscaleError)
-    assert "tare.json" in str(fault)
+    assert "known_weights.json" in str(fault)
     assert fault.exit_code == 2
 
 
@@ -131,10 +152,10 @@ def test_a_drive_that_has_begun_since_is_refused(config: Path, logs: list[Path],
         assert "load_may_have_changed" in str(refused.exception)
 
     serve(config, meet)
-    assert not (tmp_path / "state" / "tare.json").exists()
+    assert not (tmp_path / "state" / "known_weights.json").exists()
 
 
-def test_the_log_tells_of_another_calibration_and_of_the_tare_that_ends_with_it(
+def test_another_calibration_leaves_them_in_the_history_alone(
     config: Path, logs: list[Path], tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level("INFO", "gateway")
@@ -144,10 +165,13 @@ def test_the_log_tells_of_another_calibration_and_of_the_tare_that_ends_with_it(
         service.play(logs[0])
         told(service, "set", "--empty")
 
+    def meet_again(service: Running) -> None:
+        state = told(service, "show")
+        assert (state["known_weights_id"], state["history"][0]["state"]) == (None, "other_calibration")
+
     serve(config, meet)
     assert Event.CALIBRATION_CHANGED not in names(caplog)
     other = calibration_file(payload_kg=13.0, front_share_pct=51.0)
     (tmp_path / "vehicle.json").write_text(other.to_json())
-    serve(config, lambda service: None)
+    serve(config, meet_again)
     assert fields_of(caplog, Event.CALIBRATION_CHANGED) == {"calibration_id": other.id, "before": before}
-    assert fields_of(caplog, Event.TARE_DROPPED)["calibration_id"] == other.id

@@ -1,4 +1,4 @@
-"""kill -9 at any moment: every tare that was answered is there afterwards, and the file is whole."""
+"""kill -9 at any moment: every known weight that was answered is there afterwards, and the file is whole."""
 
 import random
 from pathlib import Path
@@ -6,28 +6,26 @@ from pathlib import Path
 import pytest
 from support.killed import told_before_kill
 
-from gateway.calibration.tare_file import FILE_NAME, MOST_ENTRIES, load_tares
+from gateway.calibration.known_weights_file import FILE_NAME, MOST_KNOWN_WEIGHTS, load_known_weights
 
-TARER = """
-import itertools, json, pathlib, sys
-from gateway.service.tare_desk import Subject, TareDesk
-from support.calibrated import calibration_file
-from support.tare import FakePipeline
+STATER = """
+import itertools, pathlib, sys
+from support.known_weights import KnownWeightBench
 
-pipeline = FakePipeline()
-subject = Subject(calibration_file().for_core(), "ratio_index", "van-17")
-desk = TareDesk(pathlib.Path(sys.argv[1]), subject, pipeline, stale_after_s=900.0, on_event=lambda kind, detail: None)
+bench = KnownWeightBench(pathlib.Path(sys.argv[1]))
+print("ready", flush=True)
 for n in itertools.count():
-    pipeline.weigh(n % 60)
-    print(json.loads(desk.tare("a", None))["id"], flush=True)
+    bench.pipeline.weigh(n % 60)
+    made = bench.empty()["id"]
+    print(made, flush=True)
     if n % 3 == 2:
-        desk.undo("b", to_factory=False)
+        bench.service.take_back("b", made)
 """
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_kill_loses_no_tare_that_was_answered(tmp_path: Path, seed: int) -> None:
-    answered = told_before_kill(TARER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.15))
-    kept = [entry.id for entry in load_tares(tmp_path / FILE_NAME).entries]
-    known = [line.strip() for line in answered][1 - MOST_ENTRIES :]  # one more may have been kept, unanswered
+def test_a_kill_loses_no_known_weight_that_was_answered(tmp_path: Path, seed: int) -> None:
+    answered = told_before_kill(STATER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.3), ready="ready\n")
+    kept = [entry.id for entry in load_known_weights(tmp_path / FILE_NAME).entries]
+    known = [line.strip() for line in answered][1 - MOST_KNOWN_WEIGHTS :]  # one more may have been kept, unanswered
     assert set(known) <= set(kept)

@@ -1,4 +1,4 @@
-"""A vehicle as the service of known weights sees it, without a pipeline behind it; and loads with every kind of error."""
+"""A vehicle as the service of known weights sees it, without a pipeline; and loads with every kind of error."""
 
 import json
 from dataclasses import replace

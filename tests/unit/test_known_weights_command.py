@@ -1,4 +1,4 @@
-"""springscale calibration tare: whom it asks, and what it says where nobody answers as wanted."""
+"""springscale calibration tare and ticket: whom they ask, and what they say where nobody answers as wanted."""
 
 import json
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import trustme
 from click.testing import CliRunner, Result
-from support.tare import FakePipeline, tare_desk
+from support.known_weights import FakePipeline, KnownWeightBench
 from support.web import Gateway, serving
 
 from gateway.cli.calibration import calibration as calibration_commands
@@ -19,9 +19,20 @@ def run(*arguments: str, **environment: str) -> Result:
     return CliRunner(env=environment).invoke(calibration_commands, ["tare", *arguments])
 
 
+def ticket(*arguments: str, **environment: str) -> Result:
+    return CliRunner(env=environment).invoke(calibration_commands, ["ticket", *arguments])
+
+
 @pytest.fixture
-def pipeline() -> FakePipeline:
-    return FakePipeline()
+def bench(tmp_path: Path) -> Iterator[KnownWeightBench]:
+    made = KnownWeightBench(tmp_path / "vehicle", 276.0, 398.0)
+    yield made
+    made.store.close()
+
+
+@pytest.fixture
+def pipeline(bench: KnownWeightBench) -> FakePipeline:
+    return bench.pipeline
 
 
 @pytest.fixture
@@ -30,49 +41,63 @@ def tokens(tmp_path: Path) -> TokenFile:
 
 
 @pytest.fixture
-def url(tmp_path: Path, tokens: TokenFile, pipeline: FakePipeline) -> Iterator[str]:
+def url(tmp_path: Path, tokens: TokenFile, bench: KnownWeightBench) -> Iterator[str]:
     """A service behind tokens."""
     tokens.create("somebody", Scope.READ)
-    desk = tare_desk(tmp_path, pipeline)
-    with Gateway(tmp_path / "store", tokens=tokens, tare=desk) as gateway, serving(gateway.app) as server:
+    with (
+        Gateway(tmp_path / "store", tokens=tokens, known_weights=bench.service) as gateway,
+        serving(gateway.app) as server,
+    ):
         yield server.url
 
 
-def test_set_show_and_undo_with_a_token_from_the_environment(
-    url: str, tokens: TokenFile, pipeline: FakePipeline
-) -> None:
+def test_set_show_and_undo_with_a_token_from_the_environment(url: str, tokens: TokenFile) -> None:
     token = tokens.create("workshop", Scope.OPERATE)
+    offer = run("show", "--url", url, "--token", token).output
+    assert "no known weight is in use: weighed by the calibration alone" in offer
+    assert "a tare now would be of 12.0 ± " in offer
     made = run("set", "--empty", "--note", "yard", "--url", url, SPRINGSCALE_TOKEN=token)
     assert made.exit_code == 0, made.exception
-    assert "+12.0 ± 9.8 kg and +1.00 ± 0.78 pp (95 %) from one batch, set " in made.output
+    assert "empty: 0.0 ± 19.6 kg known, 12.0 ± " in made.output
     assert "by workshop (yard)" in made.output
-    shown = run("show", "--url", url + "/", "--token", token)
-    assert shown.output.splitlines()[0] == "in use: " + made.output.strip()
-    assert "a tare now would take off +12.0 ± 9.8 kg" in shown.output
-    assert "nothing speaks for a drift" not in shown.output
-    pipeline.weigh(9.0, share_pct=50.5)
-    assert "nothing speaks for a drift" in run("show", "--url", url, "--token", token).output
+    shown = run("show", "--url", url + "/", "--token", token).output.splitlines()
+    assert shown[0] == "one known weight in use; without them estimates were +12.0 kg off"
+    assert shown[-1] == "  " + made.output.strip()
     undone = run("undo", "--url", url, "--token", token, "--json")
-    assert json.loads(undone.output)["active"] is None
-    assert "undone" in run("show", "--url", url, "--token", token).output
+    assert json.loads(undone.output)["known_weights_id"] is None
+    assert "withdrawn" in run("show", "--url", url, "--token", token).output
+
+
+def test_a_ticket_is_added_confirmed_and_withdrawn(url: str, tokens: TokenFile, bench: KnownWeightBench) -> None:
+    asked = ("--url", url, "--token", tokens.create("workshop", Scope.OPERATE))
+    weight = f"payload_kg=400,at={bench.stated(0, 400.0).at}"
+    made = ticket("add", weight, "--kind", "delivery_note", "--note", "no. 17", *asked)
+    assert made.exit_code == 0, made.exception
+    assert "delivery note: 400.0 ± 19.6 kg known, 276.0 ± " in made.output
+    assert "HELD: it contradicts the estimate" in made.output
+    entry_id = json.loads(ticket("show", "--json", *asked).output)["history"][0]["id"]
+    assert isinstance(ticket("confirm", "sha256:none", *asked).exception, SpringscaleError)
+    confirmed = ticket("confirm", entry_id[:19], *asked)
+    assert "one known weight in use; without them estimates were -124.0 kg off" in confirmed.output
+    assert "withdrawn" in ticket("withdraw", entry_id.removeprefix("sha256:")[:12], *asked).output
+    refused = ticket("add", "payload_kg=1,at=2020-01-01T00:00:00Z", *asked).exception
+    assert isinstance(refused, SpringscaleError)
+    assert "no_epoch" in str(refused)
 
 
 def test_a_refusal_comes_in_the_services_own_words(url: str, tokens: TokenFile, pipeline: FakePipeline) -> None:
     token = tokens.create("workshop", Scope.OPERATE)
-    pipeline.weigh(200.0)
+    pipeline.age_s = 1000.0
     for arguments, said in (
-        (
-            ("set", "--empty", "--url", url, "--token", token),
-            "either the vehicle is not empty, or it needs a calibration",
-        ),
-        (("undo", "--url", url, "--token", token), "not_tared"),
+        (("set", "--empty", "--url", url, "--token", token), "drive, empty, until the next batch has counted"),
+        (("undo", "--url", url, "--token", token), "no_such_weight"),
         (("show", "--url", url), "a bearer token is needed"),
     ):
         fault = run(*arguments).exception
         assert isinstance(fault, SpringscaleError)
         assert fault.exit_code == 1
         assert said in str(fault)
-    assert "no tare now (offset_too_large)" in run("show", "--url", url, "--token", token).output
+    assert "no tare now (stale)" in run("show", "--url", url, "--token", token).output
 
 
 @pytest.fixture
@@ -100,7 +125,7 @@ def test_a_service_that_asks_for_a_certificate_is_shown_one(mutual: str, tmp_pat
         ("--certificate", pem["client.pem"], "--key", pem["client.key"]),
         ("--certificate", pem["client-whole.pem"]),
     ):
-        assert "in use: the zero of the calibration" in run(*asked, *shown).output
+        assert "no known weight is in use" in run(*asked, *shown).output
     fault = run(*asked, "--certificate", pem["client.pem"], "--key", pem["server.key"]).exception
     assert isinstance(fault, ConfigurationError)
     assert "client.pem: no certificate with its key" in str(fault)

@@ -77,15 +77,15 @@ class NoKnownWeights:
         raise WeightRefusedError(*_NO_SUCH)
 
 
-class Noted(Body):
-    """A word on it."""
+Note = Annotated[
+    str, Field(max_length=200, description="kept in the history: number of the ticket, scales used, place")
+]
 
-    note: str = Field("", max_length=200, description="kept in the history: number of the ticket, scales used, place")
 
-
-class KnownWeightRequest(Noted):
+class KnownWeightRequest(Body):
     """What is known, and of what kind."""
 
+    note: Note = ""
     kind: KnownWeightKind = Field(description="`empty`: it is empty now, and was so while it was last weighed")
     weight: Stated | None = Field(None, description="not for `empty`; of both axles for `axle_pads`")
 
@@ -98,17 +98,19 @@ class KnownWeightRequest(Noted):
         return self
 
 
-class TareRequest(Noted):
+class TareRequest(Body):
     """The claim that makes a tare."""
 
+    note: Note = ""
     is_empty: Literal[True] = Field(
         description="you know that the vehicle is empty, and was so while it was last weighed (`offer` says when)"
     )
 
 
-class TicketRequest(Noted):
+class TicketRequest(Body):
     """The weight on the ticket."""
 
+    note: Note = ""
     weight: Stated
 
 
