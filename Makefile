@@ -54,6 +54,7 @@ check: .venv/.development
 	$(BIN)/python docs/make_scale.py --check
 	$(BIN)/python docs/make_fleet.py --check
 	$(BIN)/python docs/make_phone.py --check
+	$(BIN)/python docs/make_hardware.py --check
 	$(BIN)/python docs/make_site.py
 	$(BIN)/python docs/make_drawings.py --check
 	$(BIN)/python deploy/dist/audit_locks.py --advisory
@@ -136,6 +137,7 @@ docs: .venv/.development
 	$(BIN)/python docs/make_scale.py
 	$(BIN)/python docs/make_fleet.py
 	$(BIN)/python docs/make_phone.py
+	$(BIN)/python docs/make_hardware.py
 	$(BIN)/python docs/make_drawings.py
 
 # The documents as a site, in build/site.

@@ -24,6 +24,7 @@ _COMMANDS = {
     "estimate": "Weigh from log files, one line per batch.",
     "evaluate": "Compare estimates with known loads: the error table.",
     "events": "What was loaded and unloaded where and when, and the trips between, from log files.",
+    "feed": "Send an IMU of Linux IIO and a receiver behind gpsd onto a CAN interface.",
     "fleet-report": "What a fleet's data set tells of each vehicle, as pages.",
     "import": "Make a log of what a phone recorded: Sensor Logger or phyphox.",
     "line": "Build the line of several vehicles, so that the next one is calibrated by an empty drive.",
@@ -38,7 +39,7 @@ _COMMANDS = {
     "verification": "Known loads held against what a running service weighed, as dated records.",
 }  # each in the module of its name, or a room of ours
 _ROOMS = {"fleet-report": "fleet", "line": "fleet", "record": "asked", "verification": "asked", "commission": "asked"}
-_ROOMS |= {"campaign": "logs", "events": "logs", "import": "logs"}
+_ROOMS |= {"campaign": "logs", "events": "logs", "feed": "logs", "import": "logs"}
 _NAMES = {"import": "import_recording"}  # a word of the language names no module
 
 

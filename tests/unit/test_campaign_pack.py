@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from gateway.offline.bundle import CONTRIBUTION, MANIFEST, TEMPLATE, pack, unpacked
 from support.known_load_logs import write_known_loads
 
 from gateway.bus.frames import merge_frames
@@ -15,6 +14,7 @@ from gateway.bus.logs import open_whole_log, write_candump
 from gateway.bus.signals import Encoder, load_signal_map
 from gateway.cli import springscale
 from gateway.errors import CampaignError, ConfigurationError
+from gateway.offline.bundle import CONTRIBUTION, MANIFEST, TEMPLATE, pack, unpacked
 from gateway.records import Frames
 from gateway.workbench.simulate import bench_of, write_campaign
 
