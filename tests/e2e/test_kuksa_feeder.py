@@ -25,8 +25,6 @@ from support.patience import PATIENCE_S, wait_until
 from support.ports import free_port
 from support.web import Gateway, serving
 
-from gateway.estimate import Weight, Weights
-
 ROOT = Path(__file__).parents[2]
 OVERLAY = {
     path: node
@@ -201,20 +199,21 @@ def test_a_service_that_goes_away_leaves_nothing_that_looks_known(tmp_path: Path
 
 def test_a_value_that_the_databroker_refuses_holds_nothing_else_up(tmp_path: Path, gateway: Gateway) -> None:
     """An integrator's specification may be narrower than ours: told, not available there, and the rest goes on."""
-    heavy = Weights(gross=Weight(2600.0, 8.0, None, None))
     with (
         databroker([*CORE, *OVERLAY]) as broker,
         serving(gateway.app) as service,
         feeding(service.url, broker.port, tmp_path / "log"),
     ):
-        broker.narrowed = {"Vehicle.CurrentOverallWeight": 2000.0}
-        gateway.publish(replace(make_estimate(3), weights=heavy))
+        broker.narrowed = {PAYLOAD: 103.5}
+        gateway.publish(make_estimate(3))
         assert wait_until(lambda: broker.now.get(PAYLOAD) == 103.0)
-        assert wait_until(lambda: "Vehicle.CurrentOverallWeight" in broker.refused)
-        gateway.publish(replace(make_estimate(4), weights=heavy))
-        assert wait_until(lambda: broker.now[PAYLOAD] == 104.0)
-        assert broker.now["Vehicle.CurrentOverallWeight"] is None
-    assert "refuses Vehicle.CurrentOverallWeight = 2600" in (tmp_path / "log").read_text()
+        known = {path for path, value in broker.now.items() if value is not None}
+        assert len(known) > 1
+        gateway.publish(make_estimate(4))
+        assert wait_until(lambda: PAYLOAD in broker.refused)
+        assert wait_until(lambda: broker.now[PAYLOAD] is None)  # and not the 103 kg of before
+        assert wait_until(lambda: known - {PAYLOAD} == {p for p, value in broker.now.items() if value is not None})
+    assert f"refuses {PAYLOAD} = 104" in (tmp_path / "log").read_text()
 
 
 def test_every_signal_keeps_to_its_type_and_bounds(tmp_path: Path, gateway: Gateway) -> None:
