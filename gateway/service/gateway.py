@@ -13,11 +13,11 @@ from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
+from gateway.notify import Notifier
 from gateway.service.alarm_desk import AlarmDesk, rules_of
 from gateway.service.changes import BatchLog, StateLog, told_in_turn
 from gateway.service.day_book import DayBook
 from gateway.service.last_good import keep_copy
-from gateway.service.notify import Notifier
 from gateway.service.parts import (
     Forwarding,
     board_of,

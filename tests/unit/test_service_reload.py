@@ -22,8 +22,8 @@ from gateway.config import Settings, load_settings
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.errors import ConfigurationError
 from gateway.log import LOGGER, set_log_level
+from gateway.notify import Notifier
 from gateway.service.commissioning import commissioned, with_commissioned
-from gateway.service.notify import Notifier
 from gateway.service.reload import Reloader, changed_keys, tls_of
 from gateway.setup import setup_of
 from gateway.web import server_config
