@@ -99,14 +99,14 @@ class Gateway:
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
         subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
-        self.alarms = AlarmDesk(rules_of(settings.alarms), subject, self.store, self.board)
+        self.alarms = AlarmDesk(rules_of(settings.alarms), subject, self.store)
         self.pipeline = Pipeline(
             self.source.inbox,
             Decoder(setup.signal_map),
             flow,
             self.store,
             self.board,
-            told_in_turn(log_batch, DayBook(setup, self.store, self.board), self.alarms),
+            told_in_turn(log_batch, DayBook(setup, self.store), self.alarms),
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
         self.uplink = uplink_of(forwarding.broker, setup, self.store, with_places=with_places)

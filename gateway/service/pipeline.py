@@ -134,9 +134,9 @@ class Pipeline:
             self._count(found)
             if self.flow.weighed is not self._weighed_at[0]:
                 self._weighed_at = (self.flow.weighed, boot_clock_s())
-            record = estimate_to_json(found)
-            cursor = None if found.is_provisional else self._store.write_estimate(record)
-            self._board.publish(found, cursor)
+            self._board.publish(found)  # first: whoever hears of it by the journal finds it there
+            if not found.is_provisional:
+                self._store.write_estimate(estimate_to_json(found))
             self._on_batch(found)
 
     def _count(self, found: Estimate) -> None:

@@ -1,6 +1,10 @@
 """One MQTT 5 connection, driven by whoever owns it: paho-mqtt without its own thread or queue of retries."""
 
+import contextlib
 import json
+import select
+import socket
+import ssl
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -60,9 +64,16 @@ class MqttLink:
         self._loss: str | None = None
         self._most_bytes: int | None = None  # the broker's Maximum Packet Size
         self._under_way = _NOTHING
+        self._bell, self._alarm = socket.socketpair()
+        self._bell.setblocking(False)
+        self._alarm.setblocking(False)
         self._client = self._make_client()
-        self._connect()
-        self._announce(birth)
+        try:
+            self._connect()
+            self._announce(birth)
+        except BaseException:
+            self._hang_up()
+            raise
         if settings.home_assistant is not None:
             self._introduce(*discovery(settings.home_assistant, settings.topic, birth))
 
@@ -81,11 +92,29 @@ class MqttLink:
 
         A broker may give its last answer by ending the connection: then that comes first, and LinkError with the next.
         """
-        code = self._client.loop(0.0 if self._answers else timeout_s)
+        if not self._answers:
+            self._wait(min(timeout_s, self._settings.keep_alive_s / 4.0))
+        code = self._client.loop(0.0)
         if not self._answers and (code != mqtt.MQTT_ERR_SUCCESS or self._loss is not None):
             raise LinkError(self._loss or mqtt.error_string(code))
         answers, self._answers = self._answers, []
         return answers
+
+    def wake(self) -> None:
+        """End the turn under way; from any thread."""
+        with contextlib.suppress(OSError):  # full: it is woken already; closed: nobody waits
+            self._alarm.send(b".")
+
+    def _wait(self, timeout_s: float) -> None:
+        """Until the socket moves, somebody wakes us, or the time is out."""
+        sock = self._client.socket()
+        if sock is None or (isinstance(sock, ssl.SSLSocket) and sock.pending()):
+            return
+        writing = [sock] if self._client.want_write() else []
+        with contextlib.suppress(ValueError):  # closed meanwhile: paho tells why
+            readable, _, _ = select.select([sock, self._bell], writing, [], timeout_s)
+            if self._bell in readable:
+                self._bell.recv(4096)
 
     def close(self) -> None:
         """Say goodbye, so that the will is not carried out."""
@@ -98,12 +127,18 @@ class MqttLink:
             self._client.loop(_TURN_S)
         except LinkError:  # it was broken already
             pass
+        self._hang_up()
 
     def abandon(self) -> None:
         """Drop a broken connection; the broker carries out the will."""
         sock = self._client.socket()
         if sock is not None:
             sock.close()
+        self._hang_up()
+
+    def _hang_up(self) -> None:
+        self._alarm.close()
+        self._bell.close()
 
     def _make_client(self) -> mqtt.Client:
         settings = self._settings

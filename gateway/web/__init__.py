@@ -4,6 +4,7 @@ Estimates come in through the board, the history through a reader, the service's
 to whoever has a token. The application is made by ``create_app``, from the door, the live board and the routes.
 """
 
+from gateway.history import Reader
 from gateway.web.app import create_app, forget_routes
 from gateway.web.door import (
     Scope,
@@ -15,7 +16,6 @@ from gateway.web.door import (
     server_config,
 )
 from gateway.web.live import Board, boot_clock_s
-from gateway.web.reader import Reader
 from gateway.web.routes import KnownLoad, KnownLoads, LatestWeights, Scales, weigh_latest
 from gateway.web.settings import WebSettings
 

@@ -10,6 +10,7 @@ from fastapi.dependencies import models
 from starlette.types import ASGIApp
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.history import Reader
 from gateway.status import Status
 from gateway.web import pages
 from gateway.web.door import (
@@ -24,7 +25,6 @@ from gateway.web.door import (
     problems,
 )
 from gateway.web.live import Board, LatestFirst
-from gateway.web.reader import Reader
 from gateway.web.routes import (
     KNOWN_LOADS_PATH,
     AlarmDesk,

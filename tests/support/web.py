@@ -59,11 +59,11 @@ class Gateway:
         self.app = self._make_app()
 
     def publish(self, *estimates: Estimate) -> list[str]:
-        """As the pipeline does: into the store, then onto the board."""
+        """As the pipeline does: onto the board, then into the journal."""
         cursors = []
         for estimate in estimates:
+            self.board.publish(estimate)
             cursors.append(self.store.write_estimate(estimate_to_json(estimate)))
-            self.board.publish(estimate, cursors[-1])
         return cursors
 
     def restart_board(self) -> None:
