@@ -65,6 +65,11 @@ class Forwarder(ABC, Generic[Report]):
                 self._outbox.rewind()
                 self._pause(self._back_off.next_s())
 
+    @property
+    def fault(self) -> str | None:
+        """Nothing here: what goes wrong stands in the report."""
+        return None
+
     @abstractmethod
     def _deliver(self) -> None:
         """Until asked to stop, or until something goes wrong."""

@@ -5,7 +5,7 @@ to whoever has a token. The application is made by ``create_app``, from the door
 """
 
 from gateway.history import Reader
-from gateway.web.app import create_app, forget_routes
+from gateway.web.app import create_app
 from gateway.web.door import (
     Scope,
     Tls,
@@ -33,7 +33,6 @@ __all__ = [
     "WebSettings",
     "boot_clock_s",
     "create_app",
-    "forget_routes",
     "refuse_open_address",
     "renew_certificate",
     "server_config",

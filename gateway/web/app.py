@@ -6,7 +6,6 @@ from contextlib import asynccontextmanager
 from typing import Any, Final
 
 from fastapi import FastAPI
-from fastapi.dependencies import models
 from starlette.types import ASGIApp
 
 from gateway.core.calibrated import CalibratedVehicle
@@ -171,14 +170,3 @@ def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
         return told[is_guarded]
 
     app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's documented way to extend the description
-
-
-def forget_routes() -> None:
-    """Let go of the applications that are over.
-
-    FastAPI remembers the last thousand routes that it looked at, and so all that stands behind them: a service that
-    begins anew would hold every one before it.
-    """
-    for remembered in vars(models).values():
-        if hasattr(remembered, "cache_clear"):
-            remembered.cache_clear()
