@@ -159,6 +159,7 @@ class Gateway:
             trend=self.proving.trend,
             tickets=tickets,
             alarms=self.alarms,
+            draws_trailers=settings.broadcast.draws_trailers,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = WebServer(web)

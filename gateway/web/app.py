@@ -87,6 +87,8 @@ def create_app(
     trend: TrendDesk | None = None,
     tickets: TicketDesk | None = None,
     alarms: AlarmDesk | None = None,
+    *,
+    draws_trailers: bool = False,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the
@@ -132,7 +134,7 @@ def create_app(
     app.include_router(record_router(record or NoFrameLog()))
     app.include_router(weights_router(board, scales))
     app.include_router(cab_router(board, reader, status, scales))
-    app.include_router(j1939_router(board, scales))
+    app.include_router(j1939_router(board, scales, draws_trailers=draws_trailers))
     app.include_router(vss_router(board, scales))
     app.include_router(rfms_router(board, reader, status, scales))
     app.include_router(health_router(status, metrics_registry(board, scales, status, responses)))
