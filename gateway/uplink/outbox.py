@@ -1,6 +1,7 @@
 """What is still to be delivered. The journal is the queue: the outbox only knows how far it has come."""
 
 import json
+import logging
 import threading
 import time
 from collections import deque
@@ -9,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from gateway.history import ALARM, ESTIMATE, KINDS, Delivery, Journal, Record
+from gateway.log import Event, log_event
 from gateway.records import json_line
 
 SETTLES_S: Final = 30.0  # a record is on disk after that, or the disk refuses
@@ -96,13 +98,14 @@ class Outbox:
         epoch = _epoch(self._journal.head())
         if not self._is_placed or _epoch(self._follower.place) != epoch:
             self._take_place(epoch)
-        records = self._follower.read(limit)
-        if records:
-            self._under_way = records[-1].cursor
+        letters: list[Letter] = []
+        while not letters and (records := self._follower.read(limit)):
+            letters = [letter for record in records if (letter := self._letter(record)) is not None]
+        if letters:
+            self._under_way = letters[-1].cursor
         elif self._under_way is None and self._delivered != self._follower.place:
             self._delivered = self._follower.place  # nothing up to there is wanted
             self._journal.write_delivery(self._name, self._delivered)
-        letters = [letter_of(record, self._shown(json.loads(record.text))) for record in records]
         return self._with_retained(letters) if self._with_latest else letters
 
     def wait(self, timeout_s: float) -> None:
@@ -154,6 +157,14 @@ class Outbox:
         self._delivered = known
         self._follower.go_to(known)
         self._is_placed = True
+
+    def _letter(self, record: Record) -> Letter | None:
+        """None, and told, for one that is as it was written and yet no record of this program."""
+        try:
+            return letter_of(record, self._shown(json.loads(record.text)))
+        except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as fault:
+            log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, seq=record.number, fault=repr(fault))
+            return None
 
     def _shown(self, record: dict[str, Any]) -> dict[str, Any]:
         """What may leave the box: no spectra, and positions only where they are wanted."""

@@ -9,7 +9,9 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.errors import AlarmRefusedError, CommissioningRefusedError
 from gateway.history import Reader
+from gateway.records import json_line
 from gateway.status import Status
 from gateway.web import pages
 from gateway.web.door import (
@@ -30,12 +32,8 @@ from gateway.web.routes import (
     CommissioningDesk,
     FrameLog,
     KnownLoads,
-    NoAlarmDesk,
-    NoCommissioningDesk,
-    NoFrameLog,
     NoTareDesk,
     NoTicketDesk,
-    NoTrend,
     NoVerificationDesk,
     Scales,
     TareDesk,
@@ -64,8 +62,24 @@ from gateway.web.routes import (
     vss_router,
     weights_router,
 )
+from gateway.web.routes.absent import absent
 from gateway.web.settings import WebSettings
 
+_NOT_HERE: Final = CommissioningRefusedError("not_allowed", "there is no service behind this page that could calibrate")
+_NO_ALARM: Final = AlarmRefusedError("no_such_alarm", "it is none of the alarms that can be acknowledged")
+NO_TREND: Final = json_line({"calibration_id": None, "parameters": []})
+NO_LINES: Final = json_line({"items": []})
+NOT_COMMISSIONED: Final = json_line(
+    {
+        "is_allowed": False,
+        "why_not": str(_NOT_HERE),
+        "is_offered": False,
+        "is_pending": False,
+        "underway": None,
+        "active": None,
+        "history": [],
+    }
+)
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
 
@@ -125,13 +139,13 @@ def create_app(
     app.include_router(spectra_router(board, calibrated))
     app.include_router(tare_router(tare or NoTareDesk()))
     app.include_router(verification_router(verification or NoVerificationDesk()))
-    app.include_router(trend_router(trend or NoTrend()))
+    app.include_router(trend_router(trend or absent(told=NO_TREND)))
     app.include_router(tickets_router(tickets or NoTicketDesk()))
-    app.include_router(commissioning_router(commissioning or NoCommissioningDesk()))
+    app.include_router(commissioning_router(commissioning or absent(_NOT_HERE, told=NOT_COMMISSIONED, lines=NO_LINES)))
     app.include_router(export_router(reader))
     app.include_router(events_router(reader))
-    app.include_router(alarms_router(reader, alarms or NoAlarmDesk()))
-    app.include_router(record_router(record or NoFrameLog()))
+    app.include_router(alarms_router(reader, alarms or absent(_NO_ALARM, standing="[]")))
+    app.include_router(record_router(record or absent(segments=(), open=None)))
     app.include_router(weights_router(board, scales))
     app.include_router(cab_router(board, reader, status, scales))
     app.include_router(j1939_router(board, scales, draws_trailers=draws_trailers))

@@ -16,7 +16,7 @@ from gateway.records import Why
 from gateway.status import State, Status
 from gateway.web import Scope, TokenFile, create_app
 from gateway.web.live.stream import EventStream
-from gateway.web.routes.alarms.routes import Alarm
+from gateway.web.routes.alarms import Alarm
 
 URL = "/api/v1/alarms"
 OVER = LIMIT_KG + 60.0

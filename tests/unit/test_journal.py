@@ -61,14 +61,23 @@ def test_a_flipped_bit_in_an_event_is_passed_over_counted_and_shown(
     assert Event.STORE_BAD_RECORD in names(caplog)
 
 
-def test_a_record_that_no_sender_can_read_ends_no_thread(store: Store) -> None:
+def test_a_record_that_no_sender_can_read_is_passed_over_and_told(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
     """Its checksum is right, and yet it is no record of this program."""
+    entry(store, 0)
     store.write_entry("event", "event-1", 0, "[]")
-    uplink = Uplink(SETTINGS, Outbox(store, "fleet"), {}, FakeBroker(accepted), BackOff(0.001, 0.002))
-    uplink.start()
-    assert wait_until(lambda: uplink.report().last_fault is not None)
-    assert uplink.is_alive()
-    uplink.stop()
+    entry(store, 2)
+    store.write_entry("event", "event-3", 0, "{}")
+    outbox = Outbox(store, "fleet")
+    letters = outbox.next_letters(10)
+    assert [letter.id for letter in letters] == ["event-0-1", "event-2-1"]
+    assert names(caplog) == [Event.STORE_BAD_RECORD] * 2
+    for letter in letters:
+        outbox.delivered(letter)
+    assert outbox.next_letters(10) == []
+    assert store.flush(PATIENCE_S)
+    assert store.reader().delivery("fleet").n_waiting == 0
 
 
 def test_a_resumed_follower_gets_more_than_a_page_of_entries(store: Store) -> None:

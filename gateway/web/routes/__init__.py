@@ -4,12 +4,11 @@ The live board, the store's reader and the service's status come in; a router a 
 puts together. Here an estimate becomes weights, metrics, and the words of rFMS, VSS and J1939.
 """
 
-from gateway.web.routes.alarms import AlarmDesk, NoAlarmDesk, alarms_router
+from gateway.web.routes.alarms import AlarmDesk, alarms_router
 from gateway.web.routes.cab import cab_router
 from gateway.web.routes.calibration import (
     NoTareDesk,
     NoTicketDesk,
-    NoTrend,
     NoVerificationDesk,
     TareDesk,
     TicketDesk,
@@ -20,7 +19,7 @@ from gateway.web.routes.calibration import (
     trend_router,
     verification_router,
 )
-from gateway.web.routes.commissioning import CommissioningDesk, NoCommissioningDesk, commissioning_router
+from gateway.web.routes.commissioning import CommissioningDesk, commissioning_router
 from gateway.web.routes.estimates import api_router
 from gateway.web.routes.events import events_router
 from gateway.web.routes.export import export_router
@@ -29,7 +28,7 @@ from gateway.web.routes.j1939 import j1939_router
 from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoad, KnownLoads, known_loads_router
 from gateway.web.routes.metrics import metrics_registry
 from gateway.web.routes.reasons import reasons_router
-from gateway.web.routes.record import FrameLog, NoFrameLog, record_router
+from gateway.web.routes.record import FrameLog, record_router
 from gateway.web.routes.rfms import rfms_router
 from gateway.web.routes.spectra import spectra_router
 from gateway.web.routes.vehicle import vehicle_router
@@ -44,12 +43,8 @@ __all__ = [
     "KnownLoad",
     "KnownLoads",
     "LatestWeights",
-    "NoAlarmDesk",
-    "NoCommissioningDesk",
-    "NoFrameLog",
     "NoTareDesk",
     "NoTicketDesk",
-    "NoTrend",
     "NoVerificationDesk",
     "Scales",
     "TareDesk",

@@ -61,8 +61,10 @@ class Scales:
 
     def weigh_each(self, estimates: Sequence[Estimate]) -> list[Weights]:
         """Likewise of many, each computed once however often these are asked for. From any thread."""
-        known = self._known
-        found = {id(one): known.get(id(one)) or (one, self.weigh(one)) for one in estimates}
+        known, found = self._known, dict[int, tuple[Estimate, Weights]]()
+        for one in estimates:
+            if id(one) not in found:
+                found[id(one)] = known.get(id(one)) or (one, self.weigh(one))
         self._known = found
         return [found[id(one)][1] for one in estimates]
 

@@ -6,13 +6,12 @@ thread of its own; its refusals go out as problems with a reason.
 
 from gateway.web.routes.calibration.tare import NoTareDesk, TareDesk, tare_router
 from gateway.web.routes.calibration.tickets import NoTicketDesk, TicketDesk, tickets_router
-from gateway.web.routes.calibration.trend import NoTrend, TrendDesk, trend_router
+from gateway.web.routes.calibration.trend import TrendDesk, trend_router
 from gateway.web.routes.calibration.verification import NoVerificationDesk, VerificationDesk, verification_router
 
 __all__ = [
     "NoTareDesk",
     "NoTicketDesk",
-    "NoTrend",
     "NoVerificationDesk",
     "TareDesk",
     "TicketDesk",

@@ -7,7 +7,6 @@ from fastapi import APIRouter, Path, Query, Request
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
-from gateway.errors import AlarmRefusedError
 from gateway.history import ALARM, Reader
 from gateway.web.routes.calibration.asking import answered, who
 from gateway.web.routes.estimates import HistoryQuery
@@ -25,18 +24,6 @@ class AlarmDesk(Protocol):
     def acknowledge(self, alarm_id: str, by: str, note: str | None) -> str:
         """The Alarm after it. Raises AlarmRefusedError."""
         ...
-
-
-class NoAlarmDesk:
-    """Where nothing is watched nothing is the matter."""
-
-    def standing(self) -> str:
-        """None ever."""
-        return "[]"
-
-    def acknowledge(self, alarm_id: str, by: str, note: str | None) -> str:
-        """Always refused."""
-        raise AlarmRefusedError("no_such_alarm", f"{alarm_id} is none of the alarms that can be acknowledged")
 
 
 class AlarmStep(BaseModel):
