@@ -19,7 +19,7 @@ from gateway.service.changes import BatchLog, StateLog, told_in_turn
 from gateway.service.day_book import DayBook
 from gateway.service.last_good import keep_copy
 from gateway.service.notify import Notifier
-from gateway.service.part import CLOSE_WITHIN_S, Deadline, Part, Sending, stop_in_turn
+from gateway.service.part import CLOSE_WITHIN_S, Deadline, Part, Sending, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     Forwarding,
     board_of,
@@ -248,7 +248,7 @@ class Gateway:
             await self._supervise(serving)
         except Exception as failure:  # noqa: BLE001 - whatever ends the watching, what was accepted reaches the disk
             self._failure = f"the supervisor died: {failure!r}"
-        await asyncio.to_thread(self._stop_parts)
+        await in_own_thread(self._stop_parts)
         self._server.should_exit = True
         await serving
         self._notifier.close()
@@ -262,7 +262,7 @@ class Gateway:
         """And tell systemd when it begins and ends."""
         self._notifier.send_reloading()
         try:
-            await asyncio.to_thread(self._reload)
+            await in_own_thread(self._reload)
         finally:
             self._notifier.send(READY="1")
 
@@ -355,7 +355,7 @@ class Look:
         now_s = time.monotonic()
         if self._task is None and now_s - self._begun_s >= LOOK_S:
             self._begun_s = now_s
-            self._task = asyncio.create_task(asyncio.to_thread(self._gateway.look, self._log_state))
+            self._task = asyncio.create_task(in_own_thread(lambda: self._gateway.look(self._log_state)))
 
 
 def _died(failure: BaseException | None) -> str | None:

@@ -1,9 +1,11 @@
 """What every part of the service is to the gateway: started, watched, stopped in time, the same way for all."""
 
+import asyncio
 import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import ClassVar, Final, Protocol
 
@@ -58,6 +60,31 @@ class Deadline:
     def left_s(self, most_s: float = STOP_WITHIN_S, *, keep_s: float = 0.0) -> float:
         """What one part may take of what is left, without the last ``keep_s``."""
         return max(0.0, min(most_s, self._end_s - keep_s - self._clock_s()))
+
+
+async def in_own_thread(work: Callable[[], object]) -> None:
+    """Do it in a thread of its own while the event loop goes on. Raises what it raises.
+
+    Not in the loop's pool: clients' questions may have taken that, and one that hangs keeps the process from ending.
+    """
+    loop = asyncio.get_running_loop()
+    done: asyncio.Future[None] = loop.create_future()
+
+    def end(failure: BaseException | None) -> None:
+        if not done.done():
+            done.set_result(None) if failure is None else done.set_exception(failure)
+
+    def run() -> None:
+        failure: BaseException | None = None
+        try:
+            work()
+        except Exception as raised:  # noqa: BLE001 - raised again where it is awaited
+            failure = raised
+        with suppress(RuntimeError):  # the loop is closed: nobody waits any more
+            loop.call_soon_threadsafe(end, failure)
+
+    threading.Thread(target=run, name="beside", daemon=True).start()
+    await done
 
 
 def stop_in_turn(parts: Sequence[Part], deadline: Deadline) -> list[str]:
