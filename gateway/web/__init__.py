@@ -16,7 +16,8 @@ from gateway.web.door import (
     server_config,
 )
 from gateway.web.live import Board, boot_clock_s
-from gateway.web.routes import KnownLoad, KnownLoads, LatestWeights, Scales, weigh_latest
+from gateway.web.routes.known_loads import KnownLoad, KnownLoads
+from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 from gateway.web.settings import WebSettings
 
 __all__ = [

@@ -26,43 +26,37 @@ from gateway.web.door import (
     problems,
 )
 from gateway.web.live import Board, LatestFirst
-from gateway.web.routes import (
-    KNOWN_LOADS_PATH,
-    AlarmDesk,
-    CommissioningDesk,
-    FrameLog,
-    KnownLoads,
+from gateway.web.routes.absent import absent
+from gateway.web.routes.alarms import AlarmDesk, alarms_router
+from gateway.web.routes.cab import cab_router
+from gateway.web.routes.calibration import (
     NoTareDesk,
     NoTicketDesk,
     NoVerificationDesk,
-    Scales,
     TareDesk,
     TicketDesk,
     TrendDesk,
     VerificationDesk,
-    alarms_router,
-    api_router,
-    cab_router,
-    commissioning_router,
-    events_router,
-    export_router,
-    health_router,
-    j1939_router,
-    known_loads_router,
-    metrics_registry,
-    reasons_router,
-    record_router,
-    rfms_router,
-    spectra_router,
     tare_router,
     tickets_router,
     trend_router,
-    vehicle_router,
     verification_router,
-    vss_router,
-    weights_router,
 )
-from gateway.web.routes.absent import absent
+from gateway.web.routes.commissioning import CommissioningDesk, commissioning_router
+from gateway.web.routes.estimates import api_router
+from gateway.web.routes.events import events_router
+from gateway.web.routes.export import export_router
+from gateway.web.routes.health import health_router
+from gateway.web.routes.j1939 import j1939_router
+from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
+from gateway.web.routes.metrics import metrics_registry
+from gateway.web.routes.reasons import reasons_router
+from gateway.web.routes.record import FrameLog, record_router
+from gateway.web.routes.rfms import rfms_router
+from gateway.web.routes.spectra import spectra_router
+from gateway.web.routes.vehicle import vehicle_router
+from gateway.web.routes.vss import vss_router
+from gateway.web.routes.weights import Scales, weights_router
 from gateway.web.settings import WebSettings
 
 _NOT_HERE: Final = CommissioningRefusedError("not_allowed", "there is no service behind this page that could calibrate")
@@ -133,27 +127,32 @@ def create_app(
     )
     problems.install(app)
     scales = Scales(calibrated)
-    app.include_router(api_router(board, reader, status, chosen))
-    app.include_router(reasons_router())
-    app.include_router(vehicle_router(status, calibrated))
-    app.include_router(spectra_router(board, calibrated))
-    app.include_router(tare_router(tare or NoTareDesk()))
-    app.include_router(verification_router(verification or NoVerificationDesk()))
-    app.include_router(trend_router(trend or absent(told=NO_TREND)))
-    app.include_router(tickets_router(tickets or NoTicketDesk()))
-    app.include_router(commissioning_router(commissioning or absent(_NOT_HERE, told=NOT_COMMISSIONED, lines=NO_LINES)))
-    app.include_router(export_router(reader))
-    app.include_router(events_router(reader))
-    app.include_router(alarms_router(reader, alarms or absent(_NO_ALARM, standing="[]")))
-    app.include_router(record_router(record or absent(segments=(), open=None)))
-    app.include_router(weights_router(board, scales))
-    app.include_router(cab_router(board, reader, status, scales))
-    app.include_router(j1939_router(board, scales, draws_trailers=draws_trailers))
-    app.include_router(vss_router(board, scales))
-    app.include_router(rfms_router(board, reader, status, scales))
-    app.include_router(health_router(status, metrics_registry(board, scales, status, responses)))
+    metrics = metrics_registry(board, scales, status, responses)
+    routers = [
+        api_router(board, reader, status, chosen),
+        reasons_router(),
+        vehicle_router(status, calibrated),
+        spectra_router(board, calibrated),
+        tare_router(tare or NoTareDesk()),
+        verification_router(verification or NoVerificationDesk()),
+        trend_router(trend or absent(told=NO_TREND)),
+        tickets_router(tickets or NoTicketDesk()),
+        commissioning_router(commissioning or absent(_NOT_HERE, told=NOT_COMMISSIONED, lines=NO_LINES)),
+        export_router(reader),
+        events_router(reader),
+        alarms_router(reader, alarms or absent(_NO_ALARM, standing="[]")),
+        record_router(record or absent(segments=(), open=None)),
+        weights_router(board, scales),
+        cab_router(board, reader, status, scales),
+        j1939_router(board, scales, draws_trailers=draws_trailers),
+        vss_router(board, scales),
+        rfms_router(board, reader, status, scales),
+        health_router(status, metrics),
+    ]
     if known_loads is not None:
-        app.include_router(known_loads_router(known_loads))
+        routers.append(known_loads_router(known_loads))
+    for router in routers:
+        app.include_router(router)
     pages.install(app, KNOWN_LOADS_PATH if known_loads else "")
     _describe(app, tokens)
     return app

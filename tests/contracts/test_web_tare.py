@@ -16,7 +16,7 @@ from gateway.calibration.tare_file import load_tares
 from gateway.service.tare_desk import TareDesk
 from gateway.web import Scope, TokenFile
 from gateway.web.door import problems
-from gateway.web.routes import tare_router
+from gateway.web.routes.calibration import tare_router
 from gateway.web.schemas import Body
 
 URL = "/api/v1/calibration/tare"

@@ -19,8 +19,8 @@ from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
-from gateway.web.routes import CommissioningDesk
 from gateway.web.routes.calibration import TareDesk, TicketDesk, VerificationDesk
+from gateway.web.routes.commissioning import CommissioningDesk
 from gateway.web.routes.record import FrameLog
 from support.patience import PATIENCE_S
 
