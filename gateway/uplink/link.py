@@ -1,16 +1,16 @@
 """One MQTT 5 connection, driven by whoever owns it: paho-mqtt without its own thread or queue of retries."""
 
-import contextlib
 import json
+import os
 import select
-import socket
 import ssl
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 import paho.mqtt.client as mqtt
-from paho.mqtt.enums import CallbackAPIVersion
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
@@ -64,9 +64,8 @@ class MqttLink:
         self._loss: str | None = None
         self._most_bytes: int | None = None  # the broker's Maximum Packet Size
         self._under_way = _NOTHING
-        self._bell, self._alarm = socket.socketpair()
-        self._bell.setblocking(False)
-        self._alarm.setblocking(False)
+        self._bell_lock = threading.Lock()
+        self._bell = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._client = self._make_client()
         try:
             self._connect()
@@ -92,29 +91,39 @@ class MqttLink:
 
         A broker may give its last answer by ending the connection: then that comes first, and LinkError with the next.
         """
-        if not self._answers:
-            self._wait(min(timeout_s, self._settings.keep_alive_s / 4.0))
-        code = self._client.loop(0.0)
+        code = self._move(0.0 if self._answers else min(timeout_s, self._settings.keep_alive_s / 4.0))
         if not self._answers and (code != mqtt.MQTT_ERR_SUCCESS or self._loss is not None):
-            raise LinkError(self._loss or mqtt.error_string(code))
+            raise LinkError(self._loss or mqtt.error_string(MQTTErrorCode(code)))
         answers, self._answers = self._answers, []
         return answers
 
     def wake(self) -> None:
         """End the turn under way; from any thread."""
-        with contextlib.suppress(OSError):  # full: it is woken already; closed: nobody waits
-            self._alarm.send(b".")
+        with self._bell_lock:  # its number may be another file's once it is closed
+            if self._bell >= 0:
+                os.eventfd_write(self._bell, 1)
 
-    def _wait(self, timeout_s: float) -> None:
-        """Until the socket moves, somebody wakes us, or the time is out."""
-        sock = self._client.socket()
-        if sock is None or (isinstance(sock, ssl.SSLSocket) and sock.pending()):
-            return
-        writing = [sock] if self._client.want_write() else []
-        with contextlib.suppress(ValueError):  # closed meanwhile: paho tells why
-            readable, _, _ = select.select([sock, self._bell], writing, [], timeout_s)
-            if self._bell in readable:
-                self._bell.recv(4096)
+    def _move(self, timeout_s: float) -> int:
+        """Wait until the socket moves, somebody wakes us, or the time is out; read and write what can be.
+
+        By poll(): select(), which paho would use, knows no file beyond the first 1024 of a process.
+        """
+        client, sock = self._client, self._client.socket()
+        if sock is None:
+            return int(mqtt.MQTT_ERR_NO_CONN)
+        waiting = select.poll()
+        waiting.register(sock, select.POLLIN | (select.POLLOUT if client.want_write() else 0))
+        waiting.register(self._bell, select.POLLIN)
+        has_rest = isinstance(sock, ssl.SSLSocket) and sock.pending() > 0
+        moved = dict(waiting.poll(0 if has_rest else round(1000.0 * timeout_s)))
+        if self._bell in moved:
+            os.eventfd_read(self._bell)
+        events = moved.get(sock.fileno(), 0)
+        codes = [client.loop_write()] if events & select.POLLOUT else []
+        if has_rest or events & ~select.POLLOUT:
+            codes.append(client.loop_read())
+        codes.append(client.loop_misc())
+        return next((int(code) for code in codes if code != mqtt.MQTT_ERR_SUCCESS), int(mqtt.MQTT_ERR_SUCCESS))
 
     def close(self) -> None:
         """Say goodbye, so that the will is not carried out."""
@@ -124,7 +133,7 @@ class MqttLink:
                 if any(answer.mid == farewell for answer in self.turn(_TURN_S)):
                     break
             self._client.disconnect()
-            self._client.loop(_TURN_S)
+            self._move(_TURN_S)
         except LinkError:  # it was broken already
             pass
         self._hang_up()
@@ -137,8 +146,10 @@ class MqttLink:
         self._hang_up()
 
     def _hang_up(self) -> None:
-        self._alarm.close()
-        self._bell.close()
+        with self._bell_lock:
+            bell, self._bell = self._bell, -1
+            if bell >= 0:
+                os.close(bell)
 
     def _make_client(self) -> mqtt.Client:
         settings = self._settings

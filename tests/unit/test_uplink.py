@@ -1,12 +1,15 @@
 """The uplink's own logic against a link that does what the test says."""
 
+import os
 import random
+import resource
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.broker import needs_mosquitto, running_broker
 from support.estimates import make_record
 from support.log import fields_of, names
 from support.patience import PATIENCE_S, wait_until
@@ -343,3 +346,25 @@ def test_the_log_tells_of_a_link_when_it_comes_and_when_it_goes(store: Store, ca
     ]
     assert fields_of(caplog, Event.UPLINK_NOT_REACHED) == {"broker": "broker.example:8883", "fault": "no name"}
     assert fields_of(caplog, Event.UPLINK_LOST) == {"broker": "broker.example:8883", "fault": "cut"}
+
+
+@needs_mosquitto
+def test_a_link_works_in_a_process_with_more_than_a_thousand_open_files(store: Store, tmp_path: Path) -> None:
+    """select() knows no file beyond 1023: a process of a hundred vehicles' uplinks lost every link at once."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, hard), hard))
+    ids = fill(store, 3)
+    taken = [os.open(os.devnull, os.O_RDONLY) for _ in range(1100)]
+    try:
+        with running_broker(tmp_path) as broker:
+            section = UplinkSection(host="127.0.0.1", port=broker.port, tls=False)
+            settings = uplink_settings(section, VehicleSection(id="van-17"))
+            assert settings is not None
+            uplink = Uplink(settings, Outbox(store, "fleet"), {})
+            uplink.start()
+            assert wait_until(lambda: uplink.report().n_delivered == len(ids)), uplink.report()
+            uplink.stop()
+    finally:
+        for file in taken:
+            os.close(file)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
