@@ -40,6 +40,8 @@ class Event(StrEnum):
     CALIBRATION_NOT_KEPT = "copy of the calibration cannot be kept"
     SETUP_REFUSED = "signal map or calibration cannot be used"
     PIPELINE_DIED = "pipeline died"
+    WEB_DIED = "web server died"
+    PART_LATE = "part did not stop in time"
     PIPELINE_LATE = "pipeline did not finish in time"
     BUS_RECEIVING = "bus receiving"
     BUS_SILENT = "bus silent"

@@ -13,6 +13,13 @@ class Notifier:
         self._address = "\0" + address[1:] if address.startswith("@") else address
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) if address else None
         self.n_unsent = 0
+        self._status = ""
+
+    def send_status(self, sentence: str) -> None:
+        """What `systemctl status` shows, where it is another than before."""
+        if sentence != self._status:
+            self._status = sentence
+            self.send(STATUS=sentence)
 
     def send(self, **fields: str) -> None:
         """One datagram, e.g. READY="1". A full or vanished socket is counted, never waited for."""

@@ -16,12 +16,8 @@ from gateway.errors import SpringscaleError
 
 _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",
-<<<<<<< HEAD
     "calibration": "Show, compare and check calibration files; state known weights to a running service.",
-=======
-    "calibration": "Show, compare and check calibration files; re-zero a running service.",
     "campaign": "Pack known-load drives into one archive, to hand on or to contribute.",
->>>>>>> d689c9d60efb8a7a39512077680838215527a65b
     "check-config": "Check a configuration, without opening the bus.",
     "commission": "Calibrate a running service's vehicle from its axle weights and an empty drive.",
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",

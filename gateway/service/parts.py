@@ -39,7 +39,13 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with
         "estimator": setup.estimator,
         "calibration_id": setup.calibration.id if setup.calibration else None,
     }
-    outbox = Outbox(store.reader(), store, _queue_name(wanted), with_places=with_places, repeat_s=wanted.repeat_s)
+    outbox = Outbox(
+        store,
+        _queue_name(wanted),
+        with_places=with_places,
+        repeat_s=wanted.repeat_s,
+        with_latest=wanted.home_assistant is not None,
+    )
     return Uplink(wanted, outbox, birth)
 
 
@@ -73,7 +79,7 @@ def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: boo
     """None where none is configured."""
     if wanted is None:
         return None
-    outbox = Outbox(store.reader(), store, wanted.queue, with_places=with_places, only=wanted.kinds)
+    outbox = Outbox(store, wanted.queue, with_places=with_places, only=wanted.kinds)
     return Webhook(wanted, outbox, store.write_event)
 
 

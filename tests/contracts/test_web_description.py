@@ -111,7 +111,7 @@ def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
         ) as gateway,
     ):
         gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
-        AlarmDesk(AlarmRules(), SUBJECT, gateway.store, gateway.board)(of_load(0, LIMIT_KG + 60.0))
+        AlarmDesk(AlarmRules(), SUBJECT, gateway.store)(of_load(0, LIMIT_KG + 60.0))
         assert gateway.store.flush(PATIENCE_S)
         gateway.board.close()  # so that the stream has an end
         yield schemathesis.openapi.from_asgi("/openapi.json", gateway.app)

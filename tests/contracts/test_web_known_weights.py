@@ -15,7 +15,7 @@ from support.web import Client, Gateway
 from gateway.calibration.known_weights_file import FILE_NAME, load_known_weights
 from gateway.web import Scope, TokenFile
 from gateway.web.door import problems
-from gateway.web.routes import known_weights_router
+from gateway.web.routes.calibration import known_weights_router
 from gateway.web.schemas import Body
 
 URL = "/api/v1/calibration/tare"

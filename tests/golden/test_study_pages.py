@@ -34,11 +34,8 @@ PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "events": delivery_page,
     "alarm_rules": alarms_page,
     "sensitivity": sensitivity_page,
-<<<<<<< HEAD
     "budget": budget_page,
-=======
     "phone_accuracy": phones_page,
->>>>>>> d689c9d60efb8a7a39512077680838215527a65b
 }
 
 

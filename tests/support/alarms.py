@@ -63,9 +63,7 @@ class AlarmBench:
     def start(self) -> None:
         """As a new start of the service would."""
         self.store, self.board = Store.open(self.directory), Board()
-        self.desk = AlarmDesk(
-            self.rules, SUBJECT, self.store, self.board, lambda: at(self.clock_s / 60.0), lambda: self.clock_s
-        )
+        self.desk = AlarmDesk(self.rules, SUBJECT, self.store, lambda: at(self.clock_s / 60.0), lambda: self.clock_s)
 
     def restart(self) -> None:
         self.store.close()

@@ -19,8 +19,8 @@ from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
-from gateway.web.routes import CommissioningDesk
 from gateway.web.routes.calibration import KnownWeightService, VerificationDesk
+from gateway.web.routes.commissioning import CommissioningDesk
 from gateway.web.routes.record import FrameLog
 from support.patience import PATIENCE_S
 
@@ -57,11 +57,11 @@ class Gateway:
         self.app = self._make_app()
 
     def publish(self, *estimates: Estimate) -> list[str]:
-        """As the pipeline does: into the store, then onto the board."""
+        """As the pipeline does: onto the board, then into the journal."""
         cursors = []
         for estimate in estimates:
+            self.board.publish(estimate)
             cursors.append(self.store.write_estimate(estimate_to_json(estimate)))
-            self.board.publish(estimate, cursors[-1])
         return cursors
 
     def restart_board(self) -> None:

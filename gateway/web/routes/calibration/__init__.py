@@ -5,13 +5,12 @@ thread of its own; its refusals go out as problems with a reason.
 """
 
 from gateway.web.routes.calibration.known_weights import KnownWeightService, NoKnownWeights, known_weights_router
-from gateway.web.routes.calibration.trend import NoTrend, TrendDesk, trend_router
+from gateway.web.routes.calibration.trend import TrendDesk, trend_router
 from gateway.web.routes.calibration.verification import NoVerificationDesk, VerificationDesk, verification_router
 
 __all__ = [
     "KnownWeightService",
     "NoKnownWeights",
-    "NoTrend",
     "NoVerificationDesk",
     "TrendDesk",
     "VerificationDesk",

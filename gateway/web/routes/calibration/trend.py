@@ -6,7 +6,6 @@ from fastapi import APIRouter, Request
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
-from gateway.records import json_line
 from gateway.web.routes.calibration.asking import answered
 
 TREND_PATH: Final = "/calibration/trend"
@@ -18,14 +17,6 @@ class TrendDesk(Protocol):
     def told(self) -> str:
         """A TrendState."""
         ...
-
-
-class NoTrend:
-    """Where nobody follows them."""
-
-    def told(self) -> str:
-        """Nothing."""
-        return json_line({"calibration_id": None, "parameters": []})
 
 
 class PointTold(BaseModel):

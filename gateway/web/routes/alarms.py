@@ -7,13 +7,11 @@ from fastapi import APIRouter, Path, Query, Request
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
-from gateway.errors import AlarmRefusedError
-from gateway.web.reader import Reader
+from gateway.history import ALARM, Reader
 from gateway.web.routes.calibration.asking import answered, who
-from gateway.web.routes.events import EntriesQuery, entries_of
+from gateway.web.routes.estimates import HistoryQuery
+from gateway.web.routes.events import entries_of
 from gateway.web.schemas import Body, problem_responses
-
-KIND: Final = "alarm"  # as the store names them
 
 
 class AlarmDesk(Protocol):
@@ -26,18 +24,6 @@ class AlarmDesk(Protocol):
     def acknowledge(self, alarm_id: str, by: str, note: str | None) -> str:
         """The Alarm after it. Raises AlarmRefusedError."""
         ...
-
-
-class NoAlarmDesk:
-    """Where nothing is watched nothing is the matter."""
-
-    def standing(self) -> str:
-        """None ever."""
-        return "[]"
-
-    def acknowledge(self, alarm_id: str, by: str, note: str | None) -> str:
-        """Always refused."""
-        raise AlarmRefusedError("no_such_alarm", f"{alarm_id} is none of the alarms that can be acknowledged")
 
 
 class AlarmStep(BaseModel):
@@ -102,9 +88,9 @@ def alarms_router(reader: Reader, desk: AlarmDesk) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["alarms"])
 
     @router.get("/alarms", response_model=AlarmsPage, responses=problem_responses(422, 503))
-    async def alarms(query: Annotated[EntriesQuery, Query()]) -> Response:
+    async def alarms(query: Annotated[HistoryQuery, Query()]) -> Response:
         """What stands, and what stood. One that changes comes again, behind all that was there: follow next_cursor."""
-        history = await entries_of(reader, KIND, query)
+        history = await entries_of(reader, ALARM, query)
         standing = await asyncio.to_thread(desk.standing)
         return Response(f'{{"active":{standing},{history}', media_type="application/json")
 
