@@ -56,7 +56,9 @@ def _quantity(known: Mapping[str, Any], path: str) -> Quantity:
 def _epoch(known: Mapping[str, Any]) -> Epoch | None:
     if "epoch.n_batches" not in known:
         return None
-    payload, front_share, cg_left = (_quantity(known, f"epoch.{name}") for name in ("payload", "front_share", "cg_left"))
+    payload, front_share, cg_left = (
+        _quantity(known, f"epoch.{name}") for name in ("payload", "front_share", "cg_left")
+    )
     return Epoch(payload, front_share, known["epoch.n_batches"], cg_left)
 
 

@@ -94,9 +94,7 @@ def test_the_next_batch_has_a_model_of_its_own(client: Client, board: Board, wei
     assert second["model"]["pitch_rate_radps_rthz"] != first["model"]["pitch_rate_radps_rthz"]
 
 
-def test_the_model_is_of_what_was_measured(
-    client: Client, board: Board, weighed: Estimate
-) -> None:
+def test_the_model_is_of_what_was_measured(client: Client, board: Board, weighed: Estimate) -> None:
     board.publish(weighed)
     plain = told(client)["model"]
     known = posterior_of(255.0, 47.3, 6.0, 0.2)

@@ -36,8 +36,8 @@ STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rat
 COARSE: Final = 0.5  # of evidence, which tells peaks apart
 FINE: Final = 1e-3
 FIRM_HZ: Final = 25.0
-"""A load that rings on its mount below this turns there too, which no model here knows: the evidence of its shape counts
-less, as the square of the ratio. Chosen.
+"""A load that rings on its mount below this turns there too, which no model here knows: the evidence of its shape
+counts less, as the square of the ratio. Chosen.
 """
 OF_SHAPES: Final = 0.02  # of evidence, likewise of shapes
 MOST_RIVALRY: Final = 1.0
@@ -166,12 +166,12 @@ def answer_at(
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
-    covariance = np.linalg.inv(whole.information[np.ix_(FITTED, FITTED)] + np.pad(DRIFT_PRECISION, (0, 2)))
+    covariance = np.asarray(np.linalg.inv(_of_sought(whole)), float)
     pull = whole.gradient[FITTED].copy()
     off = (point.theta[DRIFTING]) - expected
     pull[: len(DRIFTING)] += DRIFT_PRECISION @ off
-    free = np.arange(len(STEADY)) if is_shape_known else np.delete(np.arange(len(STEADY)), STEADY.index(_GYRATION))
-    t = np.array(STEADY)[free]
+    free = [i for i in range(len(STEADY)) if is_shape_known or STEADY[i] != _GYRATION]
+    t = [STEADY[i] for i in free]
     along = -covariance @ whole.information[np.ix_(FITTED, t)]  # what was sought moves by -C I_xt with each t
     gradient = whole.gradient[t] + along.T @ pull
     information = whole.information[np.ix_(t, t)] + along.T @ whole.information[np.ix_(FITTED, t)]
@@ -187,7 +187,15 @@ def answer_at(
     steady[:, free] = along @ np.linalg.inv(narrowing)  # S_posterior S^-1
     by_noise = along @ posterior * evidence
     at_peak = whittle.cost(point) + 0.5 * float(off @ DRIFT_PRECISION @ off)
-    return Answer(whole, covariance, at_peak + gained + narrowed, along @ step, steady, by_noise @ information @ by_noise.T)
+    return Answer(
+        whole, covariance, at_peak + gained + narrowed, along @ step, steady, by_noise @ information @ by_noise.T
+    )
+
+
+def _of_sought(whole: Curvature) -> F64:
+    """Information on what is sought, its prior included."""
+    information: F64 = whole.information[np.ix_(FITTED, FITTED)] + np.pad(DRIFT_PRECISION, (0, 2))
+    return information
 
 
 def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
@@ -195,10 +203,10 @@ def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
     with each of the half-car's parameters.
     """
     n = len(point.theta)
-    information = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1]).information
-    covariance = np.linalg.inv(information[np.ix_(FITTED, FITTED)] + np.pad(DRIFT_PRECISION, (0, 2)))
+    whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
+    covariance = np.asarray(np.linalg.inv(_of_sought(whole)), float)
     moves = np.zeros((2, len(PARAMETERS)))
-    moves[:, STEADY] = -(covariance @ information[np.ix_(FITTED, STEADY)])[-2:]
+    moves[:, STEADY] = -(covariance @ whole.information[np.ix_(FITTED, STEADY)])[-2:]
     return covariance[-2:, -2:], moves
 
 

@@ -18,10 +18,12 @@ from gateway.posterior import NORMAL_TAILS
 from gateway.records import F64
 
 NODES_PER_WHEELBASE2: Final = (0.004, 0.013, 0.032, 0.06, 0.095, 0.14, 0.2, 0.3)
-"""Squared radii of gyration at which a load is weighed, over the squared wheelbase: 0.03 to 2.4 m2 in a van of 2.8 m."""
+"""Squared radii of gyration at which a load is weighed, over the squared wheelbase: 0.03 to 2.4 m2 in a van of 2.8
+m.
+"""
 EVIDENCE: Final = 0.5
-"""How much a batch's evidence counts against shapes, calibration and nature, 1 being what its own statistics say. Chosen
-on simulated vans that serve no other purpose (`benchmarks.accuracy budget`).
+"""How much a batch's evidence counts against shapes, calibration and nature, 1 being what its own statistics say.
+Chosen on simulated vans that serve no other purpose (`benchmarks.accuracy budget`).
 """
 LEAST_PROBABILITY: Final = 1e-3  # of a shape that is worth weighing, before and after
 POINTS: Final = (0.025, 0.5, 0.975)
@@ -30,7 +32,8 @@ POINTS: Final = (0.025, 0.5, 0.975)
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
     """A load weighed under one shape: where its search ended (start (k,), for the next one), minus the logarithm of its
-    evidence (cost), the answer x (k,), payload in kg and front share (0..1) being its last, and the payload's own error.
+    evidence (cost), the answer x (k,), payload in kg and front share (0..1) being its last, and the payload's own
+    error.
     """
 
     start: F64

@@ -49,8 +49,8 @@ def _predicted(model: RegressionModel | None, ra: float, rg: float) -> Quantity:
 
 
 def _posterior(payload: Quantity, front_share: Quantity) -> Posterior | None:
-    """Half of each variance is taken to be the batch's own, half the regression's, whose coefficients err alike in every
-    batch; None without a payload.
+    """Half of each variance is taken to be the batch's own, half the regression's, whose coefficients err alike in
+    every batch; None without a payload.
 
     Standard deviations are those of the normal error whose 95 % interval is as wide as Student's.
     """
