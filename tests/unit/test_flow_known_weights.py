@@ -87,7 +87,7 @@ def test_weights_and_the_budget_are_of_what_is_shown() -> None:
 
 def test_a_rejected_batch_weighs_nothing_and_says_so() -> None:
     crawling = drive(45.0, lambda t_s: np.full_like(t_s, 0.5))
-    found = [one for one in fed(flow(known()), crawling) if not one.is_provisional][0]
+    found = next(one for one in fed(flow(known()), crawling) if not one.is_provisional)
     assert found.rejected
     assert {weight.lacks for _, weight in found.weights.items()} == {Lack.ESTIMATE}
     assert (found.posterior, found.known_weights_id, found.error_budget) == (None, None, ())

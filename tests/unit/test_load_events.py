@@ -45,7 +45,9 @@ def test_a_change_is_the_less_sure_the_less_alike_the_loads_are():
     """What grows with the load by a tenth errs by a tenth of the change."""
     for after_kg in (320.0, 900.0):
         loads = [
-            Posterior(np.array([kg, 50.0]), np.diag([OWN_KG**2, 0.01]), {Source.CALIBRATION: np.array([[0.1 * kg, 0.0]])})
+            Posterior(
+                np.array([kg, 50.0]), np.diag([OWN_KG**2, 0.01]), {Source.CALIBRATION: np.array([[0.1 * kg, 0.0]])}
+            )
             for kg in (120.0, after_kg)
         ]
         std_kg = math.sqrt(2.0 * OWN_KG**2 + (0.1 * (after_kg - 120.0)) ** 2)

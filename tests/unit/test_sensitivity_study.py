@@ -20,8 +20,8 @@ from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.judgement import Judged
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.vehicle import Vehicle
 from gateway.core.change import Rules
+from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.posterior import Posterior, Source
 from gateway.records import Why

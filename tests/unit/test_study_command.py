@@ -86,8 +86,17 @@ def test_coverage_says_whether_it_falls_short(
 ) -> None:
     batches = [
         JudgedBatch(
-            "a", f"a {i}", "mixed", "cross_spectrum", (), 1.0, 1.0, i >= n_missed, i % 20 > 0,
-            payload_half_width_pct=3.0, payload_score_pct=6.5,
+            "a",
+            f"a {i}",
+            "mixed",
+            "cross_spectrum",
+            (),
+            1.0,
+            1.0,
+            i >= n_missed,
+            i % 20 > 0,
+            payload_half_width_pct=3.0,
+            payload_score_pct=6.5,
         )
         for i in range(200)
     ]
