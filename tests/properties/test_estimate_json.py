@@ -23,12 +23,11 @@ quantities = st.builds(Quantity, numbers, numbers, st.tuples(numbers, numbers))
 by_name = st.dictionaries(names, numbers, max_size=3)
 spectra = st.integers(0, 4).map(lambda n: Spectra(*(np.linspace(0.1 * k, np.pi, n) for k in range(5))))
 weights = st.builds(Weight, numbers, numbers, st.none() | st.floats(1.0, 1e6), st.none() | st.sampled_from(Lack))
-budgets = st.lists(
-    st.builds(
-        BudgetLine, st.sampled_from(["own", *Source]), *[numbers] * 3, st.none() | st.sampled_from(Remedy), numbers
-    ),
-    max_size=3,
-).map(tuple)
+stds = st.floats(0.0, 1e6) | st.just(float("nan"))
+lines = st.builds(
+    BudgetLine, st.sampled_from(["own", *Source]), stds, stds, stds, st.none() | st.sampled_from(Remedy), stds
+)
+budgets = st.lists(lines, max_size=3).map(tuple)
 
 
 @st.composite
@@ -38,7 +37,8 @@ def posteriors(draw: st.DrawFn) -> Posterior:
     sources = {
         name: rng.normal(0.0, 20.0, (draw(st.integers(1, 9)), size)) for name in draw(st.sets(st.sampled_from(Source)))
     }
-    return Posterior(rng.normal(0.0, 300.0, size), rng.normal(0.0, 50.0, (size, size)), sources, (1.2, 2.6))
+    root = rng.normal(0.0, 50.0, (size, size))
+    return Posterior(rng.normal(0.0, 300.0, size), root @ root.T + np.eye(size), sources, (1.2, 2.6))
 
 
 estimates = st.builds(
@@ -80,14 +80,23 @@ OF_THE_LOAD = (
 )
 
 
+FOLLOWING = {one.name for one in FIELDS if one.name.startswith("raw_") or "correlation" in one.name}
+
+
 def read_back(told: dict[str, Any]) -> Estimate:
     return estimate_from_json(json.loads(json_line(told)))
 
 
 @given(estimates)
 def test_what_is_read_back_is_told_in_the_same_words(estimate: Estimate) -> None:
-    told = json_line(estimate_to_json(estimate))
-    assert json_line(estimate_to_json(read_back(json.loads(told)))) == told
+    told = estimate_to_json(estimate)
+    again = estimate_to_json(read_back(told))
+    assert again.keys() == told.keys()
+    for name, x in told.items():
+        if name in FOLLOWING and x is not None:  # from the posterior, which was rounded
+            assert again[name] == pytest.approx(x, rel=1e-4, abs=1e-4)
+        else:
+            assert json_line({name: again[name]}) == json_line({name: x})
 
 
 @given(estimates)
@@ -101,7 +110,9 @@ def test_what_an_early_version_stored_is_read_too(estimate: Estimate) -> None:
     told = estimate_to_json(estimate)
     early = {name: x for name, x in told.items() if name not in ("roughness_mps2", "diagnostics")}
     again = estimate_to_json(read_back(early))
-    assert {**again, "roughness_mps2": told["roughness_mps2"], "diagnostics": told["diagnostics"]} == told
+    assert {**again, "roughness_mps2": told["roughness_mps2"], "diagnostics": told["diagnostics"]} | dict.fromkeys(
+        FOLLOWING & told.keys()
+    ) == told | dict.fromkeys(FOLLOWING & told.keys())
 
 
 @given(posteriors())
@@ -139,16 +150,6 @@ def test_a_line_of_csv_has_the_columns_and_no_other(estimate: Estimate) -> None:
     ]
     if (interval := told["cg_left_interval95_m"]) is not None:
         assert [cells["cg_left_low95_m"], cells["cg_left_high95_m"]] == interval
-
-
-@given(estimates)
-def test_what_was_stored_before_there_was_a_roll_rate_is_read_too(estimate: Estimate) -> None:
-    told = estimate_to_json(estimate)
-    told["weights"] = estimate_to_json(Estimate(0, 0, ""))["weights"]
-    early = {name: x for name, x in told.items() if not any(part in name for part in ("left", "roll", "weights"))}
-    assert estimate_to_json(read_back(early)) == {
-        name: None if any(part in name for part in ("left", "roll")) else x for name, x in told.items()
-    }
 
 
 @given(estimates, st.sampled_from(Why))

@@ -79,8 +79,8 @@ def accuracy_page(results: Mapping[str, Any]) -> str:
         "identification part. All of it is simulated by `gateway/sim`, whose friction, progressive springs, sensor "
         "errors and rough two-track roads the estimators do not know; the paper's tests run on its one-track road (1). "
         "A rejected batch gave no answer and stands in no mean. +- is the mean of half the 95 % intervals; the "
-        f"interval score is their width and 40 times what the truth lies outside, {IDEAL_SCORE:g} times the mean error where "
-        "they are as wide as they should be.\n\n" + "\n".join([*head, *lines]) + "\n"
+        f"interval score is their width and 40 times what the truth lies outside, {IDEAL_SCORE:g} times the mean "
+        "error where they are as wide as they should be.\n\n" + "\n".join([*head, *lines]) + "\n"
     )
 
 
