@@ -35,6 +35,7 @@ LEAST_START_SHARE: Final = 0.33
 STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rate bends
 COARSE: Final = 0.5  # of evidence, which tells peaks apart
 FINE: Final = 1e-3
+MOST_LOAD_SHARE: Final = 4.0  # of the empty mass: no search goes beyond, wherever noise may lead it
 FIRM_HZ: Final = 25.0
 """A load that rings on its mount below this turns there too, which no model here knows: the evidence of its shape
 counts less, as the square of the ratio. Chosen.
@@ -364,8 +365,10 @@ def _sought(
     prior_mean = np.r_[packing.drifting, 0.0, 0.0]
     prior_precision = np.pad(DRIFT_PRECISION, (0, 2))  # flat in payload and share
 
+    most_kg = MOST_LOAD_SHARE * calibration.empty_mass_kg
+
     def cost(x: F64) -> float:
-        return whittle.cost(_point(x, calibration, cg_left_m))
+        return whittle.cost(_point(x, calibration, cg_left_m)) if abs(x[-2]) <= most_kg else np.inf
 
     def curvature(x: F64) -> Curvature:
         point = _point(x, calibration, cg_left_m)
