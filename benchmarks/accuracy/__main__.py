@@ -16,12 +16,14 @@ import click
 from benchmarks.accuracy import advice as on_advice
 from benchmarks.accuracy import alarm_days as on_alarm_days
 from benchmarks.accuracy import alarms as on_alarms
+from benchmarks.accuracy import budget as on_budget
 from benchmarks.accuracy import coverage as on_coverage
 from benchmarks.accuracy import delivery as on_delivery
 from benchmarks.accuracy import disturbances as on_disturbances
 from benchmarks.accuracy import sensitivity as on_sensitivity
 from benchmarks.accuracy import siblings as on_siblings
 from benchmarks.accuracy.bounds import limits, limits_table
+from benchmarks.accuracy.budget import budget_page
 from benchmarks.accuracy.coverage_drives import Scope
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.delivery_page import delivery_page
@@ -117,6 +119,19 @@ def coverage(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
     with counted("calibrating and driving vans") as on_van:
         found = on_coverage.coverage(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("coverage", found, coverage_page(found), output)
+
+
+@studies.command("budget")
+@_vans(on_budget.SEED)
+@_output
+def budget(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
+    """Is the error made up as its budget says? Each source alone, then all at once; ~3 min a van."""
+    with counted("driving vans with each source alone") as on_van:
+        alone = on_budget.alone(n_vans, seed, workers=workers, on_van=on_van)
+    with counted("driving vans with all sources at once") as on_van:
+        together = on_budget.together(n_vans, seed + 1, workers=workers, on_van=on_van)
+    found = {"seed": seed, "n_vans": n_vans, "alone": alone, "together": together}
+    _hand_out("budget", found, budget_page(found), output)
 
 
 @studies.command("disturbances")

@@ -15,15 +15,19 @@ import numpy as np
 from gateway.calibration.inspection import SplitRun
 from gateway.calibration.judgement import errors_of, judge
 from gateway.calibration.judgement.learning_curve import calibrated_on, triples_at_different_positions
-from gateway.calibration.plan import Design, PlacedLoad, Spread, usual_drive, weighed_loads
+from gateway.calibration.plan import Design, PlacedLoad, usual_drive, weighed_loads
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cargo import shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.ideal_drive import Drive
+from gateway.core.cross_spectrum.predicted import predicted
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 
 Errors = tuple[float, float]  # mean |error| of payload and front share, percent (12)
 ESTIMATOR: Final = "cross_spectrum"
 LEAST_RUNS: Final = 5
+BATCH_S: Final = 300.0
 OnFit = Callable[[int, int], None]  # (calibrations done, calibrations in all)
 Scored = tuple[Errors, Errors]  # with misses, and of what was answered
 
@@ -147,7 +151,7 @@ class _Tried:
         return (
             number_of[design.best(found.covariance, loads)],
             number_of[design.worst(found.covariance, loads)],
-            _expected(design.spread(found.covariance), found, self._vehicle),
+            expected_of(found, self._vehicle, drive.speed_mps),
         )
 
     def _calibrated(self, numbers: tuple[int, ...]) -> tuple[CalibratedVehicle, Scored]:
@@ -169,14 +173,15 @@ class _Tried:
         )
 
 
-def _expected(spread: Spread, found: CrossSpectrumCalibration, vehicle: Vehicle) -> Errors:
-    """Mean |error| (12) of Gaussian errors with the standard deviations that the service would state."""
+def expected_of(found: CrossSpectrumCalibration, vehicle: Vehicle, speed_mps: float) -> Errors:
+    """Mean |error| (12) of Gaussian errors with the variances that the service would state, over all loads."""
+    prior = shape_prior(vehicle, *found.known_shape)
+    drive = Drive(BATCH_S, speed_mps)
+    stated = [predicted(found, prior, placed.load, drive).covariance for placed in weighed_loads(vehicle)]
+    payload_std_kg, share_std_pct = np.sqrt(np.mean([np.diag(one)[:2] for one in stated], axis=0)).tolist()
     (low_kg, high_kg), (low_pct, high_pct) = vehicle.payload_range_kg, vehicle.front_share_range_pct
     mean_of_std = 100.0 * math.sqrt(2.0 / math.pi)
-    return (
-        mean_of_std * found.payload_inflation * spread.payload_std_kg / (high_kg - low_kg),
-        mean_of_std * found.front_share_inflation * spread.front_share_std_pct / (high_pct - low_pct),
-    )
+    return mean_of_std * payload_std_kg / (high_kg - low_kg), mean_of_std * share_std_pct / (high_pct - low_pct)
 
 
 def _or_nan(x: float | None) -> float:

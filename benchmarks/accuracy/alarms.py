@@ -3,7 +3,7 @@
 alarms(n_loads, seed) -> numbers for docs/alarm_rules.json
 
 No vehicle is simulated: each load's gross weight lies so many of a batch's standard deviations from the limit, half of
-each batch's error is its own and half is the load's (what core.fusion takes where an estimator tells no better), and
+each batch's error is its own and half is shared by all batches of the load, and
 what comes of it goes through the fusion and the alarms of the service. Whether estimates are as sure as they say is
 asked elsewhere (docs/coverage.md).
 """
@@ -18,10 +18,12 @@ import numpy as np
 
 from benchmarks.accuracy.alarm_days import NEAR
 from gateway.core.alarms import AlarmRules, AlarmState, AlarmWatch
-from gateway.core.fusion import PAYLOAD_OWN_STD_KG, fused, summary
+from gateway.core.change import Rules
+from gateway.core.fusion import epoch_of, fused_epoch
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import weighed
-from gateway.estimate import Estimate, Quantity
+from gateway.estimate import Estimate
+from gateway.posterior import Posterior, Source
 from gateway.units import NS_PER_S
 
 N_LOADS: Final = 500
@@ -35,6 +37,10 @@ _LIMIT_PAYLOAD_KG: Final = 700.0
 _VAN: Final = Vehicle(
     "made up", 1600.0, 3.0, unsprung_front_kg=100.0, unsprung_rear_kg=100.0, gross_limit_kg=1800.0 + _LIMIT_PAYLOAD_KG
 )
+
+
+_RULES: Final = Rules(_LIMIT_PAYLOAD_KG, _VAN.empty_mass_kg + _LIMIT_PAYLOAD_KG)
+_SHARE_STD_PCT: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +71,9 @@ def told_of(rules: AlarmRules, distance: float, shared: float, own: list[float])
     n_alarms = 0
     for n, error in enumerate(own, 1):
         batch = _batch(n, distance + shared + error)
-        epoch = fused(epoch, batch)
-        batch = weighed(replace(batch, epoch=summary(epoch)), _VAN)
+        epoch = fused_epoch(epoch, batch, _RULES)
+        assert epoch is not None
+        batch = weighed(replace(batch, epoch=epoch_of(epoch.posterior, epoch.n_batches)), _VAN)
         for alarm in watch.weigh(batch, _VAN):
             first.setdefault(alarm.state, n)
             n_alarms += len(alarm.steps) == 1
@@ -79,15 +86,10 @@ def _errors(drawn: Any) -> tuple[float, list[float]]:
 
 
 def _batch(n: int, off: float) -> Estimate:
-    return Estimate(
-        n * _BATCH_NS,
-        (n + 1) * _BATCH_NS,
-        "made up",
-        payload=Quantity.normal(_LIMIT_PAYLOAD_KG + STD_KG * off, STD_KG),
-        front_share=Quantity.normal(50.0, 0.5),
-        correlation=0.0,
-        diagnostics={PAYLOAD_OWN_STD_KG: math.sqrt(0.5) * STD_KG},
-    )
+    half = math.sqrt(0.5) * np.array([STD_KG, _SHARE_STD_PCT])
+    mean = np.array([_LIMIT_PAYLOAD_KG + STD_KG * off, 50.0])
+    posterior = Posterior(mean, np.diag(half**2), {Source.MODEL: np.diag(half)})
+    return Estimate(n * _BATCH_NS, (n + 1) * _BATCH_NS, "made up").answered(posterior)
 
 
 def _line(told: list[Load]) -> dict[str, Any]:
@@ -157,8 +159,8 @@ def _days_section(days: Mapping[str, Any]) -> list[str]:
         "|---|---|---|---|---|---|",
         *(_day_row(line) for line in days["lines"]),
         "",
-        "What was confirmed stays so through later legs, until their load says no. Where nobody said how long loads "
-        "lie, these vans weigh too little ([load events](events.md#how-long-the-load-lies)); no rule of an alarm mends "
+        "What was confirmed stays so through later legs, until their load says no. Where nobody said what the vans "
+        "carry, they may weigh too little ([load events](events.md#the-shape-of-the-load)); no rule of an alarm mends "
         "that.",
         "",
     ]
@@ -168,7 +170,7 @@ def _day_row(line: Mapping[str, Any]) -> str:
     n, n_early, n_final = line["n"], line["n_early"], line["n_final"]
     counts = (n - n_early - n_final, n_early, n_final)
     shares = (f"{count} ({100 * count / max(n, 1):.0f} %)" for count in counts)
-    said = {"nothing": "nothing", "length": "how long loads lie"}[line["said"]]
+    said = {"nothing": "nothing", "carries": "that it carries parcels"}[line["said"]]
     return f"| {said} | {_WORDS[line['truth']].format(near=100 * NEAR)} | {n} | {' | '.join(shares)} |"
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from gateway.calibration.judgement.coverage import IDEAL_SCORE
+
 
 def rejected_cell(line: Mapping[str, Any]) -> str:
     """How many, and why."""
@@ -20,3 +22,8 @@ def share_cell(coverage: Mapping[str, Any] | None) -> str:
     if coverage is None:
         return "none"
     return f"{100 * coverage['share']:.0f} % ({100 * coverage['low']:.0f} to {100 * coverage['high']:.0f})"
+
+
+def score_cell(score: float | None, mean_abs: float | None) -> str:
+    """A mean interval score, and what is ideal for errors of this mean."""
+    return "none" if score is None or mean_abs is None else f"{score:.1f} ({IDEAL_SCORE * mean_abs:.1f})"

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from benchmarks.accuracy.loads import drawn_load
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, scattered
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, SignalMap, load_signal_map
 from gateway.calibration.known_run import KnownRun
@@ -99,10 +100,11 @@ def known_loads(van: Vehicle, n_loads: int, rng: np.random.Generator) -> list[tu
 
 
 def unseen_load(van: Vehicle, rng: np.random.Generator) -> tuple[Load, ...]:
-    """Any load at any place from the driver's back to the rear axle; sometimes none."""
+    """Any load of any shape at any place from the driver's back to the rear axle; sometimes none."""
     if rng.random() < EMPTY_SHARE:
         return ()
-    return (_load(van, float(rng.uniform(0.05, 1.0)), float(rng.uniform(0.15, 1.0))),)
+    mass_kg, position_m = float(rng.uniform(0.05, 1.0)) * van.rated_payload_kg, float(rng.uniform(0.15, 1.0))
+    return drawn_load(van, mass_kg, position_m * van.wheelbase_m, rng)
 
 
 def driven(

@@ -3,15 +3,15 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from benchmarks.accuracy.cells import number_cell, rejected_cell, share_cell
+from benchmarks.accuracy.cells import number_cell, rejected_cell, score_cell, share_cell
 from benchmarks.accuracy.coverage_table import ALL_KINDS, roll_in_words
 from gateway.calibration.judgement.coverage import PROMISED
 
 COLUMNS: Final = (
     "Drive", "Roll rate", "Estimator", "Runs", "Batches", "Rejected",
-    "Payload, mean abs. error %", "with misses", "95 % covers", "by van",
-    "Share, mean abs. error %", "with misses", "95 % covers", "by van",
-    "Centre of gravity sideways, mean abs. error mm", "95 % covers",
+    "Payload, mean abs. error %", "with misses", "95 % covers", "by van", "+- %", "score % (ideal)",
+    "Share, mean abs. error %", "with misses", "95 % covers", "by van", "+- %", "score % (ideal)",
+    "Centre of gravity sideways, mean abs. error mm", "95 % covers", "+- mm", "score mm (ideal)",
 )  # fmt: skip
 
 
@@ -54,7 +54,11 @@ def _protocol(found: Mapping[str, Any]) -> str:
         "Batches of 300 s; errors are percent of the payload each van is rated for and of 20 percentage points; with "
         "misses, a rejected batch counts as a mid-range answer. Coverage is the share of 95 % intervals that held the "
         "truth, with its own 95 % limits: batches of one run (of one van) are alike, so the limits are those of as "
-        "many independent batches as scatter like the runs (the vans) do."
+        "many independent batches as scatter like the runs (the vans) do. +- is the mean of half the 95 % intervals. "
+        "The interval score is their width and 40 times what the truth lies outside; in brackets what it would be, "
+        "were errors normal and intervals as wide as they should be. Loads are of every length and height: boxes, "
+        "parcels all over the floor, a filled bay, tall and long ones, pipes, and some with a part on the roof; nobody "
+        "says which."
     )
 
 
@@ -87,6 +91,8 @@ def _cells(line: Mapping[str, Any]) -> tuple[str, ...]:
         *_of_target(line, "payload"),
         *_of_target(line, "front_share"),
         number_cell(line["cg_left_mean_abs_mm"]), share_cell(line["cg_left_coverage"]),
+        number_cell(line["cg_left_half_width_mm"]),
+        score_cell(line["cg_left_interval_score_mm"], line["cg_left_mean_abs_mm"]),
     )  # fmt: skip
 
 
@@ -96,6 +102,8 @@ def _of_target(line: Mapping[str, Any], target: str) -> tuple[str, ...]:
         number_cell(line[f"{target}_mean_abs_pct_with_misses"]),
         share_cell(line[f"{target}_coverage"]),
         share_cell(line[f"{target}_coverage_by_van"]),
+        number_cell(line[f"{target}_half_width_pct"]),
+        score_cell(line[f"{target}_interval_score_pct"], line[f"{target}_mean_abs_pct"]),
     )
 
 

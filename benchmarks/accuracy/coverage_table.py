@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.calibration.judgement import Coverage, Judged, coverage_of
+from gateway.calibration.judgement.coverage import interval_scores
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.records import Why
@@ -20,8 +21,8 @@ HALF_AN_ANSWER: Final = "no_front_share"  # where an estimator is calibrated for
 class JudgedBatch:
     """One batch: errors in percent of its vehicle's ranges, and whether the 95 % intervals held the truth.
 
-    Where the batch was rejected the errors are those of a mid-range answer, and no interval covers. cg_left_error_m
-    is NaN where nothing was told of the centre of gravity sideways.
+    Where the batch was rejected the errors are those of a mid-range answer, no interval covers, and half-widths and
+    interval scores are NaN. cg_left_error_m is NaN where the lateral place is unknown.
     """
 
     van: str
@@ -36,6 +37,12 @@ class JudgedBatch:
     has_roll_rate: bool = True
     cg_left_error_m: float = math.nan
     is_cg_left_covered: bool = False
+    payload_half_width_pct: float = math.nan
+    payload_score_pct: float = math.nan
+    front_share_half_width_pct: float = math.nan
+    front_share_score_pct: float = math.nan
+    cg_left_half_width_m: float = math.nan
+    cg_left_score_m: float = math.nan
 
     @property
     def is_rejected(self) -> bool:
@@ -68,6 +75,12 @@ class Line:
     front_share_coverage_by_van: Coverage | None
     cg_left_mean_abs_mm: float | None
     cg_left_coverage: Coverage | None
+    payload_half_width_pct: float | None
+    payload_interval_score_pct: float | None
+    front_share_half_width_pct: float | None
+    front_share_interval_score_pct: float | None
+    cg_left_half_width_mm: float | None
+    cg_left_interval_score_mm: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,20 +141,45 @@ def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str, cg_m: floa
     rejected = tuple(str(why) for why in found.rejected)
     if not rejected and not (np.isfinite(payload_kg) and np.isfinite(share_pct)):
         rejected = (HALF_AN_ANSWER,)
+    is_rejected = bool(rejected)
+    payload_width, payload_score = _interval(
+        found.payload.interval95, one.payload_kg, vehicle.payload_range_kg, is_rejected
+    )
+    share_width, share_score = _interval(
+        found.front_share.interval95, one.front_share_pct, vehicle.front_share_range_pct, is_rejected
+    )
+    cg_width_m, cg_score_m = _interval(found.cg_left.interval95, cg_m, (0.0, 100.0), is_rejected)
     return JudgedBatch(
         van=vehicle.name,
         run=f"{vehicle.name} {one.run}",
         kind=kind,
         estimator=estimator,
         rejected=rejected,
-        payload_error_pct=_percent(payload_kg, one.payload_kg, vehicle.payload_range_kg, bool(rejected)),
-        front_share_error_pct=_percent(share_pct, one.front_share_pct, vehicle.front_share_range_pct, bool(rejected)),
+        payload_error_pct=_percent(payload_kg, one.payload_kg, vehicle.payload_range_kg, is_rejected),
+        front_share_error_pct=_percent(share_pct, one.front_share_pct, vehicle.front_share_range_pct, is_rejected),
         is_payload_covered=_holds(found.payload.interval95, one.payload_kg),
         is_front_share_covered=_holds(found.front_share.interval95, one.front_share_pct),
         has_roll_rate=has_roll_rate,
         cg_left_error_m=found.cg_left.number - cg_m,
         is_cg_left_covered=_holds(found.cg_left.interval95, cg_m),
+        payload_half_width_pct=payload_width,
+        payload_score_pct=payload_score,
+        front_share_half_width_pct=share_width,
+        front_share_score_pct=share_score,
+        cg_left_half_width_m=cg_width_m,
+        cg_left_score_m=cg_score_m,
     )
+
+
+def _interval(
+    interval: tuple[float, float], true: float, full_range: tuple[float, float], is_rejected: bool
+) -> tuple[float, float]:
+    """Half-width and score in percent of the range; NaN of what was rejected."""
+    if is_rejected:
+        return math.nan, math.nan
+    percent = 100.0 / (full_range[1] - full_range[0])
+    (score,) = interval_scores(np.array([true]), np.array(interval[:1]), np.array(interval[1:]))
+    return 0.5 * (interval[1] - interval[0]) * percent, float(score) * percent
 
 
 def _percent(found: float, true: float, full_range: tuple[float, float], is_rejected: bool) -> float:
@@ -177,6 +215,12 @@ def _line(kind: str, estimator: str, has_roll_rate: bool, batches: Sequence[Judg
         front_share_coverage_by_van=_coverage(answered, share, lambda b: b.van),
         cg_left_mean_abs_mm=_mean_abs([1000.0 * batch.cg_left_error_m for batch in placed]),
         cg_left_coverage=_coverage(placed, lambda b: b.is_cg_left_covered, lambda b: b.run),
+        payload_half_width_pct=_mean_known([batch.payload_half_width_pct for batch in answered]),
+        payload_interval_score_pct=_mean_known([batch.payload_score_pct for batch in answered]),
+        front_share_half_width_pct=_mean_known([batch.front_share_half_width_pct for batch in answered]),
+        front_share_interval_score_pct=_mean_known([batch.front_share_score_pct for batch in answered]),
+        cg_left_half_width_mm=_mean_known([1000.0 * batch.cg_left_half_width_m for batch in placed]),
+        cg_left_interval_score_mm=_mean_known([1000.0 * batch.cg_left_score_m for batch in placed]),
     )
 
 
@@ -186,6 +230,11 @@ def _counted(reasons: Sequence[str]) -> dict[str, int]:
 
 def _mean_abs(errors_pct: Sequence[float]) -> float | None:
     return float(np.mean(np.abs(errors_pct))) if errors_pct else None
+
+
+def _mean_known(numbers: Sequence[float]) -> float | None:
+    """Of those that are known: an answer without an interval has no width."""
+    return _mean_abs([x for x in numbers if math.isfinite(x)])
 
 
 def _coverage(

@@ -17,7 +17,9 @@ from benchmarks.accuracy.coverage_drives import stated
 from benchmarks.accuracy.delivery_days import Day as DrivenDay
 from benchmarks.accuracy.delivery_days import Said, kept_day
 from benchmarks.accuracy.vans import OnVan, of_each_van, van_of
-from gateway.core.events import Entry, EntryKind, Ledger, Rules
+from gateway.calibration.judgement.coverage import interval_scores
+from gateway.core.change import Rules
+from gateway.core.events import Entry, EntryKind, Ledger
 from gateway.core.events.day import Day
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json
@@ -70,10 +72,11 @@ class Carried:
 
 @dataclass(frozen=True, slots=True)
 class Weighed:
-    """A batch that counted: its error in percent of the rated payload, and whether its 95 % interval held the truth."""
+    """A batch that counted, in percent of the rated payload: its error, half its 95 % interval, and its score."""
 
     error_pct: float
-    std_pct: float
+    half_width_pct: float
+    score_pct: float
     is_held: bool
 
 
@@ -139,9 +142,12 @@ def _judged(number: int, driven: DrivenDay, estimates: tuple[Estimate, ...], rul
 def _weighed(estimate: Estimate, driven: DrivenDay) -> Weighed:
     payload_kg = driven.payload_kg[leg_of(driven, estimate)]
     low, high = estimate.payload.interval95
+    percent = 100.0 / driven.rated_kg
+    (score_kg,) = interval_scores(np.array([payload_kg]), np.array([low]), np.array([high])).tolist()
     return Weighed(
-        100.0 * (estimate.payload.number - payload_kg) / driven.rated_kg,
-        100.0 * estimate.payload.std / driven.rated_kg,
+        percent * (estimate.payload.number - payload_kg),
+        percent * 0.5 * (high - low),
+        percent * score_kg,
         low <= payload_kg <= high,
     )
 
@@ -152,7 +158,8 @@ def _batches(weighed: Sequence[Weighed]) -> dict[str, Any]:
         "n": len(weighed),
         "mean_abs_pct": _rounded(float(np.mean(np.abs(errors)))),
         "bias_pct": _rounded(float(np.mean(errors))),
-        "mean_std_pct": _rounded(float(np.mean([one.std_pct for one in weighed]))),
+        "half_width_pct": _rounded(float(np.mean([one.half_width_pct for one in weighed]))),
+        "interval_score_pct": _rounded(float(np.mean([one.score_pct for one in weighed]))),
         "n_held": sum(one.is_held for one in weighed),
     }
 
@@ -211,6 +218,7 @@ def _errors(told: Sequence[Change]) -> dict[str, Any]:
         "bias_kg": _rounded(float(np.mean(errors))),
         "rms_kg": _rounded(float(np.sqrt(np.mean(errors**2)))),
         "mean_std_kg": _rounded(float(np.mean([one.std_kg for one in told]))),
+        "mean_z2": _rounded(float(np.mean([(one.change_kg - one.true_kg) ** 2 / one.std_kg**2 for one in told]))),
         "mean_abs_pct": _rounded(100.0 * float(np.mean([abs(one.change_kg / one.true_kg - 1.0) for one in told]))),
         "n_held": sum(one.is_held for one in told),
     }

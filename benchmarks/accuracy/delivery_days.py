@@ -15,11 +15,13 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.accuracy.coverage_drives import MAP_NAME, Scope
+from benchmarks.accuracy.loads import box
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, scattered
 from benchmarks.accuracy.vans import fresh_van
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cargo import Carries
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate_json import estimate_to_json
@@ -45,13 +47,14 @@ N_PARCELS: Final = 6
 
 
 FLOOR_PARTS: Final = (0.25, 1.0)  # of the wheelbase, where parcels lie
+PARCEL_EXTENT_M: Final = ((0.3, 1.1), (0.2, 0.9))  # lengths and heights of single ones
 
 
 class Said(StrEnum):
-    """What the campaign says of how long loads lie."""
+    """What the campaign says of the loads' shape."""
 
     NOTHING = "nothing"
-    LENGTH = "length"  # the floor's
+    CARRIES = "carries"  # parcels
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,12 +110,10 @@ def day_of(seed: int, number: int) -> Day:
 
 
 def _with(said: Said, calibrated: CalibratedVehicle) -> CalibratedVehicle:
-    """As the calibration would be, had the campaign said so: runs left out are weighed without it either way."""
-    if said is Said.NOTHING or calibrated.cross_spectrum is None:
+    """As the calibration would be, had the campaign said so: known loads are weighed by their own shape either way."""
+    if said is Said.NOTHING:
         return calibrated
-    begin, end = FLOOR_PARTS
-    length_m = (end - begin) * calibrated.vehicle.wheelbase_m
-    return replace(calibrated, cross_spectrum=replace(calibrated.cross_spectrum, payload_length_m=length_m))
+    return replace(calibrated, vehicle=replace(calibrated.vehicle, carries=Carries.PARCELS))
 
 
 def loads_of_legs(van: Vehicle, rng: np.random.Generator) -> list[tuple[Load, ...]]:
@@ -157,11 +158,11 @@ _AS_TOLD: Final[dict[str, Callable[[Any], Any]]] = {
 
 
 def _parcel(van: Vehicle, rng: np.random.Generator) -> Load:
-    return Load(
-        float(rng.uniform(*PARCEL_PARTS)) * van.rated_payload_kg,
-        float(rng.uniform(*FLOOR_PARTS)) * van.wheelbase_m,
-        left_m=float(rng.uniform(-0.2, 0.2)),
-    )
+    mass_kg = float(rng.uniform(*PARCEL_PARTS)) * van.rated_payload_kg
+    place_m = float(rng.uniform(*FLOOR_PARTS)) * van.wheelbase_m
+    left_m = float(rng.uniform(-0.2, 0.2))
+    length_m, tall_m = (float(rng.uniform(*each)) for each in PARCEL_EXTENT_M)
+    return replace(box(mass_kg, place_m, length_m, tall_m), left_m=left_m)
 
 
 def _leg(number: int, rng: np.random.Generator) -> Drive:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from benchmarks.accuracy.cells import score_cell
 from benchmarks.accuracy.delivery_days import Said
 
 ROWS: Final = (
@@ -14,12 +15,12 @@ ROWS: Final = (
     ("under_way", "between two batches of one drive"),
 )
 
-SAID: Final = ((Said.NOTHING, "nothing"), (Said.LENGTH, "how long loads lie"))
+SAID: Final = ((Said.NOTHING, "nothing"), (Said.CARRIES, "that it carries parcels"))
 
 
 def delivery_page(found: Mapping[str, Any]) -> str:
     """The page in Markdown."""
-    said = found["said"][Said.LENGTH]
+    said = found["said"][Said.CARRIES]
     kg, trips, told = said["kg"], said["trips"], said["found"]
     n_invented = told["stops_without_change"]["n_told"] + told["under_way"]["n_told"]
     plain = told["found_above_3_std"]
@@ -31,7 +32,7 @@ def delivery_page(found: Mapping[str, Any]) -> str:
             "--output DIR`; do not edit by hand.",
             "",
             f"{len(found['vans'])} simulated delivery days, each of another van that nothing was chosen on. It is "
-            "calibrated on six known loads, its campaign says that what it carries is as long as the floor, and it is "
+            "calibrated on six known loads, its campaign says that it carries parcels, and it is "
             "a little another one on its day: worn, warm, on other tyres. It leaves empty and makes 8 "
             "stops: loading, four deliveries, one pick-up, and two at which nothing happens. "
             "Legs last five to fifteen minutes, in town and in the country, on roads of changing roughness. The bus "
@@ -52,24 +53,25 @@ def delivery_page(found: Mapping[str, Any]) -> str:
             "",
             "## Kilograms",
             "",
-            "| Changes told | mean abs. error | of the change | bias | stated std (mean) | within 95 % interval |",
-            "|---|---|---|---|---|---|",
+            "| Changes told | mean abs. error | of the change | bias | stated std (mean) | mean z squared "
+            "| within 95 % interval |",
+            "|---|---|---|---|---|---|---|",
             f"| {kg['n']} | {kg['mean_abs_kg']:.1f} kg | {kg['mean_abs_pct']:.0f} % | {kg['bias_kg']:+.1f} kg | "
-            f"{kg['mean_std_kg']:.1f} kg | {_share(kg['n_held'], kg['n'])} |",
+            f"{kg['mean_std_kg']:.1f} kg | {kg['mean_z2']:.2f} | {_share(kg['n_held'], kg['n'])} |",
             "",
             "Where two stops lie between weighings, the change is that of both together.",
             "",
-            "## How long the load lies",
+            "## The shape of the load",
             "",
-            "These vans were calibrated with each load in one place; their parcels lie all along the floor. Weighed as "
-            "the known loads they are found too light. Where nobody says how long loads lie, the interval takes half "
-            "of them to lie like the known ones: on days that are all parcels it holds less often than it says. A "
-            "campaign that says it (`payload_length_m`, here the floor's length) takes the bias out "
+            "These vans were calibrated with each load in one place; their parcels lie all along the floor, and some "
+            "are high. Where nobody says what a vehicle carries, half of all loads are believed to be like the known "
+            "ones. A campaign that says it (`carries`) narrows that "
             "([method](method.md#weighing-gatewaycorecross_spectrumestimatorpy)). Batches by themselves, in percent "
-            "of the rated payload:",
+            "of the rated payload; the interval score is the width of the 95 % interval and 40 times what the truth "
+            "lies outside, in brackets what it would be for normal errors and intervals of the right width:",
             "",
-            "| campaign says | batches | mean abs. error | bias | stated std (mean) | within 95 % interval |",
-            "|---|---|---|---|---|---|",
+            "| campaign says | batches | mean abs. error | bias | +- (mean) | interval score | within 95 % interval |",
+            "|---|---|---|---|---|---|---|",
             *(_batches_line(words, found["said"][said]["batches"]) for said, words in SAID),
             "",
             "## Trips",
@@ -86,9 +88,10 @@ def delivery_page(found: Mapping[str, Any]) -> str:
 
 
 def _batches_line(words: str, batches: Mapping[str, Any]) -> str:
+    score = score_cell(batches["interval_score_pct"], batches["mean_abs_pct"])
     return (
         f"| {words} | {batches['n']} | {batches['mean_abs_pct']:.1f} % | {batches['bias_pct']:+.1f} % | "
-        f"{batches['mean_std_pct']:.1f} % | {_share(batches['n_held'], batches['n'])} |"
+        f"{batches['half_width_pct']:.1f} % | {score} | {_share(batches['n_held'], batches['n'])} |"
     )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from benchmarks.accuracy.cells import number_cell, score_cell
 from benchmarks.accuracy.coverage_table import ALL_KINDS
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
 from gateway.records import Why
@@ -10,6 +11,7 @@ from gateway.records import Why
 COLUMNS: Final = (
     "Disturbance", "Batches", "Refused, and why", "Payload, mean abs. error %", "Share, mean abs. error %",
     "Payload held or refused", "Share held or refused",
+    "Payload, +- %", "score % (ideal)", "Share, +- %", "score % (ideal)",
 )  # fmt: skip
 WELL: Final = 0.9  # of the batches: held by their 95 % intervals, or refused for a right reason
 OF_ANY_DRIVE: Final = (Why.TOO_SLOW, Why.SPEED_SPREAD, Why.SPEED_MISSING, Why.NOT_ENOUGH_EXCITATION)
@@ -31,8 +33,10 @@ def disturbances_page(found: Mapping[str, Any]) -> str:
             "motorway). The same two drives are disturbed in every way below; in the last line half as much again "
             "is aboard as the van may carry. Sensors sit up to 0.4 m beside the centre line, loads within 0.1 m of it, "
             "sideways 0.15 to 0.35 m; a line without a roll rate is calibrated without one too. Errors are percent of "
-            "the rated payload and of 20 percentage points, over the batches that were answered. The last two columns "
-            "count batches whose 95 % interval held, and those refused for a reason that is right.",
+            "the rated payload and of 20 percentage points, over the batches that were answered. The two columns "
+            "before the widths count batches whose 95 % interval held, and those refused for a reason that is right. "
+            "+- is the mean of half the 95 % intervals; the interval score is their width and 40 times what the truth "
+            "lies outside, in brackets what it would be for normal errors and intervals of the right width.",
             "",
             "| " + " | ".join(COLUMNS) + " |",
             "|" + "---|" * len(COLUMNS),
@@ -70,7 +74,13 @@ def _cells(line: Mapping[str, Any]) -> list[str]:
             for name in ("payload_mean_abs_pct", "front_share_mean_abs_pct")
         ),
         *(f"{100.0 * held_or_refused(line, quantity):.0f} %" for quantity in ("payload", "front_share")),
+        *(cell for quantity in ("payload", "front_share") for cell in _widths(line, quantity)),
     ]
+
+
+def _widths(line: Mapping[str, Any], quantity: str) -> tuple[str, str]:
+    score = score_cell(line[f"{quantity}_interval_score_pct"], line[f"{quantity}_mean_abs_pct"])
+    return number_cell(line[f"{quantity}_half_width_pct"]), score
 
 
 def _verdicts(lines: list[Mapping[str, Any]]) -> list[str]:

@@ -3,10 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from gateway.calibration.judgement.coverage import IDEAL_SCORE
+
 RUNG_COLUMNS: Final = (
     "Runs", "Estimator", "Choices", "Refused", "Judged on",
-    "Payload, mean abs. error %", "worst choice", "95 % covers",
-    "Share, mean abs. error %", "worst choice", "95 % covers", "Batches rejected",
+    "Payload, mean abs. error %", "worst choice", "95 % covers", "+- %", "score %",
+    "Share, mean abs. error %", "worst choice", "95 % covers", "+- %", "score %", "Batches rejected",
 )  # fmt: skip
 ADVICE_ROWS: Final = (
     ("before", "three runs"),
@@ -32,7 +34,9 @@ def learning_curve_page(found: Mapping[str, Any]) -> str:
             "of the runs that were left out, so loads that calibration never met; *later part*, the validation part of "
             "every run, the calibrated loads among them. Errors are (12), percent of the vehicle's ranges: mean over "
             "the choices of runs +- standard deviation between choices. Batches that were rejected (most as "
-            "`out_of_range`: loads outside those calibrated) stand in no mean; their share is told.",
+            "`out_of_range`: loads outside those calibrated) stand in no mean; the last column counts them. +- is the "
+            "mean of half the 95 % intervals; the interval score is their width and 40 times what the truth lies "
+            f"outside, {IDEAL_SCORE:g} times the mean error where they are as wide as they should be.",
             "",
             *_rung_table(found["rungs"]),
             "",
@@ -80,7 +84,7 @@ def _rung_table(rungs: Sequence[Mapping[str, Any]]) -> list[str]:
         if rung[key]["n_trials"]
     ]
     refused = [
-        [str(rung["n_runs"]), _name(rung), str(rung["n_subsets"]), str(rung["n_refused"]), "no calibration", *[""] * 7]
+        [str(rung["n_runs"]), _name(rung), str(rung["n_subsets"]), str(rung["n_refused"]), "no calibration", *[""] * 11]
         for rung in rungs
         if rung["n_refused"] == rung["n_subsets"]
     ]
@@ -94,8 +98,10 @@ def _cells(rung: Mapping[str, Any], where: str, spread: Mapping[str, Any]) -> li
         str(rung["n_runs"]), _name(rung), str(rung["n_subsets"]), str(rung["n_refused"]), where,
         _with_spread(spread["payload_mean_pct"], spread["payload_std_pct"]),
         _number(spread["payload_worst_pct"]), _share(spread["payload_coverage95"]),
+        _number(spread["payload_half_width_pct"]), _number(spread["payload_interval_score_pct"]),
         _with_spread(spread["front_share_mean_pct"], spread["front_share_std_pct"]),
         _number(spread["front_share_worst_pct"]), _share(spread["front_share_coverage95"]),
+        _number(spread["front_share_half_width_pct"]), _number(spread["front_share_interval_score_pct"]),
         _share(spread["rejected_share"]),
     ]  # fmt: skip
 

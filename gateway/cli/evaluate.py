@@ -67,7 +67,8 @@ def _text(table: ErrorTable) -> str:
     lines = [
         f"{table.estimator}: {errors.n_batches} batches, {errors.n_rejected} rejected "
         f"{errors.rejected_by_reason or ''}".rstrip(),
-        f"{'':14}{'mean |e|':>10}{'+ misses':>10}{'bias':>9}{'std':>9}{'max':>9}{'mean |e|':>12}{'covered':>9}",
+        f"{'':14}{'mean |e|':>10}{'+ misses':>10}{'bias':>9}{'std':>9}{'max':>9}{'mean |e|':>12}{'covered':>10}"
+        f"{'+- (95 %)':>11}{'score':>9}",
         _row("payload", errors.payload),
         _row("front share", errors.front_share),
         *_sideways_lines(errors),
@@ -83,7 +84,8 @@ def _row(name: str, errors: TargetErrors) -> str:
     return (
         f"{name:14}{_cell(errors.mean_abs_pct, '%', 10)}{_cell(errors.mean_abs_pct_with_misses, '%', 10)}"
         f"{_cell(errors.bias_pct, '%', 9)}{_cell(errors.std_pct, '%', 9)}{_cell(errors.max_abs_pct, '%', 9)}"
-        f"{_cell(errors.mean_abs, errors.unit, 12)}{_percent(errors.coverage95, 9)}"
+        f"{_cell(errors.mean_abs, errors.unit, 12)}{_percent(errors.coverage95, 10)}"
+        f"{_cell(errors.half_width_pct, '%', 11)}{_cell(errors.interval_score_pct, '%', 9)}"
     )
 
 
@@ -93,7 +95,8 @@ def _sideways_lines(errors: Errors) -> Iterator[str]:
     if cg_left is not None and cg_left.mean_abs_m is not None:
         lengths = ((cg_left.bias_m, 9), (cg_left.std_m, 9), (cg_left.max_abs_m, 9), (cg_left.mean_abs_m, 12))
         in_mm = "".join(_millimetres(length_m, width) for length_m, width in lengths)
-        yield f"{'c.g. left':14}{'':20}{in_mm}{_percent(cg_left.coverage95, 9)}"
+        widths = f"{_millimetres(cg_left.half_width_m, 11)}{_millimetres(cg_left.interval_score_m, 9)}"
+        yield f"{'c.g. left':14}{'':20}{in_mm}{_percent(cg_left.coverage95, 10)}{widths}"
     if wheels is not None:
         mean, most = wheels.mean_abs_pct_of_gross, wheels.max_abs_pct_of_gross
         yield f"{'each wheel':14}{_cell(mean, '%', 10)}{'':28}{_cell(most, '%', 9)}{'of gross weight':>21}"

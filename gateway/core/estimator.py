@@ -49,10 +49,10 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
         return replace(blank, rejected=(*batch.rejected, Why.NO_CALIBRATION))
     if batch.rejected:
         return blank
-    found = _as_stated(ESTIMATORS[estimator](batch, calibrated, blank), calibrated.vehicle)
+    found = ESTIMATORS[estimator](batch, calibrated, blank)
     if found.counted and calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
-        return found.refused(Why.OUT_OF_RANGE)
-    return found
+        return found.refused(Why.OUT_OF_RANGE)  # the known loads have the error of the stated share in common with it
+    return _as_stated(found, calibrated.vehicle)
 
 
 def _as_stated(found: Estimate, vehicle: Vehicle) -> Estimate:

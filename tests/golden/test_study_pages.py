@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from benchmarks.accuracy.alarms import alarms_page
+from benchmarks.accuracy.budget import budget_page
 from benchmarks.accuracy.coverage_drives import TRIPS
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.coverage_table import ALL_KINDS
@@ -32,6 +33,7 @@ PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "events": delivery_page,
     "alarm_rules": alarms_page,
     "sensitivity": sensitivity_page,
+    "budget": budget_page,
 }
 
 
@@ -64,7 +66,7 @@ def test_every_disturbance_is_held_refused_or_mended() -> None:
 def test_every_plain_change_of_load_is_told_and_none_is_invented() -> None:
     found = numbers("events")
     assert len(found["vans"]) >= 20
-    told = found["said"]["length"]["found"]
+    told = found["said"]["carries"]["found"]
     assert told["found_above_3_std"]["n"] == told["found_above_3_std"]["n_told"] >= 50
     assert told["stops_without_change"]["n_told"] == told["under_way"]["n_told"] == 0
     assert told["stops_without_change"]["n"] >= 30
@@ -83,7 +85,7 @@ def test_a_sister_is_worth_more_than_priors_and_her_intervals_hold() -> None:
     rows = {row["estimator"]: row for row in numbers("siblings")["rows"]}
     assert set(rows) == set(Way)
     for way in (Way.LIKE_ONE, Way.LIKE_ONE_TWO_DRIVES, Way.LIKE_THREE):
-        for other in (Way.AS_IS, Way.TARED, Way.ALONE):
+        for other in (Way.AS_IS, Way.WEIGHED_EMPTY, Way.ALONE):
             for quantity in ("payload", "front_share"):
                 error = f"{quantity}_mean_abs_pct_with_misses"
                 assert rows[way][error] < 0.5 * rows[other][error]

@@ -35,7 +35,7 @@ def line() -> Line:
         scatter_std=default_scatter_std(PARAMETERS + ROLL_PARAMETERS),
         n_siblings=0,
         seen=Seen((0.0, 400.0), (40.0, 55.0), (13.0, 15.0), 0.8, 0.02, (Load(0.0, 52.0), Load(400.0, 41.0))),
-        limits=Limits(1.25, 0.0, 1.25, 0.0, 1.25, 5.0, 6.0, 6.0),
+        limits=Limits((10.0, 0.2, 0.002), (3.0, 3.0), 5.0, 6.0, 6.0),
     )
 
 
@@ -58,17 +58,13 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert read.roll is None
 
 
-def test_a_file_of_version_1_is_read_on(tmp_path: Path) -> None:
-    """Its vehicles' friction goes by how much the body moves, as it did; it says which file it was."""
-    content = line_file().model_dump(mode="json") | {"version": 1}
-    del content["migrated_from"], content["line"]["usual_stroke_mps"]
+def test_a_file_of_another_version_is_refused(tmp_path: Path) -> None:
+    content = json.loads(line_file().to_json()) | {"version": 1}
     content["id"] = content_id(content)
     path = tmp_path / "line.json"
     path.write_text(json.dumps(content))
-    held = load_like(path)
-    assert isinstance(held, LineFile)
-    assert (held.version, held.migrated_from) == (2, content["id"])
-    assert line_of_files([held]).usual == Usual(-4.0, None)
+    with pytest.raises(CalibrationFileError, match="version 1"):
+        load_like(path)
 
 
 @pytest.mark.filterwarnings("ignore:overflow")  # numbers of 1e308 are finite

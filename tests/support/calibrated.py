@@ -81,31 +81,6 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
     )
 
 
-SINCE_VERSION_3 = ("sensor_offset_left_std_m", "track_width_m", "empty_cg_left_m")
-SINCE_VERSION_3 += ("front_wheel_limit_kg", "rear_wheel_limit_kg")
-
-
-def second_version() -> dict[str, Any]:
-    """Today's made-up file as version 2 would have had it."""
-    content: dict[str, Any] = json.loads(calibration_file().to_json())
-    for name in SINCE_VERSION_3:
-        del content["vehicle"][name]
-    for run in content["provenance"]["runs"]:
-        del run["payload_left_m"]
-    content["version"] = 2
-    content["id"] = content_id(content)
-    return content
-
-
-def first_version() -> dict[str, Any]:
-    """The same of version 1."""
-    content = second_version()
-    del content["migrated_from"], content["seen"]["roughness_mps2"]
-    content["version"] = 1
-    content["id"] = content_id(content)
-    return content
-
-
 def calibration_text(**vehicle: float | None) -> str:
     """The same as a file, the vehicle's figures changed so."""
     told: dict[str, Any] = json.loads(calibration_file().to_json())

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
-from support.calibrated import calibration_file, first_version
+from support.calibrated import calibration_file
 
 from gateway.calibration.campaign import file_sha256, load_campaign
 from gateway.calibration.file import (
@@ -74,12 +74,6 @@ def test_half_car_parameters_are_shown_in_their_units() -> None:
     shown = re.search(r"spring_front_npm +(\S+) ± (\S+)", run("show", SHIPPED).output)
     assert shown is not None
     assert [float(number) for number in shown.groups()] == pytest.approx([spring_npm, std_npm], rel=0.05)
-
-
-def test_a_file_of_an_older_version_says_so(tmp_path: Path) -> None:
-    path = tmp_path / "old.json"
-    path.write_text(json.dumps(first_version()))
-    assert "migrated from an older one" in run("show", path).output
 
 
 def test_a_parameter_held_as_a_logarithm_has_a_spread_of_first_order() -> None:

@@ -75,7 +75,10 @@ def test_what_is_stated_is_known_better_than_what_is_not() -> None:
     unsaid, said = believed(), believed(payload_length_m=0.8, payload_height_m=0.5)
     assert said.variance < 0.5 * unsaid.variance
     assert (is_said(VAN), is_said(replace(VAN, payload_length_m=0.8))) == (False, True)
-    assert (is_said(replace(VAN, carries=Carries.MIXED)), is_said(replace(VAN, carries=Carries.PARCELS))) == (False, True)
+    assert (is_said(replace(VAN, carries=Carries.MIXED)), is_said(replace(VAN, carries=Carries.PARCELS))) == (
+        False,
+        True,
+    )
 
 
 def test_what_nobody_said_is_half_like_the_known_loads_and_half_longer() -> None:

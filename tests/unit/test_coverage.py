@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_table
-from gateway.calibration.judgement import coverage_of
+from gateway.calibration.judgement.coverage import IDEAL_SCORE, coverage_of, interval_scores
 
 
 def test_batches_of_different_runs_give_the_exact_binomial_limits() -> None:
@@ -93,3 +93,17 @@ def test_a_line_for_every_kind_and_one_for_all() -> None:
     assert everything.payload_coverage_by_van is not None
     assert everything.payload_coverage_by_van.n_clusters == 2
     assert table.to_json()["refused"] == ("b: ratio_index: too few",)
+
+
+def test_an_interval_score_by_hand() -> None:
+    true = np.array([0.0, 1.0, -3.0, 2.5])
+    found = interval_scores(true, np.full(4, -1.0), np.full(4, 2.0))
+    assert found.tolist() == [3.0, 3.0, 3.0 + 40.0 * 2.0, 3.0 + 40.0 * 0.5]
+
+
+def test_the_score_is_least_for_intervals_of_the_right_width() -> None:
+    """Of normal errors: it is then IDEAL_SCORE times their mean absolute value, and more on either side."""
+    error = np.random.default_rng(1).standard_normal(1_000_000)
+    scores = [float(interval_scores(error, np.full(1, -half), np.full(1, half)).mean()) for half in (1.3, 1.96, 3.0)]
+    assert scores[1] == min(scores)
+    assert scores[1] / np.abs(error).mean() == pytest.approx(IDEAL_SCORE, rel=0.01)

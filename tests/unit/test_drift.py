@@ -11,7 +11,8 @@ from gateway.core.cross_spectrum.drift import (
     NATURE_STD,
     NATURE_TOGETHER_STD,
     STEADY,
-    drift_covariance,
+    day_columns,
+    packing_columns,
 )
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.records import F64
@@ -29,6 +30,12 @@ def natural_covariance(entries: list[int], otherwise: F64) -> F64:
             if {one, other} <= {*NATURE_STD} and kind == other.split("_")[0]:
                 covariance[i, j] += NATURE_TOGETHER_STD.get(kind, 0.0) ** 2
     return covariance
+
+
+def drift_covariance(found: F64, moves: F64) -> F64:
+    """Of the fitted numbers: what the day's causes and the load's packing add to what the search states."""
+    columns = np.vstack([day_columns(found, moves), packing_columns(found)])
+    return np.asarray(columns.T @ columns)
 
 
 @pytest.mark.parametrize("evidence", [1e-2, 1.0, 1e4])

@@ -20,6 +20,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.core.weights import Unsprung, weighed
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
+from gateway.posterior import exactly
 from gateway.records import Batch, Why
 
 VAN = Vehicle("van", 1240.0, 2.8, payload_range_kg=(0.0, 400.0), unsprung_front_kg=60.0, unsprung_rear_kg=100.0)
@@ -61,6 +62,8 @@ def test_error_table_by_hand() -> None:
     assert payload.coverage95 == pytest.approx(0.5)
     assert payload.mean_abs_pct_with_misses == pytest.approx((2.0 + 5.0 + 50.0) / 3.0)  # the miss says 200 kg
     assert payload.mean_abs_pct_of_gross == pytest.approx(50.0 * (8.0 / 1500.0 + 20.0 / 1700.0))
+    assert payload.half_width_pct == pytest.approx(2.5)
+    assert payload.interval_score_pct == pytest.approx(5.0 + 40.0 * 2.5 / 2.0)  # 300 kg lie 10 kg above 290
     # errors +0.5 and -2 points of a range of 20; the miss says 50 where 50 is true
     assert share.mean_abs_pct == pytest.approx(6.25)
     assert share.mean_abs == pytest.approx(1.25)
@@ -111,7 +114,8 @@ def placed(true_m: float, found_m: float, half_m: float = 0.01, payload_kg: floa
     """A load told right but for its place beside the centre line."""
     told = judged(payload_kg, payload_kg)
     cg_left = Quantity(found_m, half_m / 2.0, (found_m - half_m, found_m + half_m))
-    estimate = weighed(replace(told.estimate, cg_left=cg_left, roll_share_front=0.6), ROLLING)
+    posterior = exactly(payload_kg, 50.0, found_m)
+    estimate = weighed(replace(told.estimate, cg_left=cg_left, roll_share_front=0.6, posterior=posterior), ROLLING)
     return replace(told, estimate=estimate, cg_left_m=true_m)
 
 
@@ -120,6 +124,7 @@ def test_sideways_errors_by_hand() -> None:
     assert errors.cg_left is not None
     told = errors.cg_left.to_json()
     expected = {"mean_abs_m": 0.013, "bias_m": -0.007, "std_m": 0.013, "max_abs_m": 0.02, "coverage95": 0.5}
+    expected |= {"half_width_m": 0.01, "interval_score_m": 0.02 + 40.0 * 0.01 / 2.0}  # the second lies 10 mm outside
     assert told == pytest.approx(expected)
     assert errors.wheels is not None
     # 1440 kg of sprung mass 6 and 20 mm beside: moments of 8.64 and 28.8 kgm over 1.5 m, of which the front takes 0.6
@@ -172,8 +177,9 @@ def answer(payload_kg: float = 200.0, front_share_pct: float = 48.0, batch: Batc
 def test_a_sound_batch_is_answered_with_spread_and_origin() -> None:
     found = answer()
     assert found.rejected == ()
-    assert (found.payload.number, found.payload.std) == pytest.approx((200.0, 10.0))
+    assert found.payload.number == pytest.approx(200.0)
     assert found.payload.interval95 == pytest.approx((200.0 - 22.6216, 200.0 + 22.6216), abs=1e-3)  # t(9) = 2.26216
+    assert found.payload.std == pytest.approx(22.6216 / 1.959964, rel=1e-4)  # the normal error as wide as Student's
     assert found.front_share.number == pytest.approx(48.0)
     assert found.ratio_index_acceleration > 0.0
     assert found.calibration_id == calibration_file().id

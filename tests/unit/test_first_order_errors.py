@@ -13,8 +13,9 @@ import pytest
 from numpy.typing import NDArray
 
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct
-from gateway.core.weights import Place, Sideways, place_of, weights_of
+from gateway.core.weights import Place, place_of, weights_of
 from gateway.estimate import PLACES, Quantity, Weights
+from gateway.posterior import Posterior, Source
 
 VAN = Vehicle(
     "van",
@@ -41,21 +42,25 @@ class State:
     roll_share: float = 0.62
 
 
+def posterior(state: State) -> Posterior:
+    """Half of the covariance own, half from sources; with an error of the empty share, in which place has no part."""
+    correlations = np.eye(3)
+    for (one, other), shared in CORRELATIONS.items():
+        correlations[one, other] = correlations[other, one] = shared
+    covariance = correlations * np.outer(STDS[:3], STDS[:3])
+    columns = np.sqrt(0.5) * np.linalg.cholesky(covariance).T
+    sources = {Source.CALIBRATION: columns[:2], Source.LOAD_LENGTH: columns[2:]}
+    return Posterior(np.array([state.payload_kg, state.share_pct, state.cg_left_m]), 0.5 * covariance, sources)
+
+
 def weights(state: State) -> Weights:
-    payload, share = Quantity(state.payload_kg, STDS[0]), Quantity(state.share_pct, STDS[1])
-    return weights_of(VAN, payload, share, CORRELATIONS[0, 1], sideways(state))
+    return weights_of(VAN, posterior(state), Quantity(state.roll_share, STDS[3]))
 
 
 def place(state: State) -> Place:
-    payload, share = Quantity(state.payload_kg, STDS[0]), Quantity(state.share_pct, STDS[1])
-    found = place_of(VAN, payload, share, CORRELATIONS[0, 1], sideways(state))
+    found = place_of(VAN, posterior(state).with_source(Source.EMPTY_SHARE, np.array([[0.0, 0.8, 0.0]])))
     assert found is not None
     return found
-
-
-def sideways(state: State) -> Sideways:
-    across = Quantity(state.cg_left_m, STDS[2])
-    return Sideways(across, state.roll_share, STDS[3], CORRELATIONS[0, 2], CORRELATIONS[1, 2])
 
 
 def errors(of: Callable[[State], tuple[float, ...]]) -> NDArray[np.float64]:

@@ -19,7 +19,9 @@ def weighed(payload_kg: float, own_kg: float = 5.0, **columns_kg: float) -> Post
     return Posterior(np.array([payload_kg, 50.0]), np.diag([own_kg**2, 0.04]), by_source)
 
 
-def observed(posterior: Posterior, truth_kg: float, std_kg: float = 3.0, t_ns: int = T_NS, name: str = "a") -> Observation:
+def observed(
+    posterior: Posterior, truth_kg: float, std_kg: float = 3.0, t_ns: int = T_NS, name: str = "a"
+) -> Observation:
     return Observation(name, t_ns, ID, BY, posterior, np.array([truth_kg]), np.array([[std_kg**2]]))
 
 
@@ -47,7 +49,9 @@ def test_it_solves_the_regression_of_what_was_seen() -> None:
     truth, noise = np.array([300.0, 48.0]), np.diag([9.0, 0.01])
     seen = []
     for i, each in enumerate(columns):
-        posterior = Posterior(truth + [12.0, -0.3], np.diag([25.0, 0.04]), {Source.CALIBRATION: each[:3], Source.SENSOR: each[3:]})
+        posterior = Posterior(
+            truth + [12.0, -0.3], np.diag([25.0, 0.04]), {Source.CALIBRATION: each[:3], Source.SENSOR: each[3:]}
+        )
         seen.append(Observation(str(i), T_NS + i, ID, BY, posterior, truth, noise))
     known = knowing(*seen)
     weight = np.linalg.inv(np.diag([25.0, 0.04]) + noise)
@@ -116,7 +120,9 @@ def test_what_is_known_of_the_day_is_forgotten() -> None:
 
 def test_what_lasts_is_not_forgotten() -> None:
     known = knowing(observed(weighed(330.0, CALIBRATION=40.0), 300.0))
-    stds = {known.applied(weighed(150.0, CALIBRATION=20.0), T_NS + days * 86_400 * NS_PER_S).std(0) for days in (0, 900)}
+    stds = {
+        known.applied(weighed(150.0, CALIBRATION=20.0), T_NS + days * 86_400 * NS_PER_S).std(0) for days in (0, 900)
+    }
     assert len(stds) == 1
 
 
@@ -167,7 +173,9 @@ def test_the_lateral_place_learns_with_the_payload() -> None:
 def test_causes_that_no_known_weight_had_stay_as_they_are() -> None:
     known = knowing(observed(weighed(330.0, CALIBRATION=40.0), 300.0))
     columns = np.array([[20.0, 0.0], [7.0, 0.1]])
-    more = Posterior(np.array([150.0, 50.0]), np.diag([25.0, 0.04]), {Source.CALIBRATION: columns, Source.GOODS: columns})
+    more = Posterior(
+        np.array([150.0, 50.0]), np.diag([25.0, 0.04]), {Source.CALIBRATION: columns, Source.GOODS: columns}
+    )
     later = known.applied(more, T_NS)
     assert later.sources[Source.CALIBRATION][1].tolist() == [7.0, 0.1]
     assert later.sources[Source.GOODS].tolist() == columns.tolist()
@@ -208,7 +216,9 @@ def test_known_weights_make_later_estimates_as_sure_as_they_say() -> None:
     for _ in range(3000):
         z = rng.standard_normal(2)
         ticket, later = (
-            weighed(kg + kg / 10.0 * z[0] + 15.0 * z[1] + 5.0 * rng.standard_normal(), CALIBRATION=kg / 10.0, SENSOR=15.0)
+            weighed(
+                kg + kg / 10.0 * z[0] + 15.0 * z[1] + 5.0 * rng.standard_normal(), CALIBRATION=kg / 10.0, SENSOR=15.0
+            )
             for kg in (300.0, 150.0)
         )
         known = knowing(observed(ticket, 300.0 + 3.0 * rng.standard_normal()))

@@ -5,13 +5,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.days import OWN_KG, RULES, SHARED_KG, T0_NS, assert_a_restart_changes_nothing, at, batch, day, events, told
+from support.days import (
+    OWN_KG,
+    OWN_PCT,
+    RULES,
+    T0_NS,
+    assert_a_restart_changes_nothing,
+    at,
+    batch,
+    day,
+    events,
+    posterior,
+    told,
+)
 
+from gateway.core.change import change_of, probability
 from gateway.core.events import Ledger
-from gateway.core.events.change import change_of, probability
 from gateway.core.events.ledger import SETTLED
 from gateway.core.events.load import load_of, weighings_of
-from gateway.estimate import Correction, Place, Quantity, Stop, Watched
+from gateway.estimate import Estimate, Place, Stop, Watched
+from gateway.posterior import Posterior, Source
 
 
 def test_a_delivery_is_told_with_its_weight_time_and_both_loads():
@@ -28,12 +41,17 @@ def test_a_delivery_is_told_with_its_weight_time_and_both_loads():
     assert found["revision"] == 1
 
 
-@pytest.mark.parametrize(("after_kg", "of_shared"), [(320.0, 0.16), (900.0, 1.0), (1000.0, 1.0)])
-def test_a_change_is_the_less_sure_the_less_alike_the_loads_are(after_kg, of_shared):
-    """Of the shared variance (2 d / range)^2, twice, for d up to half the range of 1000 kg: 1 beyond."""
-    before, after = (load_of(weighings_of(day(kg)), 0, 0) for kg in (120.0 if of_shared < 1.0 else 0.0, after_kg))
-    std_kg = math.sqrt(2.0 * OWN_KG**2 + 2.0 * SHARED_KG**2 * of_shared)
-    assert change_of(before, after, RULES).std == pytest.approx(std_kg)
+def test_a_change_is_the_less_sure_the_less_alike_the_loads_are():
+    """What grows with the load by a tenth errs by a tenth of the change."""
+    for after_kg in (320.0, 900.0):
+        loads = [
+            Posterior(
+                np.array([kg, 50.0]), np.diag([OWN_KG**2, 0.01]), {Source.CALIBRATION: np.array([[0.1 * kg, 0.0]])}
+            )
+            for kg in (120.0, after_kg)
+        ]
+        std_kg = math.sqrt(2.0 * OWN_KG**2 + (0.1 * (after_kg - 120.0)) ** 2)
+        assert change_of(*loads).std == pytest.approx(std_kg)
 
 
 def test_nothing_loaded_is_nothing_told():
@@ -41,7 +59,7 @@ def test_nothing_loaded_is_nothing_told():
 
 
 def test_the_shared_error_hides_no_change_and_makes_none():
-    loads = [load_of(weighings_of(day(100.0, kg)), i, i) for kg in (100.0, 160.0) for i in (0, 1)]
+    loads = [load_of(weighings_of(day(100.0, kg)), i, i).measured for kg in (100.0, 160.0) for i in (0, 1)]
     same, other = probability(loads[0], loads[1], 0.5, RULES), probability(loads[2], loads[3], 0.5, RULES)
     assert same < 0.1
     assert other > 0.99
@@ -50,10 +68,10 @@ def test_the_shared_error_hides_no_change_and_makes_none():
 def test_the_probability_is_bayes_own():
     """By brute force: the same prior drawn, the same densities averaged."""
     weighings = weighings_of(day(100.0, 128.0))
-    before, after = load_of(weighings, 0, 0), load_of(weighings, 1, 1)
+    before, after = (load_of(weighings, i, i).measured for i in (0, 1))
     rng = np.random.default_rng(1)
     d = RULES.spread_kg * rng.standard_normal(2_000_000)
-    x_var, f_var = 2 * OWN_KG**2, 2 * 0.25**2
+    x_var, f_var = 2 * OWN_KG**2, 2 * OWN_PCT**2
     share_var = f_var + (100.0 * 0.3 / RULES.mass_kg * d) ** 2
     with_change = np.mean(np.exp(-0.5 * (28.0 - d) ** 2 / x_var) / np.sqrt(x_var) / np.sqrt(share_var))
     without = np.exp(-0.5 * 28.0**2 / x_var) / np.sqrt(x_var) / np.sqrt(f_var)
@@ -83,7 +101,7 @@ def test_later_batches_sharpen_the_same_event():
 
 def test_an_event_that_later_batches_contradict_is_withdrawn():
     one = day(300.0, 300.0, batches=4)
-    high = replace(one[4], payload=Quantity.normal(334.0, 17.0), front_share=Quantity.normal(50.6, 0.5))
+    high = one[4].answered(posterior(334.0, 50.6))
     whole = [*one[:4], high, *one[5:]]
     ledger = Ledger(RULES)
     revisions = [entry.record for each in whole for entry in ledger.add(each) if entry.kind == "event"]
@@ -143,28 +161,25 @@ def test_a_jump_without_a_stop_must_be_plain():
     assert found["stops"] == []
 
 
-def test_a_tare_is_no_change_of_load():
-    first, second = day(300.0, 300.0)
-    zero = Quantity(60.0, 3.0), Quantity(0.5, 0.05)
-    tare = Correction("t", *zero, raw_payload=second.payload, raw_front_share=second.front_share)
-    tared = replace(second, payload=Quantity.normal(240.0, 17.3), tare=tare)
-    assert not events([first, tared])
-    third = replace(day(300.0, 300.0, 500.0)[2], tare=None)
-    tare = Correction("t", *zero, raw_payload=third.payload, raw_front_share=third.front_share)
-    third = replace(third, payload=Quantity.normal(440.0, 17.3), tare=tare)
-    (found,) = events([first, tared, third])
-    assert found["before"]["payload_kg"] == pytest.approx(240.0)
+def learned(one: Estimate, off_kg: float) -> Estimate:
+    """As it is shown once a known weight has said that the vehicle weighs so much too heavy."""
+    assert one.posterior is not None
+    shown = posterior(float(one.posterior.mean[0]) - off_kg)
+    return replace(one.answered(shown), measured=one.posterior, known_weights_id="cd")
+
+
+def test_a_known_weight_is_no_change_of_load():
+    first, second, third = day(300.0, 300.0, 500.0)
+    assert not events([first, learned(second, 60.0)])
+    (found,) = events([first, learned(second, 60.0), learned(third, 60.0)])
+    assert found["after"]["payload_kg"] == pytest.approx(440.0)
     assert found["change_kg"] == pytest.approx(200.0)
 
 
-def test_a_refused_batch_takes_no_tare_back():
+def test_a_refused_batch_takes_no_known_weight_back():
     first, second, refused = day(300.0, 500.0, None)
-    zero = Quantity(60.0, 3.0), Quantity(0.5, 0.05)
-    tared = [
-        replace(one, tare=Correction("t", *zero, raw_payload=one.payload, raw_front_share=one.front_share))
-        for one in (first, second)
-    ]
-    (before,), (after,) = events(tared), events([*tared, refused])
+    shown = [learned(one, 60.0) for one in (first, second)]
+    (before,), (after,) = events(shown), events([*shown, refused])
     assert before["after"]["payload_kg"] == 440.0
     assert after == before
 

@@ -68,9 +68,7 @@ def test_a_place_that_nobody_noted_teaches_nothing_of_places() -> None:
 
 def test_runs_beyond_the_others_show_growth_and_nothing_else() -> None:
     within = runs(200, 1.0)
-    found, calm = (
-        model_error([*within, *runs(200, std, reach=0.2, seed=2)], EMPTY_KG) for std in (6.0, 1.0)
-    )
+    found, calm = (model_error([*within, *runs(200, std, reach=0.2, seed=2)], EMPTY_KG) for std in (6.0, 1.0))
     assert found.std == calm.std
     assert found.per_reach[0] > calm.per_reach[0]
 

@@ -118,7 +118,9 @@ def test_skewed_intervals_hold_what_is_skewed() -> None:
     error = shape + 0.5 * rng.standard_normal(400_000)
     begin, end = one.quantity(PAYLOAD).interval95
     assert np.mean((begin <= error) & (error <= end)) == pytest.approx(0.95, abs=0.01)
-    assert (np.mean(error < begin), np.mean(error > end)) == pytest.approx((0.025, 0.025), abs=0.012)  # tails add in quadrature only nearly
+    assert (np.mean(error < begin), np.mean(error > end)) == pytest.approx(
+        (0.025, 0.025), abs=0.012
+    )  # tails add in quadrature only nearly
 
 
 def test_exactly_known_has_no_error() -> None:

@@ -12,7 +12,7 @@ from gateway.calibration.half_car.prior import can_roll
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.lateral.unseen import sideways_covariance
+from gateway.core.cross_spectrum.lateral.unseen import sideways_columns
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
@@ -45,8 +45,8 @@ def assert_same(one: CrossSpectrumCalibration, other: CrossSpectrumCalibration) 
     assert one.names == other.names == PARAMETERS
     np.testing.assert_array_equal(one.parameters, other.parameters)
     np.testing.assert_array_equal(one.covariance, other.covariance)
-    nothing = np.empty(0)
-    blank = {"parameters": nothing, "covariance": nothing}
+    np.testing.assert_array_equal(one.directions, other.directions)
+    blank = dict.fromkeys(("parameters", "covariance", "directions"), np.empty(0))
     assert repr(replace(one, **blank)) == repr(replace(other, **blank))
 
 
@@ -109,9 +109,7 @@ def test_a_lost_roll_rate_leaves_what_a_load_to_either_side_does_alike(
     point = Point(rolled.parameters, 200.0, 0.5)
     spectra = cross_spectra_of([silent(batch_over_two_tracks(200.0, 50.0, 0.03, seed=7))], rolled.reading)
     assert spectra is not None
-    alike = sideways_covariance(spectra, point, rolled, lambda _: np.array([200.0, 0.52]))
-    np.testing.assert_allclose(alike, [[0.0, 0.0], [0.0, 0.02**2]], atol=1e-12)
+    alike = sideways_columns(spectra, point, rolled, lambda _: np.array([200.0, 0.52]))
+    np.testing.assert_allclose(alike.T @ alike, [[0.0, 0.0], [0.0, 0.02**2]], atol=1e-12)
     flat = replace(point, theta=unrolled.parameters)
-    np.testing.assert_array_equal(
-        sideways_covariance(spectra, flat, unrolled, lambda _: np.array([200.0, 0.52])), np.zeros((2, 2))
-    )
+    assert not sideways_columns(spectra, flat, unrolled, lambda _: np.array([200.0, 0.52])).any()

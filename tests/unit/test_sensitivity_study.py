@@ -20,8 +20,10 @@ from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.judgement import Judged
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.change import Rules
 from gateway.core.vehicle import Vehicle
-from gateway.estimate import Estimate, Quantity
+from gateway.estimate import Estimate
+from gateway.posterior import Posterior, Source
 from gateway.records import Why
 from gateway.sim.sensors import REFERENCE
 
@@ -48,28 +50,39 @@ def test_a_constant_is_put_back_after_a_fault() -> None:
     assert CONSTANTS[0].current == 0.2
 
 
+RULES = Rules(range_kg=1000.0, mass_kg=1500.0)
+
+
 def judged(payload_kg: float, found_kg: float, own_kg: float, t: int = 0) -> Judged:
-    told = {"payload_own_std_kg": own_kg, "front_share_own_std_pct": 0.5}
-    estimate = Estimate(
-        t, t + 1, "cross_spectrum", payload=Quantity.normal(found_kg, 20.0), front_share=Quantity(50.0, 1.0),
-        diagnostics=told,
-    )  # fmt: skip
-    return Judged(1, "run", payload_kg, 50.0, estimate)
+    posterior = Posterior(
+        np.array([found_kg, 50.0]), np.diag([own_kg**2, 0.25]), {Source.CALIBRATION: np.array([[16.0, 0.3]])}
+    )
+    return Judged(1, "run", payload_kg, 50.0, Estimate(t, t + 1, "cross_spectrum").answered(posterior))
 
 
-def test_the_smallest_change_is_that_at_which_fusion_changes_its_mind() -> None:
-    smallest_kg = (13.8 * 2.0) ** 0.5 * 12.0
-    for change_kg, is_noticed in ((0.99 * smallest_kg, False), (1.01 * smallest_kg, True)):
-        (pair,) = pairs_of([[judged(0.0, 0.0, 12.0), judged(change_kg, change_kg, 12.0, t=5)]])
-        assert (pair.smallest_kg, pair.is_noticed) == (pytest.approx(smallest_kg), is_noticed)
+def test_the_smallest_change_is_that_at_which_the_detector_changes_its_mind() -> None:
+    (first,) = pairs_of([[judged(0.0, 0.0, 12.0), judged(0.0, 0.0, 12.0, t=5)]], RULES)
+    assert 3.0 < first.smallest_kg / np.hypot(12.0, 12.0) < 6.0
+    for change_kg, is_noticed in ((0.99 * first.smallest_kg, False), (1.01 * first.smallest_kg, True)):
+        (pair,) = pairs_of([[judged(0.0, 0.0, 12.0), judged(change_kg, change_kg, 12.0, t=5)]], RULES)
+        assert pair.smallest_kg == pytest.approx(first.smallest_kg, rel=1e-3)
+        assert pair.is_noticed is is_noticed
+
+
+def test_what_batches_share_hides_no_smaller_change() -> None:
+    noisy, sure = (
+        pairs_of([[judged(0.0, 0.0, own_kg), judged(0.0, 0.0, own_kg, t=5)]], RULES)[0] for own_kg in (12.0, 3.0)
+    )
+    assert sure.smallest_kg < 0.35 * noisy.smallest_kg
 
 
 def test_pairs_are_within_drives_and_from_one_drive_to_the_next() -> None:
     refused = replace(judged(9.0, 9.0, 9.0), estimate=judged(9.0, 9.0, 9.0).estimate.refused(Why.MODEL_MISFIT))
     drives = [[judged(0.0, 1.0, 12.0), refused, judged(0.0, 2.0, 12.0)], [refused], [judged(300.0, 290.0, 12.0)]]
-    assert [(pair.change_kg, pair.is_noticed) for pair in pairs_of(drives)] == [(0.0, False), (300.0, True)]
-    (moved,) = pairs_of([[judged(200.0, 200.0, 12.0), replace(judged(200.0, 200.0, 12.0, t=5), front_share_pct=47.0)]])
-    assert (moved.change_kg, moved.change_pct, moved.is_one_load) == (0.0, -3.0, False)
+    assert [(pair.change_kg, pair.is_noticed) for pair in pairs_of(drives, RULES)] == [(0.0, False), (300.0, True)]
+    moved = replace(judged(200.0, 200.0, 12.0, t=5), front_share_pct=47.0)
+    (pair,) = pairs_of([[judged(200.0, 200.0, 12.0), moved]], RULES)
+    assert (pair.change_kg, pair.change_pct, pair.is_one_load) == (0.0, -3.0, False)
 
 
 def test_every_setting_is_weighed_or_inspected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

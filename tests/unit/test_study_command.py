@@ -16,7 +16,7 @@ from benchmarks.accuracy.siblings.study import Way
 from gateway.calibration.judgement import LearningCurve
 from gateway.calibration.judgement.learning_curve import Score, Trial
 
-SCORE = Score(3, 1, 2.5, 1.0, 1.25, 0.5)
+SCORE = Score(3, 1, 2.5, 1.0, 1.25, 0.5, 6.0, 14.5, 3.0, None)
 CURVE = LearningCurve(
     "van",
     1,
@@ -65,7 +65,8 @@ def test_a_learning_curve_is_told_and_written(campaign: str, tmp_path: Path, mon
     page = (tmp_path / "out/learning_curve.md").read_text(encoding="utf-8")
     assert "| 2 | ratio index | 1 | 1 | no calibration |" in page
     assert (
-        "| 2 | cross spectrum | 1 | 0 | left out | 2.5 +- 0.0 | 2.5 | 100 % | 1.2 +- 0.0 | 1.2 | 50 % | 33 % |" in page
+        "| 2 | cross spectrum | 1 | 0 | left out | 2.5 +- 0.0 | 2.5 | 100 % | 6.0 | 14.5 | 1.2 +- 0.0 | 1.2 | 50 % | 3.0 "
+        "| none | 33 % |" in page
     )
 
 
@@ -84,7 +85,19 @@ def test_coverage_says_whether_it_falls_short(
     n_missed: int, verdict: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     batches = [
-        JudgedBatch("a", f"a {i}", "mixed", "cross_spectrum", (), 1.0, 1.0, i >= n_missed, i % 20 > 0)
+        JudgedBatch(
+            "a",
+            f"a {i}",
+            "mixed",
+            "cross_spectrum",
+            (),
+            1.0,
+            1.0,
+            i >= n_missed,
+            i % 20 > 0,
+            payload_half_width_pct=3.0,
+            payload_score_pct=6.5,
+        )
         for i in range(200)
     ]
     refused = JudgedBatch("b", "b 1", "mixed", "cross_spectrum", ("gap",), 9.0, 9.0, False, False)
@@ -94,6 +107,8 @@ def test_coverage_says_whether_it_falls_short(
     assert f"cross spectrum, with roll rate, all drives, payload: {100 - n_missed // 2} %" in page
     assert verdict in page
     assert "| 201 | 201 | 1: 1 gap |" in page
+    assert "| 3.00 | 6.5 (5.9) |" in page
+    assert "| none | none |" in page
     assert "- b: ratio_index: too few" in page
     assert (tmp_path / "out/coverage.md").read_text(encoding="utf-8") == page
 

@@ -2,7 +2,6 @@
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.archive import write_manifest
 from support.calibrated import calibration_text
-from support.estimates import make_estimate
+from support.estimates import make_estimate, posterior_of
 from support.web import Client, Gateway
 
 from gateway.archive.manifest import load_manifest
@@ -20,7 +19,7 @@ from gateway.config import load_settings
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import Limits, over_limit_probability, weighed
 from gateway.errors import ConfigurationError
-from gateway.estimate import Estimate, Quantity
+from gateway.estimate import Estimate
 from gateway.estimate_json import table_row
 from gateway.setup import Setup, load_setup, setup_of
 from gateway.uplink import Outbox
@@ -91,8 +90,7 @@ def loaded(folder: Path, vehicle: str = "") -> Setup:
 def batch(setup: Setup) -> Estimate:
     """500 kg aboard, a little more of all on the rear axle: 1900 kg gross, 940 kg on the rear axle."""
     assert setup.calibrated is not None
-    found = replace(make_estimate(1), payload=Quantity.normal(500.0, 6.0), front_share=Quantity.normal(50.575, 0.1))
-    return weighed(found, setup.calibrated.vehicle)
+    return weighed(make_estimate(1).answered(posterior_of(500.0, 50.575, 6.0, 0.1)), setup.calibrated.vehicle)
 
 
 def test_settings_stand_before_the_calibration_which_stands_where_they_say_nothing(tmp_path: Path) -> None:

@@ -1,20 +1,23 @@
 """Which change of load two batches that follow each other would show, and how often they show one that was none.
 
-Fusion (core.fusion) takes a batch for another load where payload and share lie too far from the epoch's, by the
-errors that batches do not share. Between two batches it notices, were the share to stay, a change of
-
-    sqrt(threshold (own_1 + own_2)),    own: the variance of a batch's payload that is its own,
-
-every other time. Drives of one van with different loads show what is noticed in fact.
+The detector (core.change) compares the whole posterior, with what is common to both batches cancelled. Here it is asked
+of every pair of neighbours; the smallest change is the one of the payload alone that it would take for a change without
+a stop. Drives of one van with different loads show what is noticed in fact.
 """
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Final
+
+import numpy as np
 
 from gateway.calibration.judgement import Judged
-from gateway.core.fusion import CHANGE_THRESHOLD, CHANGE_THRESHOLD_SIDEWAYS, fused
+from gateway.core import change
+from gateway.core.change import EVEN, Rules, probability
+from gateway.posterior import PAYLOAD, Posterior
+
+STEPS: Final = 20  # halvings of the payload range: to a millionth of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,22 +35,33 @@ class Pair:
         return self.change_kg == self.change_pct == 0.0
 
 
-def pairs_of(drives: Sequence[Sequence[Judged]]) -> list[Pair]:
+def pairs_of(drives: Sequence[Sequence[Judged]], rules: Rules) -> list[Pair]:
     """Batches that follow each other within a drive, then the last and the first of drives that do."""
     answered = [[one for one in drive if one.estimate.counted] for drive in drives]
     within = [pair for drive in answered for pair in pairwise(drive)]
     with_answers = [drive for drive in answered if drive]
     across = [(one[-1], other[0]) for one, other in pairwise(with_answers)]
-    return [_pair(*pair) for pair in (*within, *across)]
+    return [_pair(*pair, rules) for pair in (*within, *across)]
 
 
-def _pair(before: Judged, after: Judged) -> Pair:
-    one, other = fused(None, before.estimate), fused(None, after.estimate)
-    both = fused(one, after.estimate)
-    if one is None or other is None or both is None:
-        raise ValueError("an answered batch opens an epoch")
-    own_var = 1.0 / one.payload_kg.precision + 1.0 / other.payload_kg.precision
+def _pair(before: Judged, after: Judged, rules: Rules) -> Pair:
+    one, other = before.estimate.posterior, after.estimate.posterior
+    if one is None or other is None:
+        raise ValueError("an answered batch has a posterior")
     changes = after.payload_kg - before.payload_kg, after.front_share_pct - before.front_share_pct
-    is_sideways_told = one.cg_left_m is not None and other.cg_left_m is not None
-    threshold = CHANGE_THRESHOLD_SIDEWAYS if is_sideways_told else CHANGE_THRESHOLD
-    return Pair(*changes, math.sqrt(threshold * own_var), both.is_change)
+    return Pair(*changes, _smallest_kg(one, other, rules), _is_noticed(one, other, rules))
+
+
+def _is_noticed(before: Posterior, after: Posterior, rules: Rules) -> bool:
+    return probability(before, after, change.ROLLING, rules) > EVEN  # asked of its module: a study changes it
+
+
+def _smallest_kg(before: Posterior, after: Posterior, rules: Rules) -> float:
+    """By bisection, of a load that is ``before`` but for its payload, with the errors of both."""
+    low, high = 0.0, rules.range_kg
+    for _ in range(STEPS):
+        middle = 0.5 * (low + high)
+        mean = before.first(after.size).mean + middle * (np.arange(min(before.size, after.size)) == PAYLOAD)
+        moved = replace(after.first(before.size), mean=mean)
+        low, high = (low, middle) if _is_noticed(before, moved, rules) else (middle, high)
+    return high

@@ -12,6 +12,8 @@ FACTORS: Final = (0.5, 2.0)
 USED_IN: Final = (
     "gateway.core.cross_spectrum",
     "gateway.core.fusion",
+    "gateway.core.change",
+    "gateway.core.cargo",
     "gateway.calibration.half_car",
     "gateway.calibration.plan",
     "gateway.calibration.inspection",
@@ -77,8 +79,24 @@ CONSTANTS: Final = (
         "how fast they widen on smoother and rougher roads",
     ),
     Constant(
-        "LEAST_OWN_VARIANCE", "gateway.core.fusion", Acts.IN_WEIGHING,
-        "how much of a batch's variance is its own at least",
+        "EVIDENCE", "gateway.core.cross_spectrum.shape", Acts.IN_WEIGHING,
+        "how much a batch's evidence of its load's shape counts",
+    ),
+    Constant(
+        "SPREAD_PART", "gateway.core.cargo", Acts.IN_WEIGHING,
+        "how many loads of which nobody said anything are unlike the known ones",
+    ),
+    Constant(
+        "COMPACT_SCATTER", "gateway.core.cargo", Acts.IN_WEIGHING,
+        "how alike the others are to the known ones",
+    ),
+    Constant(
+        "ROLLING", "gateway.core.change", Acts.IN_WEIGHING,
+        "how likely a change of load is between two batches without a stop",
+    ),
+    Constant(
+        "SPREAD_SHARE", "gateway.core.change", Acts.IN_WEIGHING,
+        "how large such a change usually is",
     ),
     Constant(
         "LEAST_EVIDENCE", "gateway.calibration.inspection.loads", Acts.IN_INSPECTION,

@@ -8,6 +8,7 @@ from benchmarks.accuracy.sensitivity.study import AS_IT_IS, setting
 
 WEIGHED: Final = (
     "Constant", "times", "Payload, mean abs. error %", "Share, mean abs. error %", "Payload held", "Share held",
+    "Payload, +- %", "score %", "Share, +- %", "score %",
     "Refused", "Change of load that shows, kg", "Changes seen where none was",
 )  # fmt: skip
 INSPECTED: Final = ("Constant", "times", "Right ones doubted", "Wrong ones named")
@@ -27,7 +28,8 @@ def sensitivity_page(found: Mapping[str, Any]) -> str:
             f"{found['n_vans']} simulated vans that nothing was chosen on: calibrated on six known loads, then driven "
             "once in each of the ways of [coverage](coverage.md), each time with another load. Errors are percent of "
             "the rated payload and of 20 percentage points, over batches that were answered; held is the share of "
-            "these whose 95 % interval holds the truth.",
+            "these whose 95 % interval holds the truth, +- the mean of half these intervals, and the score that of "
+            "their width and 40 times what the truth lies outside.",
             "",
             *_table(WEIGHED, [_weighed_cells("as they are", "1", usual), *_rows(found["weighing"], _weighed_cells)]),
             "",
@@ -80,6 +82,11 @@ def _weighed_cells(name: str, times: str, of_setting: Mapping[str, Any]) -> list
         times,
         *(_number(line[f"{quantity}_mean_abs_pct"]) for quantity in ("payload", "front_share")),
         *(_share(line[f"{quantity}_coverage"]) for quantity in ("payload", "front_share")),
+        *(
+            _number(line[f"{quantity}_{what}_pct"])
+            for quantity in ("payload", "front_share")
+            for what in ("half_width", "interval_score")
+        ),
         f"{line['n_rejected']} of {line['n_batches']}",
         "–" if smallest_kg is None else f"{smallest_kg:.0f}",
         f"{of_setting['n_false']} of {of_setting['n_unchanged']}",

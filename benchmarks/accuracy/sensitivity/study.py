@@ -25,6 +25,7 @@ from gateway.calibration.judgement import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.change import Rules
 from gateway.core.cross_spectrum.measured import CrossSpectra
 
 ESTIMATOR: Final = "cross_spectrum"
@@ -143,7 +144,7 @@ def setting(constant: Constant, factor: float) -> str:
 
 def _weigh(name: str, calibrated: CalibratedVehicle, tests: Sequence[KnownRun], found: _OfVan) -> None:
     drives = [judge([run], calibrated, ESTIMATOR) for run in tests]
-    found.pairs[name] = pairs_of(drives)
+    found.pairs[name] = pairs_of(drives, Rules.of(calibrated.vehicle))
     for run, judged in zip(tests, drives, strict=True):
         found.batches.extend(judged_batches(judged, calibrated.vehicle, name, ESTIMATOR, run))
 

@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from benchmarks.accuracy.cells import number_cell, rejected_cell, share_cell
+from benchmarks.accuracy.cells import number_cell, rejected_cell, score_cell, share_cell
 
 COLUMNS: Final = (
     "Calibration of the sibling", "Batches", "Rejected",
-    "Payload, mean abs. error %", "with misses", "95 % covers",
-    "Share, mean abs. error %", "with misses", "95 % covers",
+    "Payload, mean abs. error %", "with misses", "95 % covers", "+- %", "score % (ideal)",
+    "Share, mean abs. error %", "with misses", "95 % covers", "+- %", "score % (ideal)",
 )  # fmt: skip
 
 
@@ -32,13 +32,16 @@ def siblings_page(found: Mapping[str, Any]) -> str:
             "rate. What is inherited, and how: [a whole line of vehicles](line.md).",
             "",
             "Batches of 300 s; errors are percent of the payload each van is rated for and of 20 percentage points, "
-            "over batches that were answered; with misses, a rejected batch counts as a mid-range answer.",
+            "over batches that were answered; with misses, a rejected batch counts as a mid-range answer. +- is the "
+            "mean of half the 95 % intervals; the interval score is their width and 40 times what the truth lies "
+            "outside, in brackets what it would be for normal errors and intervals of the right width.",
             "",
             "| " + " | ".join(COLUMNS) + " |",
             "|" + "---|" * len(COLUMNS),
             *("| " + " | ".join(_cells(row)) + " |" for row in found["rows"]),
             "",
-            "The line's own file knows nothing of the sibling, and its intervals nothing of that; a tare mends the "
+            "The line's own file knows nothing of the sibling, and its intervals nothing of that; knowing once that "
+            "the vehicle is empty mends the "
             "zero alone. Alone, an empty drive leaves the springs' answer to load to a guess, so that the vehicle is "
             "believed near its own speeds only. The sister tells the rest.",
             "",
@@ -49,8 +52,15 @@ def siblings_page(found: Mapping[str, Any]) -> str:
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         row["estimator"], str(row["n_batches"]), rejected_cell(row),
-        number_cell(row["payload_mean_abs_pct"]), number_cell(row["payload_mean_abs_pct_with_misses"]),
-        share_cell(row["payload_coverage"]),
-        number_cell(row["front_share_mean_abs_pct"]), number_cell(row["front_share_mean_abs_pct_with_misses"]),
-        share_cell(row["front_share_coverage"]),
+        *(cell for target in ("payload", "front_share") for cell in _of_target(row, target)),
     )  # fmt: skip
+
+
+def _of_target(row: Mapping[str, Any], target: str) -> tuple[str, ...]:
+    return (
+        number_cell(row[f"{target}_mean_abs_pct"]),
+        number_cell(row[f"{target}_mean_abs_pct_with_misses"]),
+        share_cell(row[f"{target}_coverage"]),
+        number_cell(row[f"{target}_half_width_pct"]),
+        score_cell(row[f"{target}_interval_score_pct"], row[f"{target}_mean_abs_pct"]),
+    )

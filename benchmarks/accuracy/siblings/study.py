@@ -19,27 +19,27 @@ from benchmarks.accuracy.vans import OnVan, of_each_van
 from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
 from gateway.calibration.judgement import judge
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.known_weight import load_of
 from gateway.calibration.line import Line, Sibling, Sister, line_of, with_siblings_left_out
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.known_weights import Knowledge, KnownWeightKind, Observation
+from gateway.core.known_weights import Knowledge, Observation
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
-from gateway.posterior import Source, fused
-from gateway.stated_weight import StatedWeight
+from gateway.posterior import fused
 
 SEED: Final = 20280
 VANS_PER_LINE: Final = 3
 SISTERS: Final = 3
 ESTIMATOR: Final = "cross_spectrum"
 ID: Final = "in memory"
+EMPTY_STD_KG: Final = 3.0  # of an empty vehicle: driver, fuel, what lies about
+EMPTY_SHARE_STD_PCT: Final = 0.2
 
 
 class Way(StrEnum):
     """How a sibling is calibrated."""
 
     AS_IS = "the line's file as it is"
-    TARED = "the line's file and a tare"
+    WEIGHED_EMPTY = "the line's file, and known to be empty once"
     ALONE = "one empty drive, priors of any vehicle"
     LIKE_ONE = "one empty drive, like one sister"
     LIKE_ONE_TWO_DRIVES = "and a second, mixed, empty drive"
@@ -97,7 +97,7 @@ def _ways(van: Driven, first: Sister, of_one: Line, of_three: Line) -> Iterator[
     steady = van.runs[:1]
     as_is = _calibrated(first.vehicle, CrossSpectrumFit(first.calibration, {}))
     yield Way.AS_IS, _Judging(van, as_is)
-    yield Way.TARED, _Judging(van, as_is, _known_empty(as_is, steady, van.vehicle))
+    yield Way.WEIGHED_EMPTY, _Judging(van, as_is, known_empty(as_is, steady, van.vehicle))
     for way, runs, line in (
         (Way.ALONE, steady, None),
         (Way.LIKE_ONE, steady, of_one),
@@ -110,7 +110,7 @@ def _ways(van: Driven, first: Sister, of_one: Line, of_three: Line) -> Iterator[
 
 @dataclass(frozen=True, slots=True)
 class _Judging:
-    """A sibling by one calibration, with what is known of its sources where anything is."""
+    """A sibling by one calibration, with what a known weight taught where there is one."""
 
     van: Driven
     calibrated: CalibratedVehicle
@@ -120,15 +120,11 @@ class _Judging:
         found = []
         for trip, run in self.van.tests:
             judged = [
-                replace(one, estimate=self._known(one.estimate)) for one in judge([run], self.calibrated, ESTIMATOR)
+                replace(one, estimate=_known(one.estimate, self.knowledge))
+                for one in judge([run], self.calibrated, ESTIMATOR)
             ]
             found += judged_batches(judged, self.van.vehicle, trip.kind, way, run)
         return found
-
-    def _known(self, estimate: Estimate) -> Estimate:
-        if self.knowledge is None or estimate.posterior is None:
-            return estimate
-        return estimate.answered(self.knowledge.applied(estimate.posterior, estimate.t_end_ns))
 
 
 def _calibrated(vehicle: Vehicle, fit: CrossSpectrumFit) -> CalibratedVehicle:
@@ -136,16 +132,19 @@ def _calibrated(vehicle: Vehicle, fit: CrossSpectrumFit) -> CalibratedVehicle:
     return CalibratedVehicle(ID, vehicle, known.payload_seen_kg, known.front_share_seen_pct, None, known)
 
 
-def _known_empty(calibrated: CalibratedVehicle, empty: Sequence[KnownRun], vehicle: Vehicle) -> Knowledge | None:
-    """What an empty drive teaches of the sources, as the service states it; None where no batch is answered."""
-    answered = [one.estimate for one in judge(empty, calibrated, ESTIMATOR) if one.estimate.posterior is not None]
-    if not answered:
+def _known(found: Estimate, knowledge: Knowledge | None) -> Estimate:
+    if knowledge is None or found.posterior is None:
+        return found
+    return found.answered(knowledge.applied(found.posterior, found.t_end_ns))
+
+
+def known_empty(calibrated: CalibratedVehicle, empty: Sequence[KnownRun], vehicle: Vehicle) -> Knowledge | None:
+    """What an empty drive teaches, once somebody has said that it was; None where no batch of it is answered."""
+    answered = [one.estimate for one in judge(empty, calibrated, ESTIMATOR) if one.estimate.counted]
+    posteriors = [one.posterior for one in answered if one.posterior is not None]
+    if not posteriors:
         return None
-    load = load_of(StatedWeight("", payload_kg=0.0), vehicle, calibrated.unsprung, KnownWeightKind.EMPTY)
-    assert load.front_share_pct is not None
-    assert load.front_share_std_pct is not None
-    truth = np.array([load.payload_kg, load.front_share_pct])
-    std = np.array([load.payload_std_kg, load.front_share_std_pct])
-    posterior = fused([one.posterior for one in answered if one.posterior is not None]).without(Source.EMPTY_SHARE)
+    truth = np.array([0.0, vehicle.empty_front_share_pct])
+    covariance = np.diag(np.square([EMPTY_STD_KG, EMPTY_SHARE_STD_PCT]))
     t_ns = max(one.t_end_ns for one in answered)
-    return Knowledge.of([Observation(ID, t_ns, ID, ESTIMATOR, posterior, truth, np.diag(std**2))])
+    return Knowledge.of([Observation(ID, t_ns, ID, ESTIMATOR, fused(posteriors), truth, covariance)])

@@ -7,6 +7,7 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from gateway.calibration.judgement.coverage import interval_scores
 from gateway.calibration.judgement.sideways import Carried, CgLeftErrors, WheelErrors, cg_left_errors, wheel_errors
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
@@ -75,7 +76,8 @@ class TargetErrors:
     """(12) for one quantity: in percent of its range, and in ``unit``. None where nothing was answered.
 
     In ``mean_abs_pct_with_misses`` a rejected batch scores as if it had answered mid-range;
-    ``mean_abs_pct_of_gross`` is of payload alone, in percent of the loaded vehicle's mass.
+    ``mean_abs_pct_of_gross`` is of payload alone, in percent of the loaded vehicle's mass. ``half_width_pct`` is the
+    mean of half the 95 % intervals, ``interval_score_pct`` that of their scores (judgement.coverage).
     """
 
     unit: Literal["kg", "pp"]
@@ -90,6 +92,8 @@ class TargetErrors:
     max_abs: float | None
     coverage95: float | None
     mean_abs_pct_of_gross: float | None = None
+    half_width_pct: float | None = None
+    interval_score_pct: float | None = None
 
     def to_json(self) -> dict[str, float | None]:
         """The object that ``evaluate --json`` prints for one quantity."""
@@ -104,6 +108,8 @@ class TargetErrors:
             f"std_{self.unit}": self.std,
             f"max_abs_{self.unit}": self.max_abs,
             "coverage95": self.coverage95,
+            "half_width_pct": self.half_width_pct,
+            "interval_score_pct": self.interval_score_pct,
         }
         return record | ({"mean_abs_pct_of_gross": self.mean_abs_pct_of_gross} if self.unit == "kg" else {})
 
@@ -218,6 +224,8 @@ def _target_errors(
         max_abs=float(np.max(np.abs(error))) if error.size else None,
         coverage95=_mean(((lower <= true) & (true <= upper)).astype(float)),
         mean_abs_pct_of_gross=None if unloaded_kg is None else _mean(100.0 * np.abs(error) / (unloaded_kg + true)),
+        half_width_pct=_mean(0.5 * (upper - lower) * percent),
+        interval_score_pct=_mean(interval_scores(true, lower, upper) * percent),
     )
 
 

@@ -42,6 +42,10 @@ class Score:
     payload_coverage95: float | None
     front_share_mean_abs_pct: float | None
     front_share_coverage95: float | None
+    payload_half_width_pct: float | None = None
+    payload_interval_score_pct: float | None = None
+    front_share_half_width_pct: float | None = None
+    front_share_interval_score_pct: float | None = None
 
     @classmethod
     def of(cls, errors: Errors) -> "Score":
@@ -51,8 +55,12 @@ class Score:
             n_rejected=errors.n_rejected,
             payload_mean_abs_pct=errors.payload.mean_abs_pct,
             payload_coverage95=errors.payload.coverage95,
+            payload_half_width_pct=errors.payload.half_width_pct,
+            payload_interval_score_pct=errors.payload.interval_score_pct,
             front_share_mean_abs_pct=errors.front_share.mean_abs_pct,
             front_share_coverage95=errors.front_share.coverage95,
+            front_share_half_width_pct=errors.front_share.half_width_pct,
+            front_share_interval_score_pct=errors.front_share.interval_score_pct,
         )
 
 
@@ -85,10 +93,14 @@ class Spread:
     payload_std_pct: float | None
     payload_worst_pct: float | None
     payload_coverage95: float | None
+    payload_half_width_pct: float | None
+    payload_interval_score_pct: float | None
     front_share_mean_pct: float | None
     front_share_std_pct: float | None
     front_share_worst_pct: float | None
     front_share_coverage95: float | None
+    front_share_half_width_pct: float | None
+    front_share_interval_score_pct: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,10 +196,14 @@ def spread_of(scores: Sequence[Score]) -> Spread:
         payload_std_pct=float(np.std(payload)) if payload else None,
         payload_worst_pct=max(payload, default=None),
         payload_coverage95=_mean(_known([score.payload_coverage95 for score in scores])),
+        payload_half_width_pct=_mean(_known([score.payload_half_width_pct for score in scores])),
+        payload_interval_score_pct=_mean(_known([score.payload_interval_score_pct for score in scores])),
         front_share_mean_pct=_mean(share),
         front_share_std_pct=float(np.std(share)) if share else None,
         front_share_worst_pct=max(share, default=None),
         front_share_coverage95=_mean(_known([score.front_share_coverage95 for score in scores])),
+        front_share_half_width_pct=_mean(_known([score.front_share_half_width_pct for score in scores])),
+        front_share_interval_score_pct=_mean(_known([score.front_share_interval_score_pct for score in scores])),
     )
 
 

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway.calibration.judgement.coverage import interval_scores
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import Unsprung, weights_of
 from gateway.estimate import Estimate, Quantity
@@ -24,6 +25,8 @@ class CgLeftErrors:
     std_m: float | None
     max_abs_m: float | None
     coverage95: float | None
+    half_width_m: float | None = None
+    interval_score_m: float | None = None
 
     def to_json(self) -> dict[str, float | None]:
         """The object that ``evaluate --json`` prints."""
@@ -57,6 +60,8 @@ def cg_left_errors(compared: F64) -> CgLeftErrors | None:
         std_m=float(np.std(error)),
         max_abs_m=float(np.max(np.abs(error))),
         coverage95=float(np.mean((low <= true) & (true <= high))),
+        half_width_m=float(np.mean(0.5 * (high - low))),
+        interval_score_m=float(np.mean(interval_scores(true, low, high))),
     )
 
 

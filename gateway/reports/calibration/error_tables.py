@@ -14,11 +14,12 @@ from gateway.calibration.judgement import (
     Part,
     TargetErrors,
 )
+from gateway.calibration.judgement.coverage import IDEAL_SCORE
 from gateway.records import iso_utc
 from gateway.reports.calibration.text import NONE, decimal, percent
 from gateway.reports.charts import Table
 
-_COLUMNS: Final = ("mean |e|", "bias", "std", "max", "mean |e| %", "with misses %", "of gross %", "95 % covers")
+_COLUMNS: Final = ("mean |e|", "bias", "std", "max", "mean |e| %", "with misses %", "of gross %", "95 % covers", "± (95 %)", "score")
 
 
 def summary_table(judgement: Judgement) -> Table:
@@ -30,7 +31,10 @@ def summary_table(judgement: Judgement) -> Table:
     ]
     return Table(
         "Errors (12): in kg and percentage points, and in percent of the campaign's ranges; of gross: in percent of "
-        "the loaded vehicle's mass; where the centre of gravity lies left of the centre line: in mm",
+        "the loaded vehicle's mass; where the centre of gravity lies left of the centre line: in mm. ± is the mean "
+        "of half the 95 % intervals; the score is their width and 40 times what the truth lies outside, in the mean, "
+        f"and {IDEAL_SCORE:g} times the mean |e| where intervals are as wide as they should be; both in percent of the "
+        "range",
         ("Batches of", "Quantity", "answered", *_COLUMNS),
         tuple(rows),
         n_heads=2,
@@ -45,13 +49,15 @@ def _labelled(errors: Errors) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield "centre of gravity, left", _cg_left_cells(errors.cg_left)
     if errors.wheels is not None:
         of_gross = decimal(errors.wheels.mean_abs_pct_of_gross)
-        yield "each wheel's load", (NONE, NONE, NONE, NONE, NONE, NONE, of_gross, NONE)
+        yield "each wheel's load", (*[NONE] * 6, of_gross, *[NONE] * 3)
 
 
 def _cg_left_cells(errors: CgLeftErrors) -> tuple[str, ...]:
     lengths_m = (errors.mean_abs_m, errors.bias_m, errors.std_m, errors.max_abs_m)
     in_mm = (decimal(None if m is None else 1000.0 * m, " mm") for m in lengths_m)
-    return (*in_mm, NONE, NONE, NONE, percent(errors.coverage95))
+    widths_m = (errors.half_width_m, errors.interval_score_m)
+    widths_in_mm = (decimal(None if m is None else 1000.0 * m, " mm") for m in widths_m)
+    return (*in_mm, NONE, NONE, NONE, percent(errors.coverage95), *widths_in_mm)
 
 
 def _cells(errors: TargetErrors) -> tuple[str, ...]:
@@ -61,6 +67,8 @@ def _cells(errors: TargetErrors) -> tuple[str, ...]:
         decimal(errors.mean_abs_pct_with_misses),
         decimal(errors.mean_abs_pct_of_gross),
         percent(errors.coverage95),
+        decimal(errors.half_width_pct),
+        decimal(errors.interval_score_pct),
     )
 
 
@@ -77,7 +85,7 @@ def runs_table(judgement: Judgement, part: Part) -> Table:
         )
         for first, errors in judgement.tables[part].runs
     )
-    errors = ("mean |e|", "bias", "max", "95 % covers")
+    errors = ("mean |e|", "bias", "max", "95 % covers", "± %", "score %")
     columns = (
         "Run",
         "payload",
@@ -91,7 +99,8 @@ def runs_table(judgement: Judgement, part: Part) -> Table:
 
 def _run_cells(errors: TargetErrors) -> tuple[str, ...]:
     figures = (errors.mean_abs, errors.bias, errors.max_abs)
-    return (*(decimal(figure, f" {errors.unit}") for figure in figures), percent(errors.coverage95))
+    widths = (decimal(errors.half_width_pct), decimal(errors.interval_score_pct))
+    return (*(decimal(figure, f" {errors.unit}") for figure in figures), percent(errors.coverage95), *widths)
 
 
 def batches_table(judgement: Judgement, part: Part) -> Table:

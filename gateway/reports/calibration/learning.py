@@ -71,11 +71,12 @@ def _table(curve: LearningCurve) -> Table:
         for judged, spread in (("runs left out", rung.left_out), ("later part of all", rung.validation))
         if spread.n_trials
     )
-    errors = ("worst", "95 % covers")
+    errors = ("worst", "95 % covers", "±", "score")
     columns = ("Runs", "estimator", "choices", "judged on", "payload", *errors, "share", *errors)
     caption = (
         "Mean |error| in percent of the ranges (12) over choices of runs ± its standard deviation between them, and "
-        "that of the worst choice"
+        "that of the worst choice; ± is half the 95 % intervals, the score their width and 40 times what the truth lies "
+        "outside"
     )
     return Table(caption, columns, rows, n_heads=2)
 
@@ -93,7 +94,11 @@ def _cells(spread: Spread) -> tuple[str, ...]:
         payload,
         decimal(spread.payload_worst_pct, " %", 1),
         percent(spread.payload_coverage95),
+        decimal(spread.payload_half_width_pct, " %", 1),
+        decimal(spread.payload_interval_score_pct, " %", 1),
         share,
         decimal(spread.front_share_worst_pct, " %", 1),
         percent(spread.front_share_coverage95),
+        decimal(spread.front_share_half_width_pct, " %", 1),
+        decimal(spread.front_share_interval_score_pct, " %", 1),
     )

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from gateway.calibration.judgement.coverage import IDEAL_SCORE
 from gateway.reports.paper.experiments import Experiments
 
 PAPER_PCT: Final = {  # mean |error| of payload and of share, percent of 450 kg and of 20 points: the paper's section 4
@@ -26,8 +27,8 @@ TITLES: Final = {
 
 COLUMNS: Final = (
     "Drive", "Method", "Batches", "Rejected",
-    "Payload, mean abs. error %", "std %", "kg", "95 % covers",
-    "Share, mean abs. error %", "std %", "points", "95 % covers",
+    "Payload, mean abs. error %", "std %", "kg", "95 % covers", "+- %", "score %",
+    "Share, mean abs. error %", "std %", "points", "95 % covers", "+- %", "score %",
 )  # fmt: skip
 
 
@@ -77,7 +78,9 @@ def accuracy_page(results: Mapping[str, Any]) -> str:
         "tests are calibrated on the simulated grid of the paper, the experiment and the speeds on the experiment's "
         "identification part. All of it is simulated by `gateway/sim`, whose friction, progressive springs, sensor "
         "errors and rough two-track roads the estimators do not know; the paper's tests run on its one-track road (1). "
-        "A rejected batch gave no answer and stands in no mean.\n\n" + "\n".join([*head, *lines]) + "\n"
+        "A rejected batch gave no answer and stands in no mean. +- is the mean of half the 95 % intervals; the interval "
+        f"score is their width and 40 times what the truth lies outside, {IDEAL_SCORE:g} times the mean error where "
+        "they are as wide as they should be.\n\n" + "\n".join([*head, *lines]) + "\n"
     )
 
 
@@ -86,8 +89,8 @@ def _paper_row(title: str, mean_pct: tuple[float, float], std_pct: tuple[float, 
     payload_std, share_std = (f"{std:.2f}" for std in std_pct) if std_pct else ("", "")
     cells = (
         title, "the paper", "", "",
-        f"{payload:.2f}", payload_std, f"{4.5 * payload:.1f}", "",
-        f"{share:.2f}", share_std, f"{0.2 * share:.2f}", "",
+        f"{payload:.2f}", payload_std, f"{4.5 * payload:.1f}", "", "", "",
+        f"{share:.2f}", share_std, f"{0.2 * share:.2f}", "", "", "",
     )  # fmt: skip
     return Row(cells, is_paper=True)
 
@@ -97,11 +100,15 @@ def _row(title: str, table: Mapping[str, Any]) -> Row:
     cells = (
         title, table["method"], str(table["n_batches"]), str(table["n_rejected"]),
         _decimal(payload["mean_abs_pct"], 2), _decimal(payload["std_pct"], 2), _decimal(payload["mean_abs_kg"], 1),
-        _percent(payload["coverage95"]),
+        _percent(payload["coverage95"]), *_widths(payload),
         _decimal(share["mean_abs_pct"], 2), _decimal(share["std_pct"], 2), _decimal(share["mean_abs_pp"], 2),
-        _percent(share["coverage95"]),
+        _percent(share["coverage95"]), *_widths(share),
     )  # fmt: skip
     return Row(cells)
+
+
+def _widths(errors: Mapping[str, Any]) -> tuple[str, str]:
+    return _decimal(errors["half_width_pct"], 2), _decimal(errors["interval_score_pct"], 2)
 
 
 def _decimal(number: float | None, digits: int) -> str:

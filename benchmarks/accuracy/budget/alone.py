@@ -1,0 +1,221 @@
+"""Each source alone: the same drive with one cause and without it, the shift found against the shift predicted.
+
+    alone(n_vans, seed) -> one Row a source
+
+The vans carry no roll rate, and nobody says what they carry: every source is there. ``slope`` is the regression of the
+shifts found upon those that the estimator's own slopes predict for the cause that was drawn, ``z2`` the mean square of
+the shifts found over the variance that its columns state.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+
+from benchmarks.accuracy.budget.nature import (
+    Gains,
+    amplified,
+    as_stated,
+    drawn_day,
+    drawn_gains,
+    drawn_log_s,
+    drawn_share_pct,
+    exactly_known,
+    load_of_shape,
+    on_that_day,
+    place_std_m,
+    to_one_side,
+)
+from benchmarks.accuracy.budget.response import day_covariance, response_to
+from benchmarks.accuracy.coverage_drives import TRIPS, Scope, Trip, known_run, rows_of, without_roll_rate
+from benchmarks.accuracy.vans import FreshVan, OnVan, fresh_van, of_each_van
+from gateway.calibration.judgement.learning_curve import calibrated_on
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cargo import ShapePrior
+from gateway.core.cross_spectrum.estimator import Weighed, weigh
+from gateway.core.cross_spectrum.sensor_change import gain_of
+from gateway.posterior import FRONT_SHARE, PAYLOAD, SHAPE, Source
+from gateway.records import F64, Batch, Why
+from gateway.sim.vehicle import Load, Vehicle
+
+ESTIMATOR: Final = "cross_spectrum"
+MIXED: Final = TRIPS["mixed"]
+ON_THE_LINE: Final = replace(MIXED, off_m=(0.0, 0.0))
+PARTS: Final = (0.3, 0.9)  # of the rated payload
+PLACES: Final = (0.35, 0.85)  # of the wheelbase
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """Of one batch by one source, payload in kg and front share in percent: found and predicted (2,), and the
+    variances (2,) that its columns state.
+    """
+
+    source: str
+    found: F64
+    predicted: F64
+    variance: F64
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One source over all batches; a figure is None where it moves no such quantity."""
+
+    source: str
+    n: int
+    payload_slope: float | None
+    payload_z2: float | None
+    payload_stated_kg: float
+    payload_found_kg: float
+    front_share_slope: float | None
+    front_share_z2: float | None
+    front_share_stated_pct: float
+    front_share_found_pct: float
+
+
+def alone(n_vans: int, seed: int, *, workers: int = 1, on_van: OnVan = lambda done, of: None) -> list[dict[str, Any]]:
+    """Drive every van once for each source, and as it was calibrated."""
+    vans = of_each_van(partial(of_one_van, Scope(n_vans=n_vans), seed), n_vans, workers, on_van)
+    shifts = [shift for of_van in vans for shift in of_van]
+    sources = dict.fromkeys(shift.source for shift in shifts)
+    return [asdict(row_of(source, [one for one in shifts if one.source == source])) for source in sources]
+
+
+def row_of(source: str, shifts: Sequence[Shift]) -> Row:
+    """Slopes through the origin, mean squares, and root mean squares of both."""
+    found, predicted, variance = (np.array([getattr(one, name) for one in shifts]) for name in _OF_SHIFT)
+    slopes, z2 = [], []
+    for i in (PAYLOAD, FRONT_SHARE):
+        is_moved = bool(np.any(variance[:, i] > 0.0))
+        across = float(predicted[:, i] @ predicted[:, i])
+        slopes.append(float(found[:, i] @ predicted[:, i]) / across if is_moved and across > 0.0 else None)
+        z2.append(float(np.mean(found[:, i] ** 2 / variance[:, i])) if is_moved else None)
+    stated, seen = np.sqrt(np.mean(variance, axis=0)), np.sqrt(np.mean(found**2, axis=0))
+    return Row(
+        source, len(shifts), slopes[0], z2[0], float(stated[0]), float(seen[0]), slopes[1], z2[1], float(stated[1]),
+        float(seen[1]),
+    )  # fmt: skip
+
+
+_OF_SHIFT: Final = ("found", "predicted", "variance")
+
+
+def of_one_van(scope: Scope, seed: int, number: int) -> list[Shift]:
+    """One draw of every source on one van."""
+    fresh = fresh_van(scope, seed, number)
+    runs = [without_roll_rate(run) for run in fresh.runs]
+    bench = _Bench(fresh, calibrated_on(runs, fresh.vehicle, ESTIMATOR), scope)
+    studies: tuple[Callable[[_Bench], Iterator[Shift]], ...] = (_day, _sensor, _shape, _sideways)
+    return [shift for study in studies for shift in study(bench)] + list(_empty_share(bench, runs))
+
+
+class _Bench:
+    """A calibrated van, a load as it was calibrated with, and one drive that is repeated with each cause."""
+
+    def __init__(self, fresh: FreshVan, calibrated: CalibratedVehicle, scope: Scope) -> None:
+        if calibrated.cross_spectrum is None:
+            raise ValueError("a budget needs the cross-spectral calibration")
+        self.fresh, self.calibrated, self.known, self._scope = fresh, calibrated, calibrated.cross_spectrum, scope
+        self.rng, self.van = fresh.rng, fresh.van
+        part, place = self.rng.uniform(*PARTS), self.rng.uniform(*PLACES)
+        self.load = Load(float(part) * self.van.rated_payload_kg, float(place) * self.van.wheelbase_m)
+        self.as_known = _shape_of(self.load, self.van)
+        self.usual = self.driven(self.van, self.load)
+        self.reference = self.weighed(self.usual, exactly_known(self.as_known))
+
+    def driven(
+        self, van: Vehicle, load: Load, trip: Trip = ON_THE_LINE, gains: Gains | None = None
+    ) -> tuple[Batch, ...]:
+        """The one drive with this van, load and gains, without its roll rate."""
+        rows, today, carried = rows_of(van, (load,), trip, self._scope, self.fresh.test_seed, self.fresh.sensors)
+        run = known_run(rows if gains is None else amplified(rows, gains), 1, "budget", today, carried)
+        self.left_m = carried[0].left_m
+        return without_roll_rate(run).batches
+
+    def weighed(self, batches: Sequence[Batch], prior: ShapePrior | None) -> list[Weighed | Why]:
+        """Each batch by the calibration, whether the service would refuse it or not."""
+        return [Why.TOO_SHORT if batch.rejected else weigh(batch, self.known, prior) for batch in batches]
+
+    def pairs(self, batches: Sequence[Batch], prior: ShapePrior | None) -> Iterator[tuple[int, Weighed, Weighed]]:
+        """Batches, by their number, that were answered in both drives: with the cause, and as calibrated."""
+        both = zip(self.weighed(batches, prior), self.reference, strict=False)
+        for i, (one, usual) in enumerate(both):
+            if isinstance(one, Weighed) and isinstance(usual, Weighed):
+                yield i, one, usual
+
+
+def _shape_of(load: Load, van: Vehicle) -> float:
+    above_m = load.height_m - van.cog_height_m
+    part = van.sprung_kg / (van.sprung_kg + load.mass_kg)
+    return float(np.log((load.length_m**2 + load.tall_m**2) / 12.0 + part * above_m**2))
+
+
+def _of(name: Source, one: Weighed) -> F64:
+    return np.asarray(np.sum(one.posterior.sources[name] ** 2, axis=0))
+
+
+def _day(bench: _Bench) -> Iterator[Shift]:
+    """Springs, tyres and dampers of another day."""
+    day = drawn_day(bench.rng)
+    batches = bench.driven(on_that_day(bench.van, day), bench.load)
+    for _, one, usual in bench.pairs(batches, exactly_known(bench.as_known)):
+        shift = one.posterior.mean - usual.posterior.mean
+        yield Shift("day", shift, response_to(usual, bench.known, day), np.diag(day_covariance(usual, bench.known)))
+
+
+def _sensor(bench: _Bench) -> Iterator[Shift]:
+    """Another temperature of the sensors."""
+    gains = drawn_gains(bench.rng)
+    batches = bench.driven(bench.van, bench.load, gains=gains)
+    for i, one, usual in bench.pairs(batches, exactly_known(bench.as_known)):
+        believed, std = gain_of(batches[i].gravity_mps2, bench.known.gravity_mps2)
+        left_open = (gains.acceleration - gains.rate - believed) / std
+        column = usual.posterior.sources[Source.SENSOR][0]
+        yield Shift("sensor", one.posterior.mean - usual.posterior.mean, left_open * column, _of(Source.SENSOR, usual))
+
+
+def _shape(bench: _Bench) -> Iterator[Shift]:
+    """A load of any shape that is believed possible, weighed as a load of which nobody said anything.
+
+    Predicted is by how much the answer differs from that under the true shape, which the same half-car finds.
+    """
+    prior = bench.calibrated.shape_prior
+    assert prior is not None
+    log_s = drawn_log_s(prior, bench.rng)
+    load = load_of_shape(bench.van, bench.load.mass_kg, bench.load.position_m, log_s)
+    batches = bench.driven(bench.van, load)
+    knowing = bench.weighed(batches, exactly_known(log_s))
+    for i, one, usual in bench.pairs(batches, prior):
+        if isinstance(known := knowing[i], Weighed):
+            goods, own = (one.posterior.sources[name][:1] for name in SHAPE)
+            variance = np.sum(goods**2 + own**2, axis=0)
+            shift = one.posterior.mean - usual.posterior.mean
+            yield Shift("load length and height", shift, one.posterior.mean - known.posterior.mean, variance)
+
+
+def _sideways(bench: _Bench) -> Iterator[Shift]:
+    """A load beside the centre line, which no roll rate shows."""
+    std_m = place_std_m(bench.fresh.vehicle)
+    batches = bench.driven(bench.van, bench.load, to_one_side(MIXED, std_m * float(bench.rng.standard_normal())))
+    z = bench.left_m / std_m * float(np.sign(bench.fresh.sensors.mount.left_m))
+    for _, one, usual in bench.pairs(batches, exactly_known(bench.as_known)):
+        column = usual.posterior.sources[Source.SIDEWAYS][0]
+        shift = one.posterior.mean - usual.posterior.mean
+        yield Shift("sideways", shift, z * column, _of(Source.SIDEWAYS, usual))
+
+
+def _empty_share(bench: _Bench, runs: list[Any]) -> Iterator[Shift]:
+    """A calibration by a fitter who was wrong about the empty vehicle."""
+    off_pct = drawn_share_pct(bench.fresh.vehicle, bench.rng)
+    vehicle, stated_runs = as_stated(bench.fresh.vehicle, runs, off_pct)
+    wrong = calibrated_on(stated_runs, vehicle, ESTIMATOR).cross_spectrum
+    assert wrong is not None
+    for batch, usual in zip(bench.usual, bench.reference, strict=True):
+        one = Why.TOO_SHORT if batch.rejected else weigh(batch, wrong, exactly_known(bench.as_known))
+        if isinstance(one, Weighed) and isinstance(usual, Weighed):
+            part = vehicle.empty_mass_kg / (vehicle.empty_mass_kg + float(usual.posterior.mean[PAYLOAD]))
+            column = np.array([0.0, vehicle.empty_front_share_std_pct * part])
+            shift = one.posterior.mean - usual.posterior.mean
+            yield Shift("empty_share", shift, np.array([0.0, off_pct * part]), column**2)

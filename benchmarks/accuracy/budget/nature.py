@@ -1,0 +1,119 @@
+"""What differs from the calibration: each cause drawn from the distribution that the estimator states of it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import exp
+
+import numpy as np
+
+from benchmarks.accuracy.coverage_drives import Trip
+from gateway.calibration.known_run import KnownRun
+from gateway.core.cargo import ShapePrior
+from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD
+from gateway.core.cross_spectrum.lateral.unseen import PAYLOAD_LEFT_PER_TRACK
+from gateway.core.cross_spectrum.sensor_change import GAIN_PER_K, OFFSET_PER_K_MPS2, TEMPERATURE_STD_K
+from gateway.core.vehicle import Vehicle as StatedVehicle
+from gateway.records import Motion, Signal
+from gateway.sim.vehicle import Axle, Load, Vehicle
+
+
+def drawn_day(rng: np.random.Generator) -> dict[str, float]:
+    """Logarithms of springs, tyres and dampers over what they were at calibration, by the names of parameters."""
+    common = {kind: std * rng.standard_normal() for kind, std in NATURE_TOGETHER_STD.items()}
+    own = {name: std * rng.standard_normal() for name, std in NATURE_STD.items()}
+    return {name: x + common[kind] for name, x in own.items() if (kind := name.split("_")[0]) in common}
+
+
+def on_that_day(van: Vehicle, day: Mapping[str, float]) -> Vehicle:
+    """The same van with its springs, tyres and dampers so changed."""
+    return replace(van, front=_axle(van.front, day, "front"), rear=_axle(van.rear, day, "rear"))
+
+
+def _axle(axle: Axle, day: Mapping[str, float], end: str) -> Axle:
+    spring, tyre, damper = (
+        exp(day[f"{name}_{end}_{unit}"]) for name, unit in (("spring", "npm"), ("tyre", "npm"), ("damper", "nspm"))
+    )
+    return replace(
+        axle,
+        spring=replace(
+            axle.spring, rate_npm=axle.spring.rate_npm * spring, progression_npm2=axle.spring.progression_npm2 * spring
+        ),
+        damper=replace(
+            axle.damper,
+            compression_nspm=axle.damper.compression_nspm * damper,
+            rebound_nspm=axle.damper.rebound_nspm * damper,
+        ),
+        wheel=replace(axle.wheel, tyre_npm=axle.wheel.tyre_npm * tyre),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """Logarithms of both sensors' gains over those at calibration, and the accelerometer's offset."""
+
+    acceleration: float = 0.0
+    rate: float = 0.0
+    offset_mps2: float = 0.0
+
+
+def drawn_gains(rng: np.random.Generator) -> Gains:
+    """As another temperature of the sensors makes them, by their data sheets."""
+    acceleration, rate, offset = rng.standard_normal(3).tolist()
+    gain_std = TEMPERATURE_STD_K * GAIN_PER_K
+    return Gains(gain_std * acceleration, gain_std * rate, TEMPERATURE_STD_K * OFFSET_PER_K_MPS2 * offset)
+
+
+def amplified(rows: Motion, gains: Gains) -> Motion:
+    """The same drive through sensors with these gains."""
+    columns = rows.columns.copy()
+    acceleration = rows.signals.index(Signal.VERTICAL_ACCELERATION)
+    columns[:, acceleration] = columns[:, acceleration] * exp(gains.acceleration) + gains.offset_mps2
+    for signal in (Signal.PITCH_RATE, Signal.ROLL_RATE):
+        if signal in rows.signals:
+            columns[:, rows.signals.index(signal)] *= exp(gains.rate)
+    return replace(rows, columns=columns)
+
+
+def drawn_log_s(prior: ShapePrior, rng: np.random.Generator) -> float:
+    """A load's squared radius of gyration (logarithm of m2) from what is believed of loads."""
+    return float(rng.choice(prior.log_s, p=prior.probability))
+
+
+def load_of_shape(van: Vehicle, mass_kg: float, position_m: float, log_s: float) -> Load:
+    """A flat load at the height of the body's centre of gravity, as long as its radius of gyration asks for."""
+    tall_m = 0.1
+    length_m = math.sqrt(max(12.0 * exp(log_s) - tall_m**2, 0.0))
+    return Load(mass_kg, position_m, height_m=van.cog_height_m, length_m=length_m, tall_m=tall_m)
+
+
+def exactly_known(log_s: float) -> ShapePrior:
+    """What is believed of a load whose shape somebody measured."""
+    return ShapePrior(log_s + np.array([-0.01, 0.0, 0.01]), np.array([0.25, 0.5, 0.25]), 0.0)
+
+
+def place_std_m(vehicle: StatedVehicle) -> float:
+    """Of a load's place across the vehicle."""
+    assert vehicle.track_width_m is not None
+    return PAYLOAD_LEFT_PER_TRACK * vehicle.track_width_m
+
+
+def to_one_side(trip: Trip, left_m: float) -> Trip:
+    """The same drive with its load so far from the centre line, to either side."""
+    return replace(trip, off_m=(abs(left_m), abs(left_m)))
+
+
+def drawn_share_pct(vehicle: StatedVehicle, rng: np.random.Generator) -> float:
+    """By how much the fitter's front share of the empty vehicle is off, in percentage points."""
+    return vehicle.empty_front_share_std_pct * float(rng.standard_normal())
+
+
+def as_stated(vehicle: StatedVehicle, runs: list[KnownRun], off_pct: float) -> tuple[StatedVehicle, list[KnownRun]]:
+    """Vehicle and known loads as a fitter states them who is off by so much: places of loads are measured rightly."""
+    stated = replace(vehicle, empty_front_share_pct=vehicle.empty_front_share_pct + off_pct)
+
+    def placed(run: KnownRun) -> KnownRun:
+        part = vehicle.empty_mass_kg / (vehicle.empty_mass_kg + run.payload_kg)
+        return replace(run, front_share_pct=run.front_share_pct + off_pct * part)
+
+    return stated, [placed(run) for run in runs]

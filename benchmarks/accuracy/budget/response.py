@@ -1,0 +1,54 @@
+"""By how much an answer moves when springs, tyres and dampers are truly other than the calibration has them."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFT_STD, DRIFTING, STEADY
+from gateway.core.cross_spectrum.estimator import Weighed
+from gateway.core.cross_spectrum.likelihood import Whittle
+from gateway.core.cross_spectrum.located import Answer, answer_at
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS
+from gateway.core.cross_spectrum.model.strokes import with_strokes
+from gateway.posterior import Source
+from gateway.records import F64
+
+_OUTWARD = np.diag([1.0, 100.0])  # kg, and percent of 0..1
+
+
+def response_to(found: Weighed, calibration: CrossSpectrumCalibration, day: Mapping[str, float]) -> F64:
+    """(2,) kg and percent, to first order: data move as the truth does, and the fit calls it load.
+
+    What is steady in the fit moves the load by minus its own slope; what drifts is fitted but for the part that its
+    prior holds back.
+    """
+    at = _at(found, calibration)
+    steady = at.steady[-2:] @ [day.get(PARAMETERS[i], 0.0) for i in STEADY]
+    drifting = _held_back(at) @ [day.get(PARAMETERS[i], 0.0) for i in DRIFTING]
+    response: F64 = -_OUTWARD @ (steady + drifting)
+    return response
+
+
+def day_covariance(found: Weighed, calibration: CrossSpectrumCalibration) -> F64:
+    """(2, 2) that the posterior states of the day: its columns, and what the search itself believed of dampers, which
+    stands in the batch's own covariance.
+    """
+    is_damper = np.array([name.startswith("damper_") for name in DRIFT_STD], dtype=float)
+    believed = np.linalg.inv(DRIFT_PRECISION) * np.outer(is_damper, is_damper)
+    held = _OUTWARD @ _held_back(_at(found, calibration))
+    columns = found.posterior.sources[Source.DAY]
+    covariance: F64 = columns.T @ columns + held @ believed @ held.T
+    return covariance
+
+
+def _at(found: Weighed, calibration: CrossSpectrumCalibration) -> Answer:
+    point, ground = found.located.point, calibration.ground
+    spectra = with_strokes(found.spectra.without_roll, calibration.parameters, point.load, ground)
+    return answer_at(Whittle(spectra, ground), point)
+
+
+def _held_back(at: Answer) -> F64:
+    """(2, k) of the load by the parameters that drift."""
+    held: F64 = at.covariance[-2:, : len(DRIFTING)] @ DRIFT_PRECISION
+    return held

@@ -1,0 +1,179 @@
+"""All sources at once: vans that differ from their calibration in everything that the estimator allows for.
+
+    together(n_vans, seed) -> one Row for each of: with or without a roll rate, what is carried said or not
+
+The fitter is wrong about the empty share, springs, tyres and dampers are those of another day, the sensors have another
+temperature, loads have every length and height and stand somewhere across the floor.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from itertools import product
+from typing import Any, Final
+
+import numpy as np
+
+from benchmarks.accuracy.budget.nature import (
+    amplified,
+    as_stated,
+    drawn_day,
+    drawn_gains,
+    drawn_share_pct,
+    on_that_day,
+    place_std_m,
+    to_one_side,
+)
+from benchmarks.accuracy.coverage_drives import EMPTY_SHARE, TRIPS, Scope, known_run, rows_of, without_roll_rate
+from benchmarks.accuracy.loads import SAYS, Shape, shaped_load
+from benchmarks.accuracy.vans import FreshVan, OnVan, fresh_van, of_each_van
+from gateway.calibration.judgement import coverage_of
+from gateway.calibration.judgement.coverage import interval_scores
+from gateway.calibration.judgement.learning_curve import calibrated_on
+from gateway.calibration.known_run import KnownRun
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.estimator import estimate
+from gateway.core.vehicle import cg_left_m
+from gateway.estimate import Estimate
+from gateway.records import Why
+
+ESTIMATOR: Final = "cross_spectrum"
+MIXED: Final = TRIPS["mixed"]
+QUANTITIES: Final = ("payload", "front_share", "cg_left")
+PERCENT_OF_M: Final = 100.0  # lateral places are stated in metres: in centimetres on the page
+
+
+@dataclass(frozen=True, slots=True)
+class Weighing:
+    """One batch: its run, whether a roll rate was read and the shape said, and for each quantity that was answered the
+    error, half-width and interval score (percent of the range; cm of places) and the error squared over its variance.
+    """
+
+    van: str
+    run: str
+    has_roll_rate: bool
+    is_shape_said: bool
+    rejected: tuple[str, ...]
+    judged: dict[str, tuple[float, float, float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """One quantity over many batches; None where too few were answered."""
+
+    n: int
+    mean_abs: float | None
+    z2: float | None
+    half_width: float | None
+    interval_score: float | None
+    coverage: dict[str, Any] | None
+    coverage_by_van: dict[str, Any] | None
+
+
+def together(
+    n_vans: int, seed: int, *, workers: int = 1, on_van: OnVan = lambda done, of: None
+) -> list[dict[str, Any]]:
+    """Calibrate and drive every van."""
+    vans = of_each_van(partial(of_one_van, Scope(n_vans=n_vans), seed), n_vans, workers, on_van)
+    return rows_of_weighings([one for of_van in vans for one in of_van])
+
+
+def rows_of_weighings(weighings: Sequence[Weighing]) -> list[dict[str, Any]]:
+    """A row for each of the four ways."""
+    rows = []
+    for has_roll_rate, is_said in product((True, False), repeat=2):
+        some = [one for one in weighings if (one.has_roll_rate, one.is_shape_said) == (has_roll_rate, is_said)]
+        reasons = [why for one in some for why in one.rejected]
+        rows.append(
+            {
+                "has_roll_rate": has_roll_rate,
+                "is_shape_said": is_said,
+                "n_batches": len(some),
+                "n_rejected": sum(bool(one.rejected) for one in some),
+                "rejected_by_reason": {why: reasons.count(why) for why in sorted({*reasons})},
+                **{name: asdict(figures_of(name, some)) for name in QUANTITIES},
+            }
+        )
+    return rows
+
+
+def figures_of(quantity: str, weighings: Iterable[Weighing]) -> Figures:
+    """Over those that answered it."""
+    answered = [one for one in weighings if quantity in one.judged]
+    if not answered:
+        return Figures(0, None, None, None, None, None, None)
+    error, half_width, score, z2 = np.array([one.judged[quantity] for one in answered]).T
+    held = [one.judged[quantity][2] <= 2.0 * one.judged[quantity][1] * (1.0 + 1e-9) for one in answered]
+    by_run, by_van = ([one.run for one in answered], [one.van for one in answered])
+    return Figures(
+        len(answered),
+        float(np.mean(np.abs(error))),
+        float(np.mean(z2)),
+        float(np.mean(half_width)),
+        float(np.mean(score)),
+        *(asdict(coverage_of(held, each)) if len({*each}) > 1 else None for each in (by_run, by_van)),
+    )
+
+
+def of_one_van(scope: Scope, seed: int, number: int) -> list[Weighing]:
+    """One van, calibrated with and without its roll rate, on the same drives."""
+    fresh = fresh_van(scope, seed, number)
+    vehicle, runs = as_stated(fresh.vehicle, fresh.runs, drawn_share_pct(fresh.vehicle, fresh.rng))
+    drives = [_driven(fresh, scope, one, i) for i, one in enumerate(fresh.test_seed.spawn(2 * scope.n_tests), 1)]
+    found: list[Weighing] = []
+    for has_roll_rate in (True, False):
+        seen = runs if has_roll_rate else [without_roll_rate(run) for run in runs]
+        calibrated = calibrated_on(seen, vehicle, ESTIMATOR)
+        for run, shape in drives:
+            heard = run if has_roll_rate else without_roll_rate(run)
+            for is_said in (False, True):
+                ready = _saying(calibrated, shape) if is_said else calibrated
+                found += _weighed(heard, ready, fresh, has_roll_rate=has_roll_rate, is_said=is_said)
+    return found
+
+
+def _driven(fresh: FreshVan, scope: Scope, seeds: np.random.SeedSequence, number: int) -> tuple[KnownRun, Shape]:
+    """A drive on another day with a load of any shape, sometimes with none; its front share is the true one."""
+    rng, van = fresh.rng, fresh.van
+    today, gains = on_that_day(van, drawn_day(rng)), drawn_gains(rng)
+    shape = list(Shape)[int(rng.integers(len(Shape)))]
+    mass_kg, place_m = float(rng.uniform(0.05, 1.0)) * van.rated_payload_kg, float(rng.uniform(0.15, 1.0))
+    loads = shaped_load(shape, van, mass_kg, place_m * van.wheelbase_m, rng)
+    left_m = place_std_m(fresh.vehicle) * float(rng.standard_normal())
+    carried = () if rng.random() < EMPTY_SHARE else loads
+    rows, driven, on_board = rows_of(today, carried, to_one_side(MIXED, left_m), scope, seeds, fresh.sensors)
+    return known_run(amplified(rows, gains), number, MIXED.kind, driven, on_board), shape
+
+
+def _saying(calibrated: CalibratedVehicle, shape: Shape) -> CalibratedVehicle:
+    vehicle = replace(calibrated.vehicle, carries=SAYS[shape], roof_rack=shape is Shape.ROOF)
+    return replace(calibrated, vehicle=vehicle)
+
+
+def _weighed(
+    run: KnownRun, calibrated: CalibratedVehicle, fresh: FreshVan, *, has_roll_rate: bool, is_said: bool
+) -> Iterator[Weighing]:
+    vehicle = fresh.vehicle
+    truths = {
+        "payload": (run.payload_kg, 100.0 / (vehicle.payload_range_kg[1] - vehicle.payload_range_kg[0])),
+        "front_share": (
+            run.front_share_pct, 100.0 / (vehicle.front_share_range_pct[1] - vehicle.front_share_range_pct[0]),
+        ),
+        "cg_left": (cg_left_m(vehicle, run.payload_kg, run.payload_left_m or 0.0), PERCENT_OF_M),
+    }  # fmt: skip
+    for batch in run.batches:
+        found = estimate(batch, calibrated, ESTIMATOR)
+        if Why.TOO_SHORT not in found.rejected:
+            judged = {name: _judged(found, name, *truth) for name, truth in truths.items()} if found.counted else {}
+            known = {name: row for name, row in judged.items() if math.isfinite(row[0])}
+            rejected = tuple(map(str, found.rejected))
+            yield Weighing(vehicle.name, f"{vehicle.name} {run.number}", has_roll_rate, is_said, rejected, known)
+
+
+def _judged(found: Estimate, quantity: str, true: float, scale: float) -> tuple[float, float, float, float]:
+    answer = getattr(found, quantity)
+    low, high = answer.interval95
+    (score,) = interval_scores(np.array([true]), np.array([low]), np.array([high])).tolist()
+    error = answer.number - true
+    return scale * error, scale * 0.5 * (high - low), scale * score, (error / answer.std) ** 2
