@@ -55,7 +55,7 @@ def reasons_router() -> APIRouter:
 
     @router.get("/reasons", response_model=ReasonsInWords)
     async def reasons() -> Response:
-        """What each reason in ``rejected`` and each source in ``error_budget`` means; fixed by the service's version."""
+        """What each reason in ``rejected`` and each source in ``error_budget`` means; fixed by the version."""
         return Response(body, media_type="application/json")
 
     return router
