@@ -80,6 +80,23 @@ _WEIGHTS: Final = Weights(
     Weight(421.2, 3.8, None, None),
 )
 
+_BUDGET: Final = [
+    {
+        "source": "load_length",
+        "payload_kg": 5.2,
+        "front_share_pct": 0.08,
+        "cg_left_m": None,
+        "remedy": "say_what_is_carried",
+        "payload_with_remedy_kg": 4.2,
+    }
+]
+_POSTERIOR: Final = {
+    "mean": [271.3, 50.4],
+    "own": [[10.2, 0.1], [0.1, 0.004]],
+    "sources": {"load_length": [[5.2, 0.08]]},
+    "tails": [1.96, 1.96],
+}
+
 FIELDS: Final = (
     _field("id", "id", TEXT, "the same for the same batch, whenever it is computed", _ID),
     _field("vehicle_id", "vehicle_id", TEXT, "as the settings name it", "van-17"),
@@ -226,7 +243,7 @@ FIELDS: Final = (
         "error_budget",
         BUDGET,
         "what each source adds to the error, largest payload first: one standard deviation each",
-        [],
+        _BUDGET,
         _LATER,
     ),
     EstimateField(
@@ -234,7 +251,8 @@ FIELDS: Final = (
         "posterior",
         POSTERIOR,
         "mean, own covariance and columns by source, in kg, % and m; null: no answer",
-        presence=_KNOWN,
+        _POSTERIOR,
+        _KNOWN,
     ),
     EstimateField(
         "measured_posterior",

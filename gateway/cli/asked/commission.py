@@ -55,7 +55,9 @@ def commission() -> None:
 )
 @click.option("--track-m", type=NUMBER, default=None, help="between the middles of left and right tyres")
 @click.option("--payload-kg", type=NUMBER, default=None, help="most that it may carry [default: as its line, else 450]")
-@click.option("--carries", type=click.Choice(list(Carries)), default=None, help="what it usually carries")
+@click.option(
+    "--carries", type=click.Choice([str(one) for one in Carries]), default=None, help="what it usually carries"
+)
 @click.option("--payload-length-m", type=NUMBER, default=None, help="how far along the floor that usually reaches")
 @click.option("--payload-height-m", type=NUMBER, default=None, help="how high above the floor")
 @click.option("--roof-rack", is_flag=True, default=None, help="part of the load may lie on the roof")
