@@ -81,6 +81,7 @@ class EventStream(Response):
         """Records by their numbers, and between them, in its place, what is not stored."""
         yield b"retry: %d\n\n" % RETRY_MS
         while True:
+            is_last = subscription.ended.is_set()  # before the last look: what came before the end still goes out
             passing = subscription.take()
             while records := await asyncio.to_thread(_read, follower):
                 for record in records:
@@ -90,7 +91,7 @@ class EventStream(Response):
                     yield StreamEvent.of(record.kind, record.text, record.cursor).wire
             if passing is not None:
                 yield passing[1].wire
-            if subscription.ended.is_set():
+            if is_last:
                 return
             if not await subscription.wait(self._keep_alive_s):
                 yield b": keep-alive\n\n"
