@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
+from support.estimates import posterior_of
 from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.estimate import Epoch, Quantity
+from gateway.core.fusion import epoch_of
 from gateway.records import Why
 from gateway.status import AlarmsStatus, OwnReading, Standing, State
 
@@ -40,13 +41,13 @@ def test_it_tells_how_much_more_may_go_in_the_tightest_first(gateway: Gateway) -
     assert cab["room"][0]["kg"] == 169.2
     assert (cab["light"], cab["light_about"], cab["has_limits"]) == ("go", [], True)
     assert cab["over_limit_probability"] < 1e-3
-    assert (cab["payload_kg"], cab["payload_interval95_kg"]) == (300.0, [288.0, 312.0])
+    assert (cab["payload_kg"], cab["payload_interval95_kg"]) == (300.0, [288.2, 311.8])
     assert (cab["load"], cab["age_s"], cab["is_stale"], cab["is_early"]) == ("weighed", 0.0, False, False)
     assert cab["vehicle_id"] == "van-17"
 
 
 def test_it_weighs_by_all_batches_of_the_load_together(gateway: Gateway) -> None:
-    one = replace(loaded(0, 300.0, 48.0), epoch=Epoch(Quantity(290.0, 3.0), Quantity(48.0, 0.1), 4))
+    one = replace(loaded(0, 300.0, 48.0), epoch=epoch_of(posterior_of(290.0, 48.0, 3.0, 0.1), 4))
     gateway.publish(one)
     cab = told(gateway)
     assert cab["room"][2]["kg"] == 310.0

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 import yaml
-from support.estimates import make_estimate, make_record
+from support.estimates import make_estimate, make_record, posterior_of
 from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
@@ -46,14 +46,13 @@ def client(gateway: Gateway, vehicle: Vehicle | None = VAN) -> Client:
 
 
 def loaded(n: int, payload_kg: float = 100.0) -> Estimate:
-    return replace(make_estimate(n), payload=Quantity(payload_kg, 6.0), front_share=Quantity(50.0, 0.5))
+    return make_estimate(n).answered(posterior_of(payload_kg, 50.0, 6.0, 0.5))
 
 
 def to_the_left(n: int) -> Estimate:
     """50 mm."""
     return replace(
-        loaded(n),
-        cg_left=Quantity(0.05, 0.004),
+        make_estimate(n).answered(posterior_of(100.0, 50.0, 6.0, 0.5, cg_left_m=0.05)),
         left_share=Quantity(53.3, 0.27),
         roll_share_front=0.6,
         roll_share_front_std=0.05,
@@ -107,12 +106,13 @@ def test_every_record_brings_its_weights_to_the_history(gateway: Gateway) -> Non
         "kg": 406.8,
         "std_kg": 4.840601,  # of 1.62, 3.35, 2.144 and 2.233 kg by payload, share, place and the axles' part
         "limit_kg": 400.0,
+        "interval95_kg": [397.312597, 416.287403],
         "is_over_limit": True,
         "lacks": None,
         "is_unsprung_estimated": False,
     }
     assert refusal["weights"]["gross"]["lacks"] == "calibration"
-    assert (answer["cg_left_m"], answer["left_share_pct"]) == (0.05, 53.3)
+    assert (answer["cg_left_m"], answer["left_share_pct"]) == (0.05, 53.3333333)
 
 
 def test_an_overload_is_warned_of_until_it_is_clearly_over(gateway: Gateway) -> None:

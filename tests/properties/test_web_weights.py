@@ -1,6 +1,7 @@
 """Weights obey statics: wheels and axles add up to the whole, loads move where the payload is, errors add up."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,6 @@ from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share
 from gateway.core.weights import (
     RELEASE_SHARE,
     Place,
-    Sideways,
     is_over_limit,
     place_of,
     unsprung_kg,
@@ -20,6 +20,7 @@ from gateway.core.weights import (
     weights_of,
 )
 from gateway.estimate import PLACES, Z95, Estimate, Lack, Quantity, Weights
+from gateway.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source, exactly
 from gateway.records import F64
 
 VAN = Vehicle("van", 1240.0, 2.8, empty_front_share_pct=52.0, unsprung_front_kg=90.0, unsprung_rear_kg=110.0)
@@ -30,16 +31,23 @@ shares = st.floats(20.0, 80.0)
 deviations = st.floats(0.0, 50.0)
 
 
+def believed(mean: Sequence[float], std: Sequence[float], correlation: float = 0.0) -> Posterior:
+    """Payload (kg), front share (%) and, if given, lateral place (m); the correlation is of the first two."""
+    together = np.eye(len(mean))
+    together[PAYLOAD, FRONT_SHARE] = together[FRONT_SHARE, PAYLOAD] = correlation
+    return Posterior(np.array(mean, float), np.outer(std, std) * together)
+
+
 def axle_loads(
     vehicle: Vehicle, kg: float, std_kg: float, share_pct: float, share_std_pct: float, correlation: float = 0.0
 ) -> Weights:
-    return weights_of(vehicle, Quantity(kg, std_kg), Quantity(share_pct, share_std_pct), correlation)
+    return weights_of(vehicle, believed([kg, share_pct], [std_kg, share_std_pct], correlation))
 
 
 def placed(
     vehicle: Vehicle, kg: float, std_kg: float, share_pct: float, share_std_pct: float, correlation: float = 0.0
 ) -> Place | None:
-    return place_of(vehicle, Quantity(kg, std_kg), Quantity(share_pct, share_std_pct), correlation)
+    return place_of(vehicle, believed([kg, share_pct], [std_kg, share_std_pct], correlation))
 
 
 @given(payloads, deviations, shares, st.floats(0.0, 3.0))
@@ -47,7 +55,7 @@ def test_the_axles_carry_the_whole(payload_kg: float, std_kg: float, share_pct: 
     weights = axle_loads(VAN, payload_kg, std_kg, share_pct, share_std_pct)
     assert weights.gross.kg == pytest.approx(1240.0 + 200.0 + payload_kg)
     assert weights.front_axle.kg + weights.rear_axle.kg == pytest.approx(weights.gross.kg)
-    assert weights.gross.std_kg == std_kg
+    assert weights.gross.std_kg == pytest.approx(std_kg)
 
 
 @given(payloads, positions)
@@ -132,10 +140,16 @@ def test_the_deviation_of_the_place_is_that_of_many_draws(correlation: float) ->
     share_pct = front_share_pct(VAN, 270.0, 1.3)
     pairs = zip(*draws(8.0, share_pct, 0.3, correlation), strict=True)
     drawn = [place.position_m for p, s in pairs if (place := placed(VAN, p, 0.0, s, 0.0)) is not None]
-    exact = replace(VAN, empty_front_share_std_pct=0.0)
-    told = placed(exact, 270.0, 8.0, share_pct, 0.3, correlation)
+    told = placed(VAN, 270.0, 8.0, share_pct, 0.3, correlation)
     assert told is not None
     assert told.std_m == pytest.approx(float(np.std(drawn)), rel=0.03)
+
+
+def test_what_the_empty_share_adds_to_the_share_moves_no_place() -> None:
+    """It is in the share of the empty vehicle too, and drops out."""
+    own = believed([270.0, 48.0], [8.0, 0.3], -0.6)
+    with_empty_share = own.with_source(Source.EMPTY_SHARE, np.array([[0.0, 0.5]]))
+    assert place_of(VAN, with_empty_share) == place_of(VAN, own)
 
 
 @given(st.floats(-100.0, 100.0), st.floats(0.1, 50.0), shares)
@@ -151,8 +165,8 @@ roll_shares = st.floats(0.0, 1.0)
 
 
 def on_wheels(payload_kg: float, share_pct: float, left_m: float, roll_share: float) -> Weights:
-    sideways = Sideways(Quantity(left_m, 0.004), roll_share, 0.05)
-    return weights_of(TRACKED, Quantity(payload_kg, 6.0), Quantity(share_pct, 0.3), 0.1, sideways)
+    posterior = believed([payload_kg, share_pct, left_m], [6.0, 0.3, 0.004], 0.1)
+    return weights_of(TRACKED, posterior, Quantity(roll_share, 0.05))
 
 
 @given(payloads, shares, offsets, roll_shares)
@@ -188,54 +202,54 @@ def test_a_load_to_the_other_side_swaps_the_wheels(
 @given(payloads, offsets)
 def test_the_left_share_is_that_of_the_wheels_without_axles(payload_kg: float, left_m: float) -> None:
     bare = replace(TRACKED, unsprung_front_kg=0.0, unsprung_rear_kg=0.0)
-    sideways = Sideways(Quantity(left_m, 0.0), 0.6, 0.0)
-    weights = weights_of(bare, Quantity(payload_kg, 0.0), Quantity(51.0, 0.0), 0.0, sideways)
+    weights = weights_of(bare, exactly(payload_kg, 51.0, left_m), Quantity(0.6, 0.0))
     share_pct = 100.0 * (weights.front_left.kg + weights.rear_left.kg) / weights.gross.kg
     assert left_share_pct(left_m, 1.5) == pytest.approx(share_pct)
 
 
-def sideways_draws() -> tuple[F64, F64]:
-    """Covariance of payload (kg), share (0..1), lateral place (m) and roll share, and draws with it."""
-    stds = np.array([8.0, 0.004, 0.006, 0.05])
-    together = np.eye(4)
-    together[0, 1] = together[1, 0] = -0.6
-    together[0, 2] = together[2, 0] = 0.3
-    together[1, 2] = together[2, 1] = -0.4
-    covariance = np.outer(stds, stds) * together
-    return stds, np.random.default_rng(11).multivariate_normal([270.0, 0.48, 0.08, 0.58], covariance, 20_000)
+ROLL_SHARE = Quantity(0.58, 0.05)
+
+
+def sideways_posterior() -> Posterior:
+    """Of payload (kg), share (%) and lateral place (m), whose errors all go together: in part by a shared cause."""
+    together = np.array([[1.0, -0.6, 0.3], [-0.6, 1.0, -0.4], [0.3, -0.4, 1.0]])
+    stds = np.array([8.0, 0.4, 0.006])
+    shared = np.array([[4.0, -0.15, 0.002]])
+    own = np.outer(stds, stds) * together - shared.T @ shared
+    return Posterior(np.array([270.0, 48.0, 0.08]), own, {Source.MODEL: shared})
+
+
+def sideways_draws() -> F64:
+    """Loads (8000, 3) with that covariance."""
+    posterior = sideways_posterior()
+    return np.random.default_rng(11).multivariate_normal(posterior.mean, posterior.covariance, 8000)
 
 
 @pytest.mark.parametrize("name", PLACES)
 def test_deviations_of_wheels_are_those_of_many_draws(name: str) -> None:
-    stds, draws = sideways_draws()
+    draws = sideways_draws()
+    roll_shares = np.random.default_rng(12).normal(ROLL_SHARE.number, ROLL_SHARE.std, len(draws))
     drawn_kg = [
-        getattr(weights_of(TRACKED, Quantity(p), Quantity(100.0 * s), 0.0, Sideways(Quantity(y), phi)), name).kg
-        for p, s, y, phi in draws[:8000]
+        getattr(weights_of(TRACKED, exactly(*load), Quantity(roll_share)), name).kg
+        for load, roll_share in zip(draws, roll_shares, strict=True)
     ]
-    told = weights_of(
-        TRACKED,
-        Quantity(270.0, stds[0]),
-        Quantity(48.0, 100.0 * stds[1]),
-        -0.6,
-        Sideways(Quantity(0.08, stds[2]), 0.58, stds[3], 0.3, -0.4),
-    )
+    told = weights_of(TRACKED, sideways_posterior(), ROLL_SHARE)
     assert getattr(told, name).std_kg == pytest.approx(float(np.std(drawn_kg)), rel=0.04)
 
 
+@pytest.mark.parametrize("name", PLACES)
+def test_intervals_of_weights_hold_95_of_100_draws(name: str) -> None:
+    draws = sideways_draws()
+    drawn_kg = np.array([getattr(weights_of(TRACKED, exactly(*load), Quantity(0.58)), name).kg for load in draws])
+    low_kg, high_kg = getattr(weights_of(TRACKED, sideways_posterior(), Quantity(0.58, 0.0)), name).interval95_kg
+    assert np.mean(drawn_kg < low_kg) == pytest.approx(0.025, abs=0.006)
+    assert np.mean(drawn_kg > high_kg) == pytest.approx(0.025, abs=0.006)
+
+
 def test_the_place_across_and_its_covariance_are_those_of_many_draws() -> None:
-    stds, draws = sideways_draws()
-    places = [
-        place_of(TRACKED, Quantity(p, 0.0), Quantity(100.0 * s), 0.0, Sideways(Quantity(y)))
-        for p, s, y, _ in draws[:8000]
-    ]
+    places = [place_of(TRACKED, exactly(*load)) for load in sideways_draws()]
     drawn = np.array([(place.position_m, place.left_m) for place in places if place is not None])
-    told = place_of(
-        replace(TRACKED, empty_front_share_std_pct=0.0),
-        Quantity(270.0, stds[0]),
-        Quantity(48.0, 100.0 * stds[1]),
-        -0.6,
-        Sideways(Quantity(0.08, stds[2]), 0.58, stds[3], 0.3, -0.4),
-    )
+    told = place_of(TRACKED, sideways_posterior())
     assert told is not None
     assert (told.std_m, told.left_std_m) == pytest.approx(tuple(drawn.std(axis=0)), rel=0.04)
     assert told.correlation == pytest.approx(float(np.corrcoef(drawn.T)[0, 1]), abs=0.04)
@@ -243,9 +257,8 @@ def test_the_place_across_and_its_covariance_are_those_of_many_draws() -> None:
 
 @given(st.floats(20.0, 800.0), positions, offsets)
 def test_the_place_across_is_the_place_loaded(payload_kg: float, position_m: float, left_m: float) -> None:
-    sideways = Sideways(Quantity(cg_left_m(TRACKED, payload_kg, left_m), 0.0))
-    share = Quantity(front_share_pct(TRACKED, payload_kg, position_m), 0.0)
-    place = place_of(TRACKED, Quantity(payload_kg, 1.0), share, 0.0, sideways)
+    share_pct, whole_left_m = front_share_pct(TRACKED, payload_kg, position_m), cg_left_m(TRACKED, payload_kg, left_m)
+    place = place_of(TRACKED, believed([payload_kg, share_pct, whole_left_m], [1.0, 0.0, 0.0]))
     assert place is not None
     assert place.left_m == pytest.approx(left_m, abs=1e-6)
 
@@ -257,16 +270,11 @@ def test_without_a_word_from_the_side_the_place_is_known_along_alone() -> None:
     assert [math.isnan(x) for x in (place.left_m, place.left_std_m, place.correlation)] == [True] * 3
 
 
-ANSWER = Estimate(
-    0,
-    0,
-    "",
-    payload=Quantity(270.0, 6.0),
-    front_share=Quantity(48.0, 0.3),
-    cg_left=Quantity(0.08, 0.004),
-    roll_share_front=0.58,
-    roll_share_front_std=0.05,
+ANSWER = Estimate(0, 0, "", roll_share_front=0.58, roll_share_front_std=0.05).answered(
+    believed([270.0, 48.0, 0.08], [6.0, 0.3, 0.004])
 )
+WITHOUT_PLACE = believed([270.0, 48.0], [6.0, 0.3])
+PAYLOAD_ALONE = Posterior(np.array([270.0]), np.array([[36.0]]))
 
 
 @pytest.mark.parametrize(
@@ -277,7 +285,7 @@ ANSWER = Estimate(
         (Estimate(0, 0, ""), TRACKED, Lack.ESTIMATE),
         (ANSWER, replace(TRACKED, unsprung_front_kg=None), Lack.UNSPRUNG_MASS),
         (ANSWER, replace(TRACKED, track_width_m=None), Lack.TRACK_WIDTH),
-        (replace(ANSWER, cg_left=Quantity()), TRACKED, Lack.ROLL_RATE),
+        (ANSWER.answered(WITHOUT_PLACE), TRACKED, Lack.ROLL_RATE),
         (replace(ANSWER, roll_share_front=math.nan), TRACKED, Lack.ROLL_RATE),
     ],
 )
@@ -291,7 +299,7 @@ def test_an_unknown_wheel_says_what_it_lacks(estimate: Estimate, vehicle: Vehicl
 
 def test_the_front_share_is_nothing_that_the_gross_weight_lacks() -> None:
     """It follows from the payload and what the axles weigh below their springs."""
-    no_share = replace(ANSWER, front_share=Quantity())
+    no_share = ANSWER.answered(PAYLOAD_ALONE)
     assert weighed(no_share, TRACKED).weights.gross.is_known
     weights = weighed(no_share, replace(TRACKED, unsprung_front_kg=None)).weights
     assert weights.gross.lacks is Lack.UNSPRUNG_MASS

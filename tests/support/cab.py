@@ -1,15 +1,14 @@
 """A gateway in a cab: a van with limits, loads it may carry, and what became of them."""
 
-from dataclasses import replace
 from pathlib import Path
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.events import EntryKind
 from gateway.core.vehicle import Vehicle
-from gateway.estimate import Estimate, Quantity
+from gateway.estimate import Estimate
 from gateway.records import iso_utc, json_line
 from gateway.status import Standing, State, Status
-from support.estimates import make_estimate
+from support.estimates import make_estimate, posterior_of
 from support.web import Gateway
 
 S = 1_000_000_000
@@ -37,11 +36,7 @@ def cab_gateway(directory: Path) -> Gateway:
 
 def loaded(n: int, payload_kg: float, front_share_pct: float) -> Estimate:
     """The n-th batch with this aboard."""
-    return replace(
-        make_estimate(n),
-        payload=Quantity(payload_kg, 6.0, (payload_kg - 12.0, payload_kg + 12.0)),
-        front_share=Quantity.normal(front_share_pct, 0.2),
-    )
+    return make_estimate(n).answered(posterior_of(payload_kg, front_share_pct, 6.0, 0.2))
 
 
 def load_event(gateway: Gateway, t_s: int, change_kg: float, *, is_withdrawn: bool = False) -> None:

@@ -6,12 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.epochs import START_NS, WINDOW_NS, drive_of
+from support.estimates import posterior_of
 
 from gateway.calibration.known_weight import WeightRefusal
-from gateway.core.fusion import LoadEpoch, fused, summary
+from gateway.core.change import Rules
+from gateway.core.fusion import LoadEpoch, epoch_of, fused_epoch
 from gateway.errors import WeightRefusedError
-from gateway.estimate import Estimate, Quantity
+from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json, estimate_to_json
+from gateway.posterior import PAYLOAD
 from gateway.records import Why
 from gateway.service.proving.epochs import NEAR_NS, WeighedEpoch, epoch_at, epochs_of
 from gateway.stated_weight import Drive
@@ -37,16 +40,14 @@ def test_epochs_are_those_that_fusion_made(batches: list[tuple[float, bool, str]
             t_start_ns=START_NS + n * WINDOW_NS,
             t_end_ns=START_NS + (n + 1) * WINDOW_NS,
             estimator="ratio_index",
-            payload=Quantity.normal(payload_kg, 5.0),
-            front_share=Quantity.normal(50.0, 0.3),
-            rejected=(Why.GAP,) if outcome == "rejected" else (),
-        )
-        epoch = fused(epoch, batch, is_stop)
+        ).answered(posterior_of(payload_kg, 50.0, 5.0, 0.3))
+        batch = batch if outcome == "counts" else batch.refused(Why.GAP)
+        epoch = fused_epoch(epoch, batch, Rules(), is_stop)
         if outcome == "counts":
             assert epoch is not None
-            told = (epoch.t_start_ns, epoch.payload_kg.n, epoch.payload_kg.mean)
+            told = (epoch.t_start_ns, epoch.n_batches, float(epoch.posterior.mean[PAYLOAD]))
             truth = [*truth[:-1], told] if truth and truth[-1][0] == told[0] else [*truth, told]
-            batch = replace(batch, epoch=summary(epoch))
+            batch = replace(batch, epoch=epoch_of(epoch.posterior, epoch.n_batches))
         shown.append(estimate_from_json(estimate_to_json(batch)))
     found = [(one.t_start_ns, one.n_batches, one.payload.number) for one in epochs_of(shown)]
     assert [one[:2] for one in found] == [one[:2] for one in truth]

@@ -5,7 +5,6 @@ gateway does not know them.
 """
 
 import json
-import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -19,7 +18,8 @@ from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
-from gateway.estimate import Estimate, Quantity, Weight
+from gateway.estimate import Estimate, Weight
+from gateway.estimate_json import estimate_from_json
 from gateway.history import BATCHES, Reader
 from gateway.records import iso_utc
 from gateway.status import Status
@@ -32,7 +32,6 @@ from gateway.web.schemas import problem_responses
 PREFIX: Final = "/rfms"
 TRIGGER: Final = "TIMER"  # batches end by the clock
 _PAGE: Final = 500
-_NUMBERS: Final = ("payload_kg", "payload_std_kg", "front_share_pct", "front_share_std_pct")
 _MEDIA_TYPE: Final = r"application/vnd\.fmsstandard\.com\.{service}\.v(2\.1|3\.0|4\.0)\+json"
 _ANY_JSON: Final = re.compile(r"\*/\*|application/\*|application/json", re.IGNORECASE)
 
@@ -125,10 +124,7 @@ class _Weighed:
     @classmethod
     def stored(cls, record: Mapping[str, Any]) -> "_Weighed":
         """From the store's JSON."""
-        numbers = {name: math.nan if record[name] is None else float(record[name]) for name in _NUMBERS}
-        payload = Quantity(numbers["payload_kg"], numbers["payload_std_kg"])
-        front_share = Quantity(numbers["front_share_pct"], numbers["front_share_std_pct"])
-        return cls(record["t_end"], Estimate(0, 0, "", payload=payload, front_share=front_share))
+        return cls(record["t_end"], estimate_from_json(record))
 
 
 async def _batches(
