@@ -65,8 +65,8 @@ def test_a_learning_curve_is_told_and_written(campaign: str, tmp_path: Path, mon
     page = (tmp_path / "out/learning_curve.md").read_text(encoding="utf-8")
     assert "| 2 | ratio index | 1 | 1 | no calibration |" in page
     assert (
-        "| 2 | cross spectrum | 1 | 0 | left out | 2.5 +- 0.0 | 2.5 | 100 % | 6.0 | 14.5 | 1.2 +- 0.0 | 1.2 | 50 % | 3.0 "
-        "| none | 33 % |" in page
+        "| 2 | cross spectrum | 1 | 0 | left out | 2.5 +- 0.0 | 2.5 | 100 % | 6.0 | 14.5 | 1.2 +- 0.0 | 1.2 | 50 % "
+        "| 3.0 | none | 33 % |" in page
     )
 
 
