@@ -53,6 +53,8 @@ check: .venv/.development
 	$(BIN)/python docs/make_readme_table.py --check
 	$(BIN)/python docs/make_scale.py --check
 	$(BIN)/python docs/make_fleet.py --check
+	$(BIN)/python docs/make_phone.py --check
+	$(BIN)/python docs/make_hardware.py --check
 	$(BIN)/python docs/make_site.py
 	$(BIN)/python docs/make_drawings.py --check
 	$(BIN)/python deploy/dist/audit_locks.py --advisory
@@ -134,6 +136,8 @@ docs: .venv/.development
 	$(BIN)/python docs/make_readme_table.py
 	$(BIN)/python docs/make_scale.py
 	$(BIN)/python docs/make_fleet.py
+	$(BIN)/python docs/make_phone.py
+	$(BIN)/python docs/make_hardware.py
 	$(BIN)/python docs/make_drawings.py
 
 # The documents as a site, in build/site.

@@ -6,7 +6,7 @@ from typing import Final
 from generated import keep_up_to_date, key_table
 from make_estimate import DIAGNOSTICS
 
-from gateway.archive.dataset import OVER_LIMIT, PROVENANCE, SCHEMA_VERSION, columns
+from gateway.archive.dataset import OVER_LIMIT, OWN_STD, PROVENANCE, SCHEMA_VERSION, columns
 from gateway.archive.manifest import ManifestFile, VehicleEntry
 from gateway.estimate_json import FIELDS
 
@@ -52,7 +52,7 @@ batch.window_s = 300.0                  # any key of [batch] in the settings
 id = "van-17"                           # its logs are in s3://fleet-logs/2026/van-17, and below
 vin = "WF0XXXTTGXJK12345"
 calibration = "van-17/vehicle.json"
-tare = "van-17/tare.json"               # as its gateway keeps it
+known_weights = "van-17/known_weights.json"  # as its gateway keeps it
 until = 2026-06-12                      # the day on which its springs were changed
 
 [[vehicles]]
@@ -131,8 +131,8 @@ obstore speaks, so a small proxy turned each into the JSON one, its condition al
     dask worker tcp://SCHEDULER:8786 --nthreads 1 --nworkers auto        # on each
     springscale reprocess s3://fleet/archive --output s3://fleet/estimates --scheduler tcp://SCHEDULER:8786
 
-Archive and data set must be places that every worker reaches; signal maps, calibrations and tares travel with the jobs.
-A worker with another version of the code refuses its job, and the run ends saying so.
+Archive and data set must be places that every worker reaches; signal maps, calibrations and known weights travel with
+the jobs. A worker with another version of the code refuses its job, and the run ends saying so.
 
 ## What a job is
 
@@ -146,8 +146,9 @@ The drives of one vehicle in one month (of a log's first frame, UTC), in order o
 - **At the beginning of a month** a job finds its state by reading the vehicle's logs of the 25 hours before, if the
   last of them is still under way; a drive that began earlier is taken to begin there. The batch that crosses the border
   is in the month of the log in which it ended.
-- **A tare counts while it was in use**: from the batch after the instant `at` to the instant at which it ended, by the
-  history in `tare.json`. (`springscale estimate --tare` applies the one that is in use now.)
+- **A known weight counts while it was in use**: from the batch after the instant `at` (of one that was held: of its
+  confirmation) to the instant at which it was taken back, by the history in `known_weights.json`.
+  (`springscale estimate --known-weights` applies those that are in use now.)
 - **A change of calibration** (`since`, `until`) parts a month into jobs, by the first frames of logs; nothing goes on
   from one calibration to the other.
 """
@@ -161,8 +162,8 @@ DATASET: Final = """\
     DATASET/logs/vehicle=van-17.json                              each log's hash and the instant of its first frame
 
 A job is the drives of one vehicle in one month, in order. JOB is the hash of everything that its rows follow from: the
-logs' own hashes, signal map, calibration, tares, settings, and the code that weighs. The same inputs make the same name
-and the same bytes, on one computer or on a hundred, and what is there is never written again.
+logs' own hashes, signal map, calibration, known weights, settings, and the code that weighs. The same inputs make the
+same name and the same bytes, on one computer or on a hundred, and what is there is never written again.
 
 **Readers trust receipts only.** A table is written first, its receipt last, and the receipt only where there is none
 (a conditional put). A table without a receipt is of a job that was killed, or of inputs that have changed since; it is
@@ -219,10 +220,9 @@ def archive_page() -> str:
 
 def _meaning(column: str) -> str:
     """In the words of the estimate's own page."""
-    if column in PROVENANCE:
-        return PROVENANCE[column]
-    if column in DIAGNOSTICS:
-        return DIAGNOSTICS[column]
+    others = {**PROVENANCE, **DIAGNOSTICS, **{name: words for name, (_, words) in OWN_STD.items()}}
+    if column in others:
+        return others[column]
     if column == OVER_LIMIT:
         return "places of `weights` that bear more than their limit; empty where none is known to"
     one = next(field for field in FIELDS if column in (field.name, *field.columns))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from drawings.half_car import half_car
+from drawings.mounting import mounting
 from drawings.rooms import rooms
 from drawings.service import service
 from drawings.spectra import spectra
@@ -17,6 +18,7 @@ TOLERANCE_PX: Final = 1.0  # of the spectra, which machines round differently
 IMAGES: Final = Path(__file__).with_name("images")
 DRAWINGS: Final[Mapping[str, Callable[[], str]]] = {
     "half-car.svg": half_car,
+    "mounting.svg": mounting,
     "rooms.svg": rooms,
     "service.svg": service,
     "spectra.svg": spectra,

@@ -13,7 +13,6 @@ PAGE = Path(__file__).with_name("estimate.md")
 UNITS: Final = (
     ("_kg", "kg"),
     ("_std_pct", "pp"),
-    ("tare_front_share_pct", "pp"),
     ("_pct", "%"),
     ("_left_m", "m"),
     ("_left_std_m", "m"),
@@ -34,7 +33,7 @@ NULL: Final = {
     "calibration_id": "null without a calibration",
     "payload": "null where rejected, or where the ratio index has no model of it",
     "front_share": "null where rejected, or where the ratio index has no model of it",
-    "correlation": "null where rejected, and by the ratio index",
+    "payload_front_share_correlation": "null where rejected",
     "cg_left": "null where rejected, by the ratio index, and without a roll rate",
     "left_share": "as above",
     "payload_cg_left_correlation": "as above",
@@ -56,7 +55,12 @@ NULL: Final = {
     "diagnostics": "empty where rejected before a fit",
     "epoch": "absent where rejected or provisional; the place is null where no batch told it",
     "way": "null in what early versions stored, and in an early look; what is unknown in it is null",
-    "tare": "absent where rejected, and where no tare is in use",
+    "known_weights_id": "absent where no known weight is in use",
+    "raw_payload": "absent where no known weight is in use",
+    "raw_front_share": "as above",
+    "error_budget": "empty where rejected",
+    "posterior": "absent where rejected",
+    "measured": "absent where no known weight is in use",
 }
 """When a field is unknown, by the part of Estimate that it shows. Empty: never."""
 
@@ -68,18 +72,14 @@ DIAGNOSTICS: Final = {
     "damper_front_ratio": "front dampers' rate over the calibrated",
     "damper_rear_ratio": "rear dampers' rate over the calibrated",
     "delay_scale": "by which share the rear axle came later than wheelbase and speed say",
-    "payload_drift_std_kg": "part of `payload_std_kg` that changes of vehicle and sensor since calibration may add",
-    "front_share_drift_std_pct": "the same of the front share",
-    "payload_own_std_kg": "part of `payload_std_kg` that this batch shares with no other of the load",
-    "front_share_own_std_pct": "the same of the front share",
     "tension": "how far the vehicle lies off its calibration: chi-squared of five; refused above 25.7",
     "sensor_position_score": "pull to another place or gain of the sensor, in standard deviations; refused beyond 6",
     "sensor_noise_score": "pull towards more noise in the acceleration, as roll makes it, likewise; refused above 6",
+    "payload_gyration_m2": "squared radius of gyration in pitch of the load, as the fit began with it",
     "payload_mode_hz": "frequency at which the payload rings on its floor",
     "payload_damping_ratio": "how much its floor or mount damps that, of critical",
     "delay_s": "mean time from axle to axle",
     "delay_std_s": "its standard deviation over the segments",
-    "cg_left_own_std_m": "part of `cg_left_std_m` that this batch shares with no other; absent without a roll rate",
 }
 """What cross_spectrum says of its own; the ratio index says nothing."""
 
@@ -102,10 +102,11 @@ Each batch is one JSON object, the same from `springscale estimate --json`, in t
 [MQTT](uplink.md). Unknown is null, never 0. Where `rejected` names [reasons](reasons.md), the numbers are null.
 """
 
+KNOWN: Final = ("known_weights_id", "raw_payload", "raw_front_share", "error_budget", "posterior", "measured")
 GROUPS: Final = (
     ("The batch", ("",)),
     ("Epoch: all batches of this load together", ("epoch",)),
-    ("Tare: the zero that was taken off", ("tare",)),
+    ("Known weights, and the error by its sources", KNOWN),
 )
 
 ON_THE_ROAD = """\
@@ -149,7 +150,7 @@ blanks, and so are the places in `over_limit`. Fields without a column are in th
 
 def estimate_page() -> str:
     """The whole page as Markdown."""
-    tables = [f"## {title}\n\n{_table(prefixes[0])}" for title, prefixes in GROUPS]
+    tables = [f"## {title}\n\n{_table(parts)}" for title, parts in GROUPS]
     return "\n".join([INTRODUCTION, *tables, _weights(), _diagnostics(), CSV])
 
 
@@ -167,8 +168,9 @@ def unit_of(one: EstimateField) -> str:
     return next((unit for ending, unit in UNITS if one.name.endswith(ending)), "")
 
 
-def _table(group: str) -> str:
-    named = [one for one in FIELDS if (part_of(one) if part_of(one) in ("epoch", "tare") else "") == group]
+def _table(group: tuple[str, ...]) -> str:
+    elsewhere = {part for _, parts in GROUPS for part in parts}
+    named = [one for one in FIELDS if (part_of(one) if part_of(one) in elsewhere else "") in group]
     cells = ((one.name, unit_of(one), one.description, NULL[part_of(one)], _columns(one)) for one in named)
     rows = [f"| `{name}` | {' | '.join(map(str, rest))} |" for name, *rest in cells]
     return "| field | unit | meaning | unknown | columns in CSV |\n|---|---|---|---|---|\n" + "\n".join(rows) + "\n"

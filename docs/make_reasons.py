@@ -4,7 +4,7 @@ from pathlib import Path
 
 from generated import keep_up_to_date
 
-from gateway.reasons import EXPLANATIONS, Cause
+from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
 
 PAGE = Path(__file__).with_name("reasons.md")
 
@@ -22,7 +22,23 @@ given.
 
 def reasons_page() -> str:
     """The whole page as Markdown."""
-    return "\n".join([INTRODUCTION, *(_table(cause) for cause in Cause)])
+    return "\n".join([INTRODUCTION, *(_table(cause) for cause in Cause), _budget()])
+
+
+BUDGET = """\
+## Why an estimate is uncertain
+
+`error_budget` in each estimate lists the sources of its error, largest first, each with one standard deviation and,
+where there is one, a remedy; `payload_with_remedy_kg` is the standard deviation of the payload once it is taken. The
+dashboard shows it under "Why ± 60 kg?".
+"""
+
+
+def _budget() -> str:
+    sources = [f"| `{source}` | {words} |" for source, words in SOURCES.items()]
+    remedies = [f"| `{remedy}` | {advice} |" for remedy, advice in REMEDIES.items()]
+    tables = ["| source | what it is |", "|---|---|", *sources, "", "| remedy | what to do |", "|---|---|", *remedies]
+    return BUDGET + "\n" + "\n".join(tables) + "\n"
 
 
 def _table(cause: Cause) -> str:

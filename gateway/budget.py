@@ -1,6 +1,7 @@
 """The budget of an error: what each source adds to it, largest first, and what would narrow it.
 
-Nothing here is canned: a remedy is offered where it applies, with the width that the same posterior would have after it.
+Nothing here is canned: a remedy is offered where it applies, with the width that the same posterior would have after
+it.
 """
 
 import math

@@ -33,14 +33,6 @@ class LineError(ConfigurationError):
     """Calibrations that make no line, or a vehicle that is none of theirs."""
 
 
-class TareRefusedError(SpringscaleError):
-    """A vehicle cannot be re-zeroed now. ``reason`` is one of core.tare.Refusal; the message says what to do."""
-
-    def __init__(self, reason: str, message: str) -> None:
-        super().__init__(message)
-        self.reason = reason
-
-
 class WeightRefusedError(SpringscaleError):
     """A stated weight cannot be used. ``reason`` is one of calibration.known_weight.WeightRefusal."""
 

@@ -251,7 +251,9 @@ class Estimate:
 
     @property
     def id(self) -> str:
-        """The same batch, vehicle, estimator, calibration and known weights have the same id, whenever it is computed."""
+        """The same batch, vehicle, estimator, calibration and known weights have the same id, whenever it is
+        computed.
+        """
         parts: tuple[object, ...] = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator)
         parts += (self.calibration_id, *((self.known_weights_id,) if self.known_weights_id else ()))
         digest = hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()

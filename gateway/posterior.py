@@ -44,8 +44,8 @@ NORMAL_TAILS: Final = (Z95, Z95)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posterior:
-    """Mean (d,), own covariance (d, d) and columns (k, d) by source, d being 2, 3 with a lateral place, or 1 for a payload
-    alone.
+    """Mean (d,), own covariance (d, d) and columns (k, d) by source, d being 2, 3 with a lateral place, or 1 for a
+    payload alone.
 
     ``tails`` are the distances of the 2.5 and the 97.5 % point of the error from the load's shape, in its standard
     deviations: a load can be much longer than it is thought to be, but hardly shorter.
@@ -57,6 +57,7 @@ class Posterior:
     tails: tuple[float, float] = NORMAL_TAILS
 
     def __eq__(self, other: object) -> bool:
+        """The same numbers, to the last bit."""
         if not isinstance(other, Posterior) or self.sources.keys() != other.sources.keys():
             return False
         return (
@@ -65,6 +66,9 @@ class Posterior:
             and np.array_equal(self.own, other.own)
             and all(np.array_equal(columns, other.sources[name]) for name, columns in self.sources.items())
         )
+
+    def __hash__(self) -> int:
+        return hash((self.mean.tobytes(), self.own.tobytes(), self.tails))
 
     @property
     def size(self) -> int:
@@ -162,9 +166,9 @@ def exactly(*numbers: float) -> Posterior:
 def fused(parts: Sequence[Posterior]) -> Posterior:
     """Several batches of one load together: own errors average out by their precision, shared ones stay.
 
-    The weights are W_i = (sum P)^-1 P_i with P_i the inverse of own covariance i; a batch that does not know the lateral
-    place has no precision there. Columns of one source stand for the same causes in every part and average with the
-    same weights. Raises ValueError for no part.
+    The weights are W_i = (sum P)^-1 P_i with P_i the inverse of own covariance i; a batch that does not know the
+    lateral place has no precision there. Columns of one source stand for the same causes in every part and average
+    with the same weights. Raises ValueError for no part.
     """
     if not parts:
         raise ValueError("there is no batch to fuse")
@@ -174,8 +178,12 @@ def fused(parts: Sequence[Posterior]) -> Posterior:
     precisions = [_padded(np.linalg.inv(part.own), size) for part in parts]
     own = np.linalg.inv(sum(precisions, np.zeros((size, size))))
     weights = [own @ precision for precision in precisions]
-    mean = sum((weight[:, : part.size] @ part.mean for weight, part in zip(weights, parts, strict=True)), np.zeros(size))
-    sources = {name: _averaged(name, parts, weights, size) for name in Source if any(name in one.sources for one in parts)}
+    mean = sum(
+        (weight[:, : part.size] @ part.mean for weight, part in zip(weights, parts, strict=True)), np.zeros(size)
+    )
+    sources = {
+        name: _averaged(name, parts, weights, size) for name in Source if any(name in one.sources for one in parts)
+    }
     by_payload = [float(weight[PAYLOAD, PAYLOAD]) for weight in weights]
     tails = tuple(float(np.average([one.tails[i] for one in parts], weights=np.abs(by_payload))) for i in (0, 1))
     return Posterior(mean, 0.5 * (own + own.T), sources, (tails[0], tails[1]))

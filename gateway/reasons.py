@@ -1,4 +1,4 @@
-"""Why a batch gave no estimate, in words for people: what happened, and what to do about it.
+"""Why a batch gave no estimate, or an uncertain one, in words for people: what happened, and what to do about it.
 
 docs/reasons.md and the dashboard say this. Names in backquotes are settings of ``[batch]`` unless the
 text gives another place.
@@ -10,6 +10,8 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
 
+from gateway.budget import OWN, Remedy
+from gateway.posterior import Source
 from gateway.records import Why
 
 
@@ -169,3 +171,31 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
     }
 )
+
+
+SOURCES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        OWN: "this drive's own length and road",
+        Source.CALIBRATION: "what the known loads left open of the vehicle",
+        Source.GOODS: "how long and high this vehicle's loads usually are",
+        Source.LOAD_LENGTH: "how long and high this very load is",
+        Source.DAY: "temperature and wear of springs, tyres and dampers",
+        Source.SENSOR: "the sensor's gain",
+        Source.SIDEWAYS: "where the load lies to the side",
+        Source.EMPTY_SHARE: "the empty vehicle's weight on its front axle",
+        Source.MODEL: "what the model of the vehicle leaves out",
+    }
+)
+"""The sources of an estimate's error, as parts of sentences."""
+
+REMEDIES: Final[Mapping[Remedy, str]] = MappingProxyType(
+    {
+        Remedy.DRIVE_ON: "drive another ten minutes with the same load",
+        Remedy.WEIGH_ONCE: "weigh it once, loaded, and state that as a known weight",
+        Remedy.SAY_WHAT_IS_CARRIED: "say in the vehicle's data what it carries, and how long and high that is",
+        Remedy.WEIGH_EMPTY: "tell the gateway when the vehicle is empty",
+        Remedy.READ_ROLL_RATE: "map the roll rate, if the device sends it",
+        Remedy.WEIGH_AXLES_EMPTY: "weigh both axles of the empty vehicle",
+    }
+)
+"""What would narrow an error, as parts of sentences."""

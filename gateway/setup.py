@@ -9,8 +9,8 @@ from gateway.calibration.known_weights_file import load_known_weights
 from gateway.config import Settings
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow, Identity
-from gateway.core.settings import BatchSettings
 from gateway.core.known_weights import Knowledge
+from gateway.core.settings import BatchSettings
 from gateway.core.weights import Limits
 from gateway.errors import ConfigurationError
 from gateway.files.signed import Read

@@ -15,7 +15,8 @@ class Drive(StrEnum):
 class StatedWeight:
     """Of one load: the gross weight, or both axles' weights, or the payload and, unless it is zero, its place.
 
-    ``at`` is RFC 3339. ``position_m`` is behind the front axle. ``drive`` None: whichever it must be.
+    ``at`` is RFC 3339. ``position_m`` is behind the front axle. ``drive`` None: whichever it must be. ``std_kg`` is the
+    standard deviation of each number on the scale or on the paper, None: as usual for its kind.
     """
 
     at: str
@@ -25,3 +26,4 @@ class StatedWeight:
     payload_kg: float | None = None
     position_m: float | None = None
     drive: Drive | None = None
+    std_kg: float | None = None

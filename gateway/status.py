@@ -223,7 +223,7 @@ class Status(_Told):
     vehicle_id: str | None = None
     vin: str | None = None
     calibration_id: str | None = None
-    tare_id: str | None = Field(None, description="the zero in use; null: that of the calibration")
+    known_weights_id: str | None = Field(None, description="hash of the known weights in use; null: there are none")
     estimator: str | None = None
     bus: BusStatus = BusStatus()
     decode: tuple[DecodeCount, ...] = ()

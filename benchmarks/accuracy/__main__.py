@@ -20,6 +20,7 @@ from benchmarks.accuracy import budget as on_budget
 from benchmarks.accuracy import coverage as on_coverage
 from benchmarks.accuracy import delivery as on_delivery
 from benchmarks.accuracy import disturbances as on_disturbances
+from benchmarks.accuracy import phones as on_phones
 from benchmarks.accuracy import sensitivity as on_sensitivity
 from benchmarks.accuracy import siblings as on_siblings
 from benchmarks.accuracy.bounds import limits, limits_table
@@ -191,6 +192,17 @@ def siblings(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
     with counted("calibrating lines and driving their siblings") as on_line:
         found = on_siblings.siblings(n_vans, seed, workers=workers, on_van=on_line).to_json()
     _hand_out("siblings", found, siblings_page(found), output)
+
+
+@studies.command("phones")
+@click.option("--rounds", "n_rounds", type=click.IntRange(min=1), default=2, show_default=True, help="times each van")
+@click.option("--seed", type=click.IntRange(min=0), default=on_phones.SEED, show_default=True)
+@_output
+def phones(n_rounds: int, seed: int, output: Path | None) -> None:
+    """What does a phone weigh beside a CAN IMU on the same drives? ~2 minutes a round."""
+    with counted("driving vans with a phone on the floor") as on_drive:
+        found = on_phones.phones(n_rounds, seed, on_drive)
+    _hand_out("phone_accuracy", found, on_phones.phones_page(found), output)
 
 
 @studies.command("bounds")

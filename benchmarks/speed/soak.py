@@ -162,7 +162,8 @@ def soak(hours_a_day: float, n_days: int) -> list[dict[str, float]]:
                 faults.append(fault)
             service.stop()
 
-        live(settings, lambda: load_settings(config), on_started=on_started, open_receiver=lambda: receiver)
+        while live(settings, lambda: load_settings(config), on_started=on_started, open_receiver=lambda: receiver):
+            pass
     if faults:
         raise faults[0]
     return days

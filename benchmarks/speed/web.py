@@ -87,7 +87,8 @@ def serve(directory: str, port: int) -> None:
     def publish() -> None:
         for n in range(1_000_000):
             made = estimate(n)
-            board.publish(made, store.write_estimate(estimate_to_json(made)))
+            board.publish(made)
+            store.write_estimate(estimate_to_json(made))
             time.sleep(0.1)
 
     threading.Thread(target=publish, daemon=True).start()

@@ -21,6 +21,8 @@ from typing import Any
 import grpc
 from kuksa_client.grpc import Datapoint, VSSClient, VSSClientError
 
+REFUSED = (400, grpc.StatusCode.INVALID_ARGUMENT.value[0])  # of kuksa.val.v1, of v2
+
 
 def asked(url: str) -> Any:
     """What the service answers. Raises OSError or ValueError."""
@@ -67,10 +69,23 @@ def feed(url: str, databroker: VSSClient, every_s: float, stopping: threading.Ev
             points = {path: Datapoint(None) for path in before}
         known = known_to(databroker, list(points)) if known is None and points else known
         news = {path: point for path, point in points.items() if path in (known or ()) and before.get(path) != point}
-        if news:
-            databroker.set_current_values(news)
+        for path, point in news.items():
+            publish(databroker, path, point)
         before = points
         stopping.wait(every_s)
+
+
+def publish(databroker: VSSClient, path: str, point: Datapoint) -> None:
+    """One signal. A value that the databroker refuses (out of the bounds of its type or its specification) is told,
+    and becomes not available there: no old value stands in its place. Raises VSSClientError where it fails.
+    """
+    try:
+        databroker.set_current_values({path: point})
+    except VSSClientError as fault:
+        if fault.error.get("code") not in REFUSED or point.value is None:
+            raise
+        tell(f"the databroker refuses {path} = {point.value}: {fault.error.get('message')}")
+        databroker.set_current_values({path: Datapoint(None, point.timestamp)})
 
 
 def tell(text: str) -> None:

@@ -83,7 +83,7 @@ def service() -> str:
                style="small", anchor="start")  # fmt: skip
     sheet.arrow([(first + 20, bottom), (first + 20, bottom + 40)], "blue")
     sheet.text(first + 20, bottom + 56, "MQTT", ink="soft", style="small")
-    _file(sheet, second - 30, bottom + 10, "tare.json", "owned by main")
+    _file(sheet, second - 30, bottom + 10, "known_weights.json", "owned by main")
     _file(sheet, second + 110, bottom + 10, "tokens.json", "springscale token")
     _file(sheet, third + 110, bottom + 10, "batches/", "owned by batch-keeper")
     return sheet.svg()

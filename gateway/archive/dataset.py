@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.archive.places import MISSING, Place
 from gateway.archive.receipts import Slot
+from gateway.budget import OWN
 from gateway.errors import ConfigurationError
 from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, REASONS, WEIGHTS, EstimateField, Kind
 from gateway.estimate_json.kinds import COUNT, INTERVAL, OVER_LIMIT, TEXT, WHOLE, places_over_limit
@@ -28,18 +29,14 @@ DIAGNOSTICS: Final = (
     "damper_front_ratio",
     "damper_rear_ratio",
     "delay_scale",
-    "payload_drift_std_kg",
-    "front_share_drift_std_pct",
-    "payload_own_std_kg",
-    "front_share_own_std_pct",
     "tension",
     "sensor_position_score",
     "sensor_noise_score",
+    "payload_gyration_m2",
     "payload_mode_hz",
     "payload_damping_ratio",
     "delay_s",
     "delay_std_s",
-    "cg_left_own_std_m",
 )
 """What an estimator says of its own, as docs/estimate.md explains it: a column each, null where it says nothing."""
 
@@ -50,9 +47,17 @@ PROVENANCE: Final[Mapping[str, str]] = {
     "software": "the version of springscale and the hash of the code that weighs",
     "job": "hash of everything that the row follows from; also the name of its file and receipt",
 }
-"""Columns that no estimate has; `calibration_id` and `tare_id` are among the estimate's own."""
+"""Columns that no estimate has; `calibration_id` and `known_weights_id` are among the estimate's own."""
 
-_LEFT_OUT: Final = frozenset({"spectra", "provisional", "way"})  # large; never true of a whole batch; of many parts
+_LEFT_OUT: Final = frozenset({"spectra", "provisional", "way", "posterior", "measured_posterior"})
+"""Large; never true of a whole batch; of many parts."""
+
+OWN_STD: Final[Mapping[str, tuple[str, str]]] = {
+    "payload_own_std_kg": ("payload_kg", "part of `payload_std_kg` that this batch shares with no other"),
+    "front_share_own_std_pct": ("front_share_pct", "the same of `front_share_std_pct`"),
+    "cg_left_own_std_m": ("cg_left_m", "the same of `cg_left_std_m`"),
+}
+"""Columns of `error_budget`: its line of the batch's own error, and what it means."""
 
 
 def columns() -> dict[str, str]:
@@ -124,6 +129,8 @@ def schema() -> "pa.Schema":
 def _columns_of(one: EstimateField) -> dict[str, str]:
     if one.name == "diagnostics":
         return dict.fromkeys(DIAGNOSTICS, "number")
+    if one.name == "error_budget":
+        return dict.fromkeys(OWN_STD, "number")
     if one.kind is WEIGHTS:
         return dict.fromkeys(one.columns, "number") | {OVER_LIMIT: "texts"}
     return dict.fromkeys(one.columns or (one.name,), _kind_name(one.kind))
@@ -142,6 +149,9 @@ def _cells_of(one: EstimateField, told: Any) -> dict[str, Any]:
 def _cells(one: EstimateField, told: Any) -> Sequence[Any]:
     if one.name == "diagnostics":
         return [told.get(name) for name in DIAGNOSTICS]
+    if one.name == "error_budget":
+        own: Mapping[str, Any] = next((line for line in told if line["source"] == OWN), {})
+        return [own.get(name) for name, _ in OWN_STD.values()]
     if one.kind is WEIGHTS:
         return [*one.kind.cells(told)[:-1], places_over_limit(told)]
     if one.kind is INTERVAL:

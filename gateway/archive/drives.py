@@ -81,7 +81,7 @@ class Drives:
     def _weighed(self, flow: Flow, batches: Iterable[Batch]) -> list[Estimate]:
         found = []
         for batch in batches:
-            flow.tare = self._job.tare_at(batch.t_end_ns)
+            flow.knowledge = self._job.knowledge_at(batch.t_end_ns)
             found.append(flow.weigh(batch))
         return found
 

@@ -1,6 +1,6 @@
 """Which logs make which jobs: one vehicle's drives of one month in order, by one calibration, named by their inputs.
 
-Where a log goes on where the one before it ended, the drive goes on: its window, its load epoch and its tare. So a job
+Where a log goes on where the one before it ended, the drive goes on: its window and its load epoch. So a job
 begins as the last logs before it leave the pipeline (``lead_in``), and leaves a window open that the next job ends.
 """
 
@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any, Final
 
 from gateway.archive.dataset import SCHEMA_VERSION
@@ -19,11 +19,11 @@ from gateway.archive.places import Place
 from gateway.archive.receipts import Slot
 from gateway.archive.software import software
 from gateway.archive.survey import Facts, LogFacts, LogFile
-from gateway.calibration.tare_file import TareHistory
+from gateway.calibration.known_weights_file import KnownWeights
 from gateway.core.flow import Identity
+from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
-from gateway.core.tare import Tare
-from gateway.estimate_json import INSTANT
+from gateway.records import ns_of
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
 
@@ -33,10 +33,10 @@ UNKNOWN_MONTH: Final = "unknown"
 
 
 @dataclass(frozen=True, slots=True)
-class TareSpan:
-    """A tare and when it was in use."""
+class KnowledgeSpan:
+    """What known weights taught, and when that was in use."""
 
-    tare: Tare
+    knowledge: Knowledge
     since_ns: int
     until_ns: int
 
@@ -67,7 +67,7 @@ class Job:
     identity: Identity
     setup: Setup
     settings: BatchSettings
-    tares: tuple[TareSpan, ...]
+    known_weights: tuple[KnowledgeSpan, ...]
     lead_in: tuple[JobLog, ...]
     logs: tuple[JobLog, ...]
     next_ns: int | None
@@ -78,9 +78,9 @@ class Job:
         """Bytes of its own logs."""
         return sum(one.log.size for one in self.logs)
 
-    def tare_at(self, t_ns: int) -> Tare | None:
-        """The tare in use when a batch ended."""
-        return next((span.tare for span in reversed(self.tares) if span.since_ns < t_ns <= span.until_ns), None)
+    def knowledge_at(self, t_ns: int) -> Knowledge | None:
+        """What known weights had taught when a batch ended."""
+        return next((span.knowledge for span in self.known_weights if span.since_ns < t_ns <= span.until_ns), None)
 
 
 def plan(
@@ -102,16 +102,16 @@ def plan(
     identity = Identity(assignment.vehicle, assignment.vin)
     for month, lead_in, own, next_ns in _months(_in_order(logs, facts, assignment.span_ns)):
         start_ns, end_ns = (lead_in or own)[0].start_ns, FOREVER_NS if next_ns is None else next_ns
-        tares = _spans(assignment.tares, setup, start_ns, end_ns)
+        known = _spans(assignment.known_weights, setup, start_ns, end_ns)
         inputs = {
             **common,
-            "tares": [[span.tare.id, span.since_ns, span.until_ns] for span in tares],
+            "known_weights": [[span.knowledge.id, span.since_ns, span.until_ns] for span in known],
             "lead_in": [one.facts.sha256 for one in lead_in],
             "logs": [[one.log.name, one.facts.sha256] for one in own],
             "next_ns": next_ns,
         }
         slot = Slot(assignment.vehicle, month, hash_of(inputs))
-        yield Job(dataset, slot, identity, setup, settings, tares, tuple(lead_in), tuple(own), next_ns, inputs)
+        yield Job(dataset, slot, identity, setup, settings, known, tuple(lead_in), tuple(own), next_ns, inputs)
 
 
 def _months(logs: Sequence[JobLog]) -> Iterator[tuple[str, Sequence[JobLog], Sequence[JobLog], int | None]]:
@@ -147,16 +147,21 @@ def signals_id(setup: Setup) -> str:
     return "sha256:" + hashlib.sha256(content.encode()).hexdigest()
 
 
-def _spans(history: TareHistory, setup: Setup, start_ns: int, end_ns: int) -> tuple[TareSpan, ...]:
-    """The tares that were in use within a span of time, oldest first: they lie one on the other."""
+def _spans(known: KnownWeights, setup: Setup, start_ns: int, end_ns: int) -> tuple[KnowledgeSpan, ...]:
+    """What the known weights of a gateway taught, from each change of their list to the next, within a span of time."""
     calibration_id = setup.calibration.id if setup.calibration else None
-    spans = (
-        TareSpan(
-            entry.for_core(),
-            INSTANT.read(entry.at),
-            FOREVER_NS if entry.ended is None else INSTANT.read(entry.ended.at),
-        )
-        for entry in history.entries
-        if (entry.calibration_id, entry.estimator) == (calibration_id, setup.estimator)
-    )
-    return tuple(span for span in spans if span.since_ns < end_ns and span.until_ns >= start_ns)
+    moments = {
+        ns_of(moment)
+        for one in known.entries
+        for moment in (one.at, one.confirmed and one.confirmed.at, one.ended and one.ended.at)
+        if moment
+    }
+    changes = [*sorted(moments), FOREVER_NS]
+    spans = []
+    for since_ns, until_ns in pairwise(changes):
+        if since_ns >= end_ns or until_ns < start_ns:
+            continue
+        knowledge = known.as_of(since_ns + 1).knowledge(calibration_id, setup.estimator)
+        if knowledge is not None:
+            spans.append(KnowledgeSpan(knowledge, since_ns, until_ns))
+    return tuple(spans)

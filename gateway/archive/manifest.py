@@ -1,4 +1,5 @@
-"""The manifest of an archive: whose logs lie where, and by which signal map, calibration and tare they are read, when.
+"""The manifest of an archive: whose logs lie where, and by which signal map, calibration and known weights they are
+read, when.
 
 TOML, or Parquet with one row for each entry of ``[[vehicles]]``. Paths in it are relative to the manifest, which may
 lie in an object store like everything else.
@@ -20,7 +21,7 @@ from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Fiel
 from gateway.archive.dataset import table_rows
 from gateway.archive.places import Place, place_of
 from gateway.bus.logs import is_named_as_log
-from gateway.calibration.tare_file import TareHistory, history_of
+from gateway.calibration.known_weights_file import KnownWeights, known_weights_of
 from gateway.config import BatchSection, EstimatorName, TrustSection
 from gateway.config.sections import OF_CALIBRATION, LimitKg
 from gateway.core.settings import BatchSettings
@@ -75,7 +76,9 @@ class VehicleEntry(Means):
     logs: str | None = Field(None, description="folder of its logs, below the top's, or a URL [default: its id]")
     since: Instant | None = Field(None, description="counts for logs that begin then or later; a day, or with a zone")
     until: Instant | None = Field(None, description="counts for logs that begin earlier than that")
-    tare: str | None = Field(None, description="tare.json of its gateway: each tare counts while it was in use")
+    known_weights: str | None = Field(
+        None, description="known_weights.json of its gateway: each entry counts while it was in use"
+    )
 
     @model_validator(mode="after")
     def _makes_sense(self) -> "VehicleEntry":
@@ -125,12 +128,12 @@ class Assignment:
     shown: str  # of its folder, as the data set names its logs
     span_ns: tuple[int, int]
     setup: Setup
-    tares: TareHistory
+    known_weights: KnownWeights
 
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """An archive, checked: every signal map, calibration and tare of it could be loaded."""
+    """An archive, checked: every signal map, calibration and known weight of it could be loaded."""
 
     where: str
     assignments: tuple[Assignment, ...]
@@ -207,9 +210,10 @@ def _assignment(base: Place, told: ManifestFile, entry: VehicleEntry, load: Any,
     except ConfigurationError as fault:
         raise ConfigurationError(f"{where}: {fault}") from None
     folder = entry.logs or entry.name
-    tares = history_of(_read(base, entry.tare), f"{base}/{entry.tare}") if entry.tare else TareHistory()
+    named = entry.known_weights
+    known = known_weights_of(_read(base, named), f"{base}/{named}") if named else KnownWeights()
     place = _below(_below(base, told.logs), folder)
-    return Assignment(entry.name, entry.vin, place, folder.rstrip("/"), entry.span_ns, setup, tares)
+    return Assignment(entry.name, entry.vin, place, folder.rstrip("/"), entry.span_ns, setup, known)
 
 
 def _found(named: str, pinned: Trust) -> tuple[Place, str, bytes]:

@@ -4,6 +4,6 @@ A campaign file says which drives were recorded with which load (``campaign``); 
 anything is fitted, ``half_car`` and ``ratio_index`` learn one estimator each, ``line`` what sister vehicles
 tell of the next one, ``calibrate`` puts what they learned
 into a ``file``, ``judgement`` holds its answers against the truth and ``plan`` advises what to drive next.
-``tare_file`` re-zeroes a calibrated vehicle. Each part hands out its own names: a running service reads files and
-never loads what fits them.
+``known_weights_file`` holds the weights that condition a calibrated vehicle's estimates. Each part hands out its own
+names: a running service reads files and never loads what fits them.
 """

@@ -19,7 +19,17 @@ from gateway.core.vehicle import (
 )
 from gateway.core.weights import unsprung_kg
 from gateway.errors import CampaignError
-from gateway.stated import PAYLOAD_LENGTH, Kilograms, Metres, MetresLeft, PayloadLengthM, Percent
+from gateway.stated import (
+    CarriesAnswer,
+    Kilograms,
+    Metres,
+    MetresLeft,
+    PayloadHeightM,
+    PayloadLengthM,
+    Percent,
+    RoofRack,
+    TowBar,
+)
 from gateway.toml_file import checked, read_toml
 
 OnRun = Callable[[int, int], None]  # (runs done, runs in all)
@@ -86,7 +96,11 @@ class VehicleTable(_Table):
     )
     kerb_rear_axle_kg: float | None = Field(None, gt=0.0, description="the same at the rear")
     wheel_radius_m: float | None = Field(None, gt=0.0, description="kept in the calibration file, not used")
-    payload_length_m: PayloadLengthM | None = Field(None, description=PAYLOAD_LENGTH)
+    carries: CarriesAnswer = None
+    payload_length_m: PayloadLengthM = None
+    payload_height_m: PayloadHeightM = None
+    roof_rack: RoofRack = False
+    tow_bar: TowBar = False
     front_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the front axle")
     rear_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the rear axle")
     gross_limit_kg: float | None = Field(None, gt=0.0, description="permitted gross weight")

@@ -1,10 +1,13 @@
 """What a stated weight makes known of a load: payload and front share of the sprung mass."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Final
 
+from gateway.core.known_weights import KnownWeightKind
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.core.weights import Unsprung
 from gateway.errors import WeightRefusedError
@@ -15,8 +18,20 @@ MOST_PAYLOAD_SHARE: Final = 3.0
 SHARES_PCT: Final = (5.0, 95.0)  # on the front axle: beyond, it is another vehicle's ticket or axles are swapped
 
 
+STD_KG: Final[Mapping[KnownWeightKind, float]] = MappingProxyType(
+    {
+        KnownWeightKind.EMPTY: 10.0,  # a tank of 60 l anywhere between a quarter and full
+        KnownWeightKind.TICKET: 5.0,  # a weighbridge that shows steps of 10 kg (class III, OIML R 76)
+        KnownWeightKind.AXLE_PADS: 10.0,  # portable pads, 1 % of an axle of a ton
+        KnownWeightKind.DELIVERY_NOTE: 10.0,  # packing and what is aboard beside the goods
+    }
+)
+"""Standard deviations where nobody states one, of each number that is weighed; chosen."""
+PLACE_STD_M: Final = 0.1  # of a load's stated place; chosen
+
+
 class WeightRefusal(StrEnum):
-    """Why a stated weight cannot be used. docs/verification.md tells what each asks of a person."""
+    """Why a stated weight cannot be used. docs/known-weights.md says what each asks of a person."""
 
     NO_CALIBRATION = "no_calibration"
     NO_UNSPRUNG_MASS = "no_unsprung_mass"
@@ -24,18 +39,22 @@ class WeightRefusal(StrEnum):
     NO_EPOCH = "no_epoch"
     AMBIGUOUS_EPOCH = "ambiguous_epoch"
     OTHER_CALIBRATION = "other_calibration"
-    NOT_COMMISSIONED = "not_commissioned"
-    NOT_KEPT = "not_kept"
-    TOO_MANY = "too_many"
-    NO_SUCH_TICKET = "no_such_ticket"
+    NO_COUNTED_BATCH = "no_counted_batch"
+    LOAD_MAY_HAVE_CHANGED = "load_may_have_changed"
+    STALE = "stale"
+    ALREADY_KNOWN = "already_known"
+    NO_SUCH_WEIGHT = "no_such_weight"
+    NOT_HELD = "not_held"
     NOT_STORED = "not_stored"
 
 
 @dataclass(frozen=True, slots=True)
-class KnownWeight:
-    """A load in a calibration's terms; ``front_share_pct`` None: nobody said where it lies.
+class StatedLoad:
+    """A load in a calibration's terms; ``front_share_pct`` None: nobody stated where it lies.
 
-    ``gross_kg`` and the axle's are as they stand on the road, None where no unsprung mass is known.
+    ``gross_kg`` and the axles' weights are as they stand on the road, None where no unsprung mass is known. The
+    ``_std`` fields are the standard deviations of what was stated. ``is_share_weighed`` is false where the front share
+    follows from the empty vehicle's, whose error it then has in common with every estimate.
     """
 
     payload_kg: float
@@ -43,9 +62,14 @@ class KnownWeight:
     gross_kg: float | None
     front_axle_kg: float | None
     rear_axle_kg: float | None
+    payload_std_kg: float
+    front_share_std_pct: float | None
+    is_share_weighed: bool
 
 
-def known_weight_of(stated: StatedWeight, vehicle: Vehicle, unsprung: Unsprung) -> KnownWeight:
+def load_of(
+    stated: StatedWeight, vehicle: Vehicle, unsprung: Unsprung, kind: KnownWeightKind = KnownWeightKind.TICKET
+) -> StatedLoad:
     """Statics: what stands on an axle is its share of the sprung mass M + L and its unsprung mass u.
 
         L = G - M - u_front - u_rear,    D = (F_front - u_front) / (M + L)
@@ -54,6 +78,8 @@ def known_weight_of(stated: StatedWeight, vehicle: Vehicle, unsprung: Unsprung) 
     """
     below = unsprung.unless_stated(vehicle)
     front_u, rear_u = below.front.number, below.rear.number
+    std_kg = STD_KG[kind] if stated.std_kg is None else stated.std_kg
+    payload_std_kg = std_kg
     share_pct: float | None
     if stated.payload_kg is not None:
         payload_kg = stated.payload_kg
@@ -65,15 +91,36 @@ def known_weight_of(stated: StatedWeight, vehicle: Vehicle, unsprung: Unsprung) 
         payload_kg = gross_kg - vehicle.empty_mass_kg - front_u - rear_u
         front_kg = stated.front_axle_kg
         share_pct = None if front_kg is None else 100.0 * (front_kg - front_u) / (vehicle.empty_mass_kg + payload_kg)
+        if front_kg is not None:
+            payload_std_kg = math.sqrt(2.0) * std_kg  # two axles, each with the scale's error
     _require_possible(payload_kg, share_pct, vehicle)
     sprung_kg = vehicle.empty_mass_kg + payload_kg
-    return KnownWeight(
+    return StatedLoad(
         payload_kg=payload_kg,
         front_share_pct=share_pct,
         gross_kg=_known(sprung_kg + front_u + rear_u),
         front_axle_kg=None if share_pct is None else _known(share_pct / 100.0 * sprung_kg + front_u),
         rear_axle_kg=None if share_pct is None else _known((1.0 - share_pct / 100.0) * sprung_kg + rear_u),
+        payload_std_kg=payload_std_kg,
+        front_share_std_pct=_share_std_pct(stated, share_pct, sprung_kg, std_kg, vehicle),
+        is_share_weighed=stated.front_axle_kg is not None,
     )
+
+
+def _share_std_pct(
+    stated: StatedWeight, share_pct: float | None, sprung_kg: float, std_kg: float, vehicle: Vehicle
+) -> float | None:
+    """To first order: of two weighed axles, or of a payload of so much at a place of so much."""
+    if share_pct is None:
+        return None
+    share = share_pct / 100.0
+    if stated.front_axle_kg is not None:
+        return 100.0 * std_kg * math.hypot(1.0 - share, share) / sprung_kg
+    position_m = stated.position_m if stated.payload_kg else None
+    # without a place an empty vehicle's tank and tools lie anywhere between the axles, at worst over one of them
+    by_weight = 0.5 if position_m is None else 1.0 - position_m / vehicle.wheelbase_m - share
+    by_place = (stated.payload_kg or 0.0) * PLACE_STD_M / vehicle.wheelbase_m
+    return 100.0 * math.hypot(by_weight * std_kg, by_place) / sprung_kg
 
 
 def _gross_kg(stated: StatedWeight) -> float:

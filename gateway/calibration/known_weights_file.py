@@ -4,12 +4,11 @@ It lies beside the database, apart from the calibration file, which no known wei
 from the list (core.known_weights), so that each can be taken back. Written by the service alone, in one step.
 """
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.file.parts import Part
@@ -66,6 +65,9 @@ class KnownWeight(Part):
     payload_std_kg: float = Field(gt=0.0, allow_inf_nan=False)
     front_share_pct: Finite | None = Field(None, description="null: nobody stated where the load lies")
     front_share_std_pct: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+    estimated_payload_kg: Finite = Field(description="by the calibration and the known weights before this one")
+    estimated_payload_std_kg: float = Field(gt=0.0, allow_inf_nan=False)
+    is_contradicted: bool = Field(description="that estimate speaks against it by more than three standard deviations")
     confirmed: Confirmation | None = None
     ended: Ending | None = None
 
@@ -93,7 +95,7 @@ class KnownWeight(Part):
     @property
     def is_held(self) -> bool:
         """True where its estimate contradicts it and nobody has confirmed it: it teaches nothing yet."""
-        return self.ended is None and self.confirmed is None and self.observation.is_contradicted
+        return self.ended is None and self.confirmed is None and self.is_contradicted
 
     @property
     def teaches(self) -> bool:
@@ -116,6 +118,31 @@ class KnownWeights(Part):
     def knowledge(self, calibration_id: str | None, estimator: str) -> Knowledge | None:
         """What they teach together; None: nothing."""
         return Knowledge.of([one.observation for one in self.of(calibration_id, estimator)])
+
+    def as_of(self, t_ns: int) -> "KnownWeights":
+        """As they stood at that time: later entries, confirmations and ends are not there yet."""
+
+        def then(moment: Confirmation | Ending | None) -> bool:
+            return moment is not None and ns_of(moment.at) < t_ns
+
+        entries = tuple(
+            one.model_copy(
+                update={
+                    "confirmed": one.confirmed if then(one.confirmed) else None,
+                    "ended": one.ended if then(one.ended) else None,
+                }
+            )
+            for one in self.entries
+            if ns_of(one.at) < t_ns
+        )
+        return self.model_copy(update={"entries": entries})
+
+    @model_validator(mode="after")
+    def _is_unchanged(self) -> "KnownWeights":
+        changed = [entry.id for entry in self.entries if entry.id != entry.content_id()]
+        if changed:
+            raise ValueError(f"known weight {changed[0]} was changed after it was written")
+        return self
 
     def with_entry(self, entry: KnownWeight) -> "KnownWeights":
         """With one more; those that stand are never forgotten."""
@@ -143,19 +170,8 @@ def load_known_weights(path: Path) -> KnownWeights:
 def known_weights_of(content: bytes, path: Path | str) -> KnownWeights:
     """What such a file holds. Raises ConfigurationError, naming ``path``, where it cannot be believed."""
     try:
-        held = KnownWeights.model_validate_json(content)
+        return KnownWeights.model_validate_json(content)
     except ValidationError as fault:
-        raise ConfigurationError(f"{describe_faults(path, fault)}: {_MEND}") from None
-    changed = [entry.id for entry in held.entries if entry.id != entry.content_id()]
-    if changed:
-        raise ConfigurationError(f"{path}: known weight {changed[0]} was changed after it was written: {_MEND}")
-    return held
-
-
-def save_known_weights(path: Path, held: KnownWeights) -> None:
-    """Replace the file in one step; on disk when this returns. Raises OSError, and then the old file stands."""
-    text = json.dumps(held.model_dump(mode="json"), indent=1, allow_nan=False, ensure_ascii=False)
-    KeptFiles(path.parent).write(path.name, (text + "\n").encode())
-
-
-_MEND: Final = "restore it, or remove it to go on without known weights"
+        raise ConfigurationError(
+            f"{describe_faults(path, fault)}: restore it, or remove it to go on without known weights"
+        ) from None

@@ -2,7 +2,8 @@
 
 Each batch finds its dampers and the scale of its delay beside the load (core.cross_spectrum.drift), held near the
 calibration by what the search believes: a real change is larger than what is found of it. Springs are not found
-batch by batch; what they change moves the zero, which each tare tells.
+batch by batch; what they change moves the zero, which each
+"it is empty now" shows.
 """
 
 import math
@@ -22,7 +23,7 @@ from gateway.units import NS_PER_S
 
 FILE_NAME: Final = "trend.json"
 MOST_WEEKS: Final = 520  # of all calibrations together, the newest
-LEAST_POINTS: Final = {"week": 8, "tare": 5}
+LEAST_POINTS: Final = {"week": 8, "zero": 5}
 CONFIDENCE: Final = 0.99  # of a change's interval
 DAMPER_CHANGE_PCT: Final = 5.0  # chosen: the search's own belief lets a damper go 3 % (core.cross_spectrum.drift)
 DELAY_CHANGE_PCT: Final = 1.0  # likewise; it believes in 0.3 %
@@ -122,7 +123,7 @@ def monday_of(t_ns: int) -> str:
 def trends_of(
     weeks: Sequence[Week], zeros: Sequence[tuple[str, float]], calibration_id: str | None, empty_mass_kg: float
 ) -> tuple[Trend, ...]:
-    """Of the calibration in use; ``zeros`` are its tares, when and how much each took off in kg."""
+    """Of the calibration in use; ``zeros`` say when the vehicle was empty and what the calibration alone read (kg)."""
     own = [week for week in weeks if week.calibration_id == calibration_id and week.n]
     least = {"damper_front": DAMPER_CHANGE_PCT, "damper_rear": DAMPER_CHANGE_PCT, "delay": DELAY_CHANGE_PCT}
     found = [
@@ -135,8 +136,8 @@ def trends_of(
         )
         for name, least_change in least.items()
     ]
-    tares = tuple(Point(at, payload_kg, 1) for at, payload_kg in zeros)
-    return (*found, trend_of("zero", "kg", tares, LEAST_POINTS["tare"], ZERO_CHANGE_SHARE * empty_mass_kg))
+    empty = tuple(Point(at, payload_kg, 1) for at, payload_kg in zeros)
+    return (*found, trend_of("zero", "kg", empty, LEAST_POINTS["zero"], ZERO_CHANGE_SHARE * empty_mass_kg))
 
 
 def trend_of(name: str, unit: str, points: tuple[Point, ...], least_points: int, least_change: float) -> Trend:

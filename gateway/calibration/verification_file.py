@@ -6,7 +6,7 @@ from pydantic import Field
 
 from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.file.parts import Part
-from gateway.calibration.known_weight import KnownWeight
+from gateway.calibration.known_weight import StatedLoad
 from gateway.core.vehicle import Vehicle
 from gateway.stated_weight import StatedWeight
 
@@ -63,7 +63,7 @@ class Verification(Part):
     vehicle_id: str | None
     calibration_id: str
     estimator: str
-    tare_id: str | None
+    known_weights_id: str | None
     rule: VerificationRule
     loads: tuple[VerifiedLoad, ...] = Field(min_length=1, max_length=MOST_LOADS)
     verdict: Verdict
@@ -86,7 +86,7 @@ class VerificationHistory(Part):
 
 
 def axle_errors(
-    known: KnownWeight, payload_kg: float, front_share_pct: float, vehicle: Vehicle
+    known: StatedLoad, payload_kg: float, front_share_pct: float, vehicle: Vehicle
 ) -> tuple[AxleError | None, AxleError | None]:
     """Of the front and the rear axle; None where the known load has no place. Unsprung masses drop out of an error."""
     if known.front_share_pct is None:

@@ -16,14 +16,17 @@ from gateway.errors import SpringscaleError
 
 _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",
-    "calibration": "Show, compare and check calibration files; re-zero a running service.",
+    "calibration": "Show, compare and check calibration files; state known weights to a running service.",
+    "campaign": "Pack known-load drives into one archive, to hand on or to contribute.",
     "check-config": "Check a configuration, without opening the bus.",
     "commission": "Calibrate a running service's vehicle from its axle weights and an empty drive.",
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",
     "estimate": "Weigh from log files, one line per batch.",
     "evaluate": "Compare estimates with known loads: the error table.",
     "events": "What was loaded and unloaded where and when, and the trips between, from log files.",
+    "feed": "Send an IMU of Linux IIO and a receiver behind gpsd onto a CAN interface.",
     "fleet-report": "What a fleet's data set tells of each vehicle, as pages.",
+    "import": "Make a log of what a phone recorded: Sensor Logger or phyphox.",
     "line": "Build the line of several vehicles, so that the next one is calibrated by an empty drive.",
     "look": "What an unknown log holds, and a first signal map from it.",
     "record": "Frames on disk: list and fetch those of a service, or record from a bus.",
@@ -36,7 +39,8 @@ _COMMANDS = {
     "verification": "Known loads held against what a running service weighed, as dated records.",
 }  # each in the module of its name, or a room of ours
 _ROOMS = {"fleet-report": "fleet", "line": "fleet", "record": "asked", "verification": "asked", "commission": "asked"}
-_ROOMS |= {"events": "logs"}
+_ROOMS |= {"campaign": "logs", "events": "logs", "feed": "logs", "import": "logs"}
+_NAMES = {"import": "import_recording"}  # a word of the language names no module
 
 
 # What a vehicle does without: the extra "workbench", in Debian a package of its own.
@@ -55,7 +59,7 @@ class _Lazy(click.Group):
         """The command itself, imported now; None where there is none of that name."""
         if cmd_name not in _COMMANDS:
             return None
-        name = cmd_name.replace("-", "_")
+        name = _NAMES.get(cmd_name, cmd_name.replace("-", "_"))
         room = f".{_ROOMS[cmd_name]}" if cmd_name in _ROOMS else ""
         command: click.Command = getattr(import_module(f"gateway.cli{room}.{name}"), name)
         return command

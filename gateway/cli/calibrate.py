@@ -14,7 +14,7 @@ from gateway.calibration.inspection import Inspection, Kind
 from gateway.calibration.judgement import LearningCurve, curve_of
 from gateway.calibration.plan import LoadPlan, plan_first, plan_next
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
-from gateway.cli.options import FILE, RunNumbers, as_json, batch_settings, window
+from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, window
 from gateway.cli.text.inspection import inspection_json, inspection_sentences
 from gateway.cli.text.plan import plan_sentences
 from gateway.cli.text.progress import counted, on_share
@@ -28,7 +28,7 @@ from gateway.records import json_line
 
 
 @click.command("calibrate")
-@click.argument("campaign", type=FILE)
+@click.argument("campaign", type=CAMPAIGN)
 @click.option("--output", type=FILE, default=None, help="calibration file to write; not needed with --plan or --check")
 @click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]")
 @click.option("--runs", "numbers", type=RunNumbers(), default=None, help="these runs only, counted from 1: 1,5,10")

@@ -1,4 +1,4 @@
-"""springscale calibration: look at calibration files, compare and check them; re-zero a running service."""
+"""springscale calibration: look at calibration files, compare and check them; state known weights to a service."""
 
 import sys
 from dataclasses import asdict
@@ -18,8 +18,7 @@ from gateway.calibration.file import (
     load_calibration,
 )
 from gateway.calibration.file.check import Verdict
-from gateway.cli.asked.tare import tare_commands
-from gateway.cli.asked.ticket import ticket_commands
+from gateway.cli.asked.known_weights import tare_commands, ticket_commands
 from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.text.axle_weights import vehicle_block
 from gateway.cli.text.calibration import calibration_text
@@ -29,7 +28,7 @@ from gateway.stated import DIVISION_KG
 
 @click.group("calibration")
 def calibration() -> None:
-    """Look at calibration files, compare and check them; re-zero a running service (tare)."""
+    """Look at calibration files, compare and check them; state known weights to a running service (tare, ticket)."""
 
 
 calibration.add_command(tare_commands)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from gateway.calibration.tare_file import FILE_NAME
+from gateway.calibration.known_weights_file import FILE_NAME
 from gateway.cli.options import FILE, as_json, trusted_keys
 from gateway.config import load_settings
 from gateway.core.weights import Limits
@@ -23,7 +23,7 @@ from gateway.uplink.webhook import webhook_settings
 @trusted_keys
 @as_json
 def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None:
-    """Check CONFIG, its signal map, its DBC files, its calibration and its tare; name every fault."""
+    """Check CONFIG, its signal map, its DBC files, its calibration and its known weights; name every fault."""
     settings = load_settings(config, trusted_keys)
     trust, untrusted = settings.trust.for_reading(), dict[Path, str]()
 
@@ -38,9 +38,9 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
     setup = setup_of(settings, read=read)
     if untrusted:
         raise ConfigurationError("\n".join(untrusted.values()))
-    tares = settings.store.directory / FILE_NAME
-    if os.access(tares, os.R_OK):  # the service's own; others may not be allowed to see it
-        setup = setup.with_tare_of(tares)
+    known_weights = settings.store.directory / FILE_NAME
+    if os.access(known_weights, os.R_OK):  # the service's own; others may not be allowed to see it
+        setup = setup.with_known_weights_of(known_weights)
     faults = tuple(startable_faults(settings))
     if faults:
         raise ConfigurationError("\n".join(f"{config}: {fault}" for fault in faults))
@@ -51,7 +51,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
         "calibration_id": setup.calibration.id if setup.calibration else None,
-        "tare_id": setup.tare.id if setup.tare else None,
+        "known_weights_id": setup.knowledge.id if setup.knowledge else None,
         "estimator": setup.estimator,
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from gateway.bus.logs import LogReport
-from gateway.calibration.tare_file import FILE_NAME
+from gateway.calibration.known_weights_file import FILE_NAME
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.text.estimate import sentence
 from gateway.config import load_settings
@@ -23,8 +23,10 @@ from gateway.setup import Setup, load_setup, setup_of
 @click.option("--config", "config_path", type=FILE, default=None, help="springscale.toml of the service")
 @click.option("--signals", default=None, help="signal map: a TOML file, or springscale:NAME")
 @click.option("--calibration", type=FILE, default=None, help="calibration file")
-@click.option("--tare", type=FILE, default=None, help="tare.json of a service [default: that of --config]")
-@click.option("--no-tare", is_flag=True, help="the zero of the calibration, whatever tare the service has in use")
+@click.option(
+    "--known-weights", type=FILE, default=None, help="known_weights.json of a service [default: that of --config]"
+)
+@click.option("--no-known-weights", is_flag=True, help="by the calibration alone, whatever weights the service knows")
 @one_estimator
 @window
 @as_json
@@ -33,8 +35,8 @@ def estimate(
     config_path: Path | None,
     signals: str | None,
     calibration: Path | None,
-    tare: Path | None,
-    no_tare: bool,
+    known_weights: Path | None,
+    no_known_weights: bool,
     estimator: str | None,
     window_s: float | None,
     as_json: bool,
@@ -43,11 +45,11 @@ def estimate(
 
     With several logs each line says of which it is: in front of the line, or as "log" in its JSON.
     """
-    if tare is not None and no_tare:
-        raise click.UsageError("give --tare FILE or --no-tare, not both")
+    if known_weights is not None and no_known_weights:
+        raise click.UsageError("give --known-weights FILE or --no-known-weights, not both")
     setup, settings, state = prepared(config_path, signals, calibration, estimator, window_s)
-    if not no_tare:
-        setup = tared_by(setup, tare, state)
+    if not no_known_weights:
+        setup = with_known_weights(setup, known_weights, state)
     for log in logs:
         for weighed in estimates_of_logs([log], setup, settings, on_read=_tell):
             record = estimate_to_json(weighed)
@@ -84,14 +86,14 @@ def prepared(
     return load_setup(signals, calibration, estimator), batch_settings(window_s), None
 
 
-def tared_by(setup: Setup, named: Path | None, state: Path | None) -> Setup:
-    """With the tare of a file that was named, which must have one for this calibration; else with the service's."""
+def with_known_weights(setup: Setup, named: Path | None, state: Path | None) -> Setup:
+    """With those of a file that was named, which must have one of this calibration; else with the service's."""
     if named is None:
-        return setup if state is None else setup.with_tare_of(state / FILE_NAME)
-    zeroed = setup.with_tare_of(named)
-    if zeroed.tare is None:
+        return setup if state is None else setup.with_known_weights_of(state / FILE_NAME)
+    known = setup.with_known_weights_of(named)
+    if known.knowledge is None:
         calibration_id = setup.calibration.id if setup.calibration else "none"
         raise ConfigurationError(
-            f"{named}: has no tare in use for the estimator {setup.estimator} and the calibration {calibration_id}"
+            f"{named}: no known weight in use for the estimator {setup.estimator} and the calibration {calibration_id}"
         )
-    return zeroed
+    return known

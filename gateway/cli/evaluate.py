@@ -8,7 +8,7 @@ import click
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.judgement import Errors, ErrorTable, Judged, Part, TargetErrors, assess_evaluation, error_table
-from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
+from gateway.cli.options import CAMPAIGN, FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.text.progress import counted
 from gateway.errors import ConfigurationError
 from gateway.offline import judge_campaign
@@ -17,7 +17,7 @@ from gateway.records import json_line
 
 
 @click.command("evaluate")
-@click.argument("campaign", type=FILE)
+@click.argument("campaign", type=CAMPAIGN)
 @click.option("--calibration", type=FILE, required=True, help="calibration file")
 @one_estimator
 @click.option("--split", type=click.Choice(["identification", "validation", "all"]), default="validation")
@@ -33,7 +33,7 @@ def evaluate(
     window_s: float | None,
     as_json: bool,
 ) -> None:
-    """Hold estimates against the known loads of CAMPAIGN."""
+    """Hold estimates against the known loads of CAMPAIGN, a campaign file or an archive of `campaign pack`."""
     loaded, held = load_campaign(campaign), load_calibration(calibration)
     chosen = estimator or held.estimators[0]
     if chosen not in held.estimators:

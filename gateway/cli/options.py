@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import click
@@ -30,6 +31,25 @@ class NumberRange(Number, click.FloatRange):
 
 
 NUMBER = Number()
+
+
+class CampaignFile(click.Path):
+    """A campaign file; an archive of `campaign pack` is unpacked for as long as the command runs."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Raises CampaignError for an archive that is not whole."""
+        path = Path(str(super().convert(value, param, ctx)))
+        if path.suffix.lower() != ".zip" or ctx is None:
+            return path
+        from gateway.offline.bundle import unpacked  # noqa: PLC0415 # --help need not wait for it
+
+        return unpacked(path, Path(ctx.with_resource(TemporaryDirectory(prefix="springscale-"))))
+
+
+CAMPAIGN = CampaignFile()
 
 as_json = click.option("--json", "as_json", is_flag=True, help="machine-readable output")
 trusted_keys = click.option(

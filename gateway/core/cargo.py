@@ -55,7 +55,7 @@ COMPACT_SCATTER: Final = 0.4  # of s of loads like the known ones
 SPREAD_PART: Final = 0.5  # of loads of which nobody said anything: half are like the known ones, half are spread out
 ROOF_ABOVE_FLOOR_LOAD_M: Final = 1.1  # roof loads of vans: 1.9 m above the road against 0.8 to 0.9 m
 TOW_BAR_BEHIND_LOAD_M: Final = 1.7  # coupling 0.9 m behind the rear axle, loads about 0.8 m ahead of it
-MOST_OUTLYING_PART: Final = 0.4  # of a load, on a roof rack or a tow bar where there is one
+OUTLYING_PARTS: Final = (0.1, 0.2, 0.3, 0.4)  # of a load, on a roof rack or a tow bar where there is one; chosen
 SMOOTHING: Final = 0.15  # kernel width in log s: the tables are no finer than that
 
 
@@ -129,14 +129,14 @@ def _points(vehicle: Vehicle) -> Iterator[tuple[float, float]]:
     """s (m2) with its weight over all lengths, heights and outlying parts that the vehicle's loads may have."""
     extent = _extent(vehicle)
     normal, weights = np.polynomial.hermite_e.hermegauss(7)
-    outlying = _outlying(vehicle)
     for (x, wx), (y, wy) in product(zip(normal, weights, strict=True), repeat=2):
         length_m = extent.length_m * np.exp(extent.length_scatter * x)
         height_m = extent.height_m * np.exp(extent.height_scatter * y)
-        above_m = 0.5 * height_m - FLOOR_BELOW_BODY_M
-        s = (length_m**2 + height_m**2) / 12.0 + BODY_MASS_PART * above_m**2
-        for added, weight in outlying:
-            yield float(s + added), float(wx * wy * weight)
+        own = (length_m**2 + height_m**2) / 12.0
+        for part, behind_m, above_m, weight in _outlying(vehicle):
+            apart = part * (1.0 - part) * (behind_m**2 + above_m**2)
+            lifted_m = 0.5 * height_m - FLOOR_BELOW_BODY_M + part * above_m
+            yield float(own + apart + BODY_MASS_PART * lifted_m**2), float(wx * wy * weight)
 
 
 def _extent(vehicle: Vehicle) -> Extent:
@@ -152,10 +152,12 @@ def _extent(vehicle: Vehicle) -> Extent:
     return Extent(extent.length_m * floor_m, extent.length_scatter, height_m, extent.height_scatter)
 
 
-def _outlying(vehicle: Vehicle) -> list[tuple[float, float]]:
-    """What a part of the load on the roof or on a tow bar adds to s (m2), with weights: in half of all loads."""
-    squares = [m**2 for m, has in ((ROOF_ABOVE_FLOOR_LOAD_M, vehicle.roof_rack), (TOW_BAR_BEHIND_LOAD_M, vehicle.tow_bar)) if has]
-    if not squares:
-        return [(0.0, 1.0)]
-    parts = [0.1, 0.2, 0.3, MOST_OUTLYING_PART]
-    return [(0.0, 0.5), *((square * f * (1.0 - f), 0.5 / (len(parts) * len(squares))) for square in squares for f in parts)]
+def _outlying(vehicle: Vehicle) -> list[tuple[float, float, float, float]]:
+    """Which part of a load stands how far behind and above the rest, with weights: in half of all loads where the
+    vehicle has a roof rack or a tow bar.
+    """
+    places = [(0.0, ROOF_ABOVE_FLOOR_LOAD_M)] * vehicle.roof_rack + [(TOW_BAR_BEHIND_LOAD_M, 0.0)] * vehicle.tow_bar
+    if not places:
+        return [(0.0, 0.0, 0.0, 1.0)]
+    weight = 0.5 / (len(places) * len(OUTLYING_PARTS))
+    return [(0.0, 0.0, 0.0, 0.5), *((part, *place, weight) for place in places for part in OUTLYING_PARTS)]

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from gateway.budget import budget_of
 from gateway.core.batch import Traits
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.estimator import estimate
 from gateway.core.cargo import is_said
 from gateway.core.change import Rules
+from gateway.core.estimator import estimate
 from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, WeighedLoad, epoch_of, fused_epoch, remembered
 from gateway.core.known_weights import Knowledge
 from gateway.core.scheduler import Scheduler

@@ -1,4 +1,5 @@
-"""What known weights teach: a vehicle weighed empty, on a scale, or by its delivery note conditions the sources of error.
+"""What known weights teach: a vehicle weighed empty, on a scale, or by its delivery note conditions the sources of
+error.
 
     knowledge = Knowledge.of(observations, now_ns)
     known = knowledge.applied(posterior, t_ns)
@@ -104,9 +105,7 @@ class Knowledge:
         n = max((each.stop for each in slots.values()), default=0)
         digest = hashlib.sha256("|".join(one.id for one in observations).encode()).hexdigest()
         first = observations[0]
-        known = cls(
-            digest[:16], first.calibration_id, first.estimator, slots, np.zeros(n), np.eye(n), first.t_ns
-        )
+        known = cls(digest[:16], first.calibration_id, first.estimator, slots, np.zeros(n), np.eye(n), first.t_ns)
         for one in observations:
             known = known._at(one.t_ns)._having_seen(one)
         return known

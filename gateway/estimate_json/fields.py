@@ -80,12 +80,38 @@ _WEIGHTS: Final = Weights(
     Weight(421.2, 3.8, None, None),
 )
 
+_BUDGET: Final = [
+    {
+        "source": "load_length",
+        "payload_kg": 5.2,
+        "front_share_pct": 0.08,
+        "cg_left_m": None,
+        "remedy": "say_what_is_carried",
+        "payload_with_remedy_kg": 4.2,
+    }
+]
+_POSTERIOR: Final = {
+    "mean": [271.3, 50.4],
+    "own": [[10.2, 0.1], [0.1, 0.004]],
+    "sources": {"load_length": [[5.2, 0.08]]},
+    "tails": [1.96, 1.96],
+}
+
 FIELDS: Final = (
     _field("id", "id", TEXT, "the same for the same batch, whenever it is computed", _ID),
     _field("vehicle_id", "vehicle_id", TEXT, "as the settings name it", "van-17"),
     _field("t_start", "t_start_ns", INSTANT, "beginning of the batch, UTC", "2026-11-21T03:50:00.000000Z"),
     _field("t_end", "t_end_ns", INSTANT, "its end, UTC", "2026-11-21T03:55:00.000000Z"),
     _field("t_end_ns", "t_end_ns", WHOLE, "the same end, since 1970 UTC", 1795233300000000000),
+    _field(
+        "t_start_ns",
+        "t_start_ns",
+        WHOLE,
+        "its beginning, likewise",
+        1795233000000000000,
+        presence=_LATER,
+        columns=(),
+    ),
     _field("estimator", "estimator", TEXT, "who weighed: cross_spectrum or ratio_index", "ratio_index"),
     _field("calibration_id", "calibration_id", TEXT, "hash of the calibration used", "sha256:9f86d081"),
     _field("payload_kg", "payload.number", NUMBER, "what is aboard besides the empty vehicle", 271.3),
@@ -217,7 +243,7 @@ FIELDS: Final = (
         "error_budget",
         BUDGET,
         "what each source adds to the error, largest payload first: one standard deviation each",
-        [],
+        _BUDGET,
         _LATER,
     ),
     EstimateField(
@@ -225,7 +251,8 @@ FIELDS: Final = (
         "posterior",
         POSTERIOR,
         "mean, own covariance and columns by source, in kg, % and m; null: no answer",
-        presence=_KNOWN,
+        _POSTERIOR,
+        _KNOWN,
     ),
     EstimateField(
         "measured_posterior",

@@ -10,8 +10,6 @@ import numpy as np
 from gateway.estimate import PLACES, UNKNOWN_INTERVAL, Lack, Weight, Weights
 from gateway.records import F64, Spectra, Why, iso_utc, ns_of
 
-NS_PER_US: Final = 1000
-
 
 @dataclass(frozen=True, slots=True)
 class Kind:

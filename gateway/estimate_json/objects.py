@@ -2,12 +2,10 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, Final
 
 from gateway.estimate import UNKNOWN_INTERVAL, Epoch, Estimate, Quantity
 from gateway.estimate_json.fields import COLUMNS, FIELDS, Presence
-from gateway.estimate_json.kinds import NS_PER_US
 
 _FOLLOWS: Final = frozenset(one.name for one in FIELDS if one.name.startswith("raw_") or "correlation" in one.name) | {
     "id",
@@ -27,14 +25,17 @@ def estimate_to_json(estimate: Estimate) -> dict[str, Any]:
 
 
 def estimate_from_json(told: Mapping[str, Any]) -> Estimate:
-    """The inverse of :func:`estimate_to_json`, as exact as that rounds; the instants and the id are exact."""
+    """The inverse of :func:`estimate_to_json`, as exact as that rounds; the instants and the id are exact.
+
+    ``t_start_ns`` stands behind ``t_start``, which has whole microseconds, and so counts where it is there.
+    """
     known = {
         one.path: one.kind.read(told[one.name])
         for one in FIELDS
         if one.name not in _FOLLOWS and told.get(one.name) is not None
     }
     whole = {path: x for path, x in known.items() if "." not in path}
-    estimate = Estimate(
+    return Estimate(
         **whole,
         payload=_quantity(known, "payload"),
         front_share=_quantity(known, "front_share"),
@@ -42,16 +43,6 @@ def estimate_from_json(told: Mapping[str, Any]) -> Estimate:
         left_share=_quantity(known, "left_share"),
         epoch=_epoch(known),
     )
-    return _with_its_nanoseconds(estimate, told["id"])
-
-
-def _with_its_nanoseconds(estimate: Estimate, told_id: str) -> Estimate:
-    """``t_start`` leaves out the nanoseconds below a microsecond; the id, a hash, tells which of the 1000 they are.
-
-    Whole microseconds where none fits: the object was not written by this program.
-    """
-    within_us = (replace(estimate, t_start_ns=estimate.t_start_ns + ns) for ns in range(NS_PER_US))
-    return next((one for one in within_us if one.id == told_id), estimate)
 
 
 def _quantity(known: Mapping[str, Any], path: str) -> Quantity:
@@ -65,7 +56,9 @@ def _quantity(known: Mapping[str, Any], path: str) -> Quantity:
 def _epoch(known: Mapping[str, Any]) -> Epoch | None:
     if "epoch.n_batches" not in known:
         return None
-    payload, front_share, cg_left = (_quantity(known, f"epoch.{name}") for name in ("payload", "front_share", "cg_left"))
+    payload, front_share, cg_left = (
+        _quantity(known, f"epoch.{name}") for name in ("payload", "front_share", "cg_left")
+    )
     return Epoch(payload, front_share, known["epoch.n_batches"], cg_left)
 
 

@@ -1,4 +1,4 @@
-"""The service's day book: what each batch tells of loads and trips, stored and shown."""
+"""The service's day book: what each batch tells of loads and trips, written to the journal."""
 
 import json
 import logging
@@ -13,7 +13,6 @@ from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.setup import Setup
 from gateway.store import Store, StoreReader
-from gateway.web import Board
 
 MOST: Final = 2 * HORIZON  # entries that so many batches can tell
 
@@ -21,10 +20,9 @@ MOST: Final = 2 * HORIZON  # entries that so many batches can tell
 class DayBook:
     """Told of every estimate once it is stored and shown; by the pipeline's thread alone."""
 
-    def __init__(self, setup: Setup, store: Store, board: Board) -> None:
+    def __init__(self, setup: Setup, store: Store) -> None:
         """Goes on from what the store remembers of the last batches."""
         self._store = store
-        self._board = board
         rules = Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules()
         try:
             self._ledger = ledger_of(store.reader(), rules)
@@ -33,11 +31,10 @@ class DayBook:
             self._ledger = Ledger(rules)
 
     def __call__(self, found: Estimate) -> None:
-        """Store and show what it tells."""
+        """Write down what it tells."""
         for entry in self._ledger.add(found):
             text = json_line(entry.record)
-            cursor = self._store.write_entry(entry.kind, entry.id, entry.t_end_ns, text)
-            self._board.publish_entry(entry.kind, text, cursor)
+            self._store.write_entry(entry.kind, entry.id, entry.t_end_ns, text, entry.revision)
             log_event(Event.ENTRY, level=logging.DEBUG, id=entry.id, revision=entry.revision)
 
 

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import signal
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -13,11 +14,12 @@ from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
+from gateway.notify import Notifier
 from gateway.service.alarm_desk import AlarmDesk, rules_of
 from gateway.service.changes import BatchLog, StateLog, told_in_turn
 from gateway.service.day_book import DayBook
 from gateway.service.last_good import keep_copy
-from gateway.service.notify import Notifier
+from gateway.service.part import CLOSE_WITHIN_S, Deadline, Part, Sending, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     Forwarding,
     board_of,
@@ -27,7 +29,6 @@ from gateway.service.parts import (
     ring_log_of,
     source_of,
     store_of,
-    tickets_of,
     uplink_of,
     webhook_of,
 )
@@ -35,10 +36,11 @@ from gateway.service.pipeline import Pipeline
 from gateway.service.proving import Proving
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
-from gateway.service.tare_desk import Subject, TareDesk
+from gateway.service.subject import Subject
 from gateway.service.web_server import WebServer
 from gateway.setup import Setup
 from gateway.status import State
+from gateway.store import Store
 from gateway.web import (
     KnownLoads,
     Scales,
@@ -49,7 +51,11 @@ from gateway.web import (
     weigh_latest,
 )
 
-SUPERVISE_S = 0.25
+SUPERVISE_S = 0.25  # how soon a dead part is seen
+LOOK_S = 1.0  # how often the whole status is looked at
+BUS_WITHIN_S = 2.0  # of a stop
+PIPELINE_WITHIN_S = 10.0  # a full inbox holds several windows
+FLUSH_WITHIN_S = 8.0  # likewise the disk
 
 OnStarted = Callable[["Gateway"], None]
 
@@ -99,32 +105,27 @@ class Gateway:
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
         subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
-        self.alarms = AlarmDesk(rules_of(settings.alarms), subject, self.store, self.board)
+        self.alarms = AlarmDesk(rules_of(settings.alarms), subject, self.store)
         self.pipeline = Pipeline(
             self.source.inbox,
             Decoder(setup.signal_map),
             flow,
             self.store,
             self.board,
-            told_in_turn(log_batch, DayBook(setup, self.store, self.board), self.alarms),
+            told_in_turn(log_batch, DayBook(setup, self.store), self.alarms),
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
         self.uplink = uplink_of(forwarding.broker, setup, self.store, with_places=with_places)
         self.webhook = webhook_of(forwarding.webhook, self.store, with_places=with_places)
-        self.tare = TareDesk(
+        self.proving = Proving(
             settings.store.directory,
+            settings.verification,
             subject,
             self.pipeline,
+            self.store,
             stale_after_s=settings.web.stale_after_s,
-            on_event=self.store.write_event,
-        )
-        tickets = tickets_of(settings, self.commissioning, self.keeper, subject, self.store)
-        self.proving = Proving(
-            settings.store.directory, settings.verification, subject, self.store, self.tare.zeros, tickets
         )
         self.broadcaster = broadcaster_of(settings.broadcast, self.board)
-        parts = (self.keeper, self.proving, self.ring_log, self.broadcaster, self.uplink, self.webhook)
-        self._beside = tuple(part for part in parts if part is not None)
         self.status = StatusReport(
             settings,
             setup,
@@ -146,14 +147,14 @@ class Gateway:
             self.status,
             calibrated=setup.calibrated,
             tokens=token_file,
-            tare=self.tare,
+            known_weights=self.proving.known_weights,
             commissioning=self.commissioning,
             known_loads=known_loads,
             record=self.ring_log,
             verification=self.proving.verification,
             trend=self.proving.trend,
-            tickets=tickets,
             alarms=self.alarms,
+            draws_trailers=settings.broadcast.draws_trailers,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = WebServer(web)
@@ -161,13 +162,47 @@ class Gateway:
         self._notifier = Notifier()
         self._stopping = asyncio.Event()
         self._failure: str | None = None
+        self._web_fault: str | None = None
+        self._reloading: asyncio.Task[None] | None = None
+        self._vital, self._beside = self._parts()
         self.is_to_start_anew = False  # with the calibration that was made meanwhile; see life.py
+
+    def _parts(self) -> tuple[tuple[Part, ...], tuple[Part, ...]]:
+        """What the weighing cannot be without, and what goes on beside it; each in the order of the start."""
+        vital = (
+            Part("database writer", lambda: None, self.store.close, death=lambda: _ended(self.store), is_vital=True),
+            Part(
+                "pipeline",
+                self.pipeline.start,
+                self.pipeline.stop,
+                lambda: self.pipeline.roll_rate_fault,
+                lambda: _died(self.pipeline.failure) or _ended(self.pipeline),
+                is_vital=True,
+            ),
+            Part(
+                "bus reader",
+                self.source.start,
+                self.source.stop,
+                death=lambda: _died(self.source.failure),
+                is_vital=True,
+            ),
+        )
+        beside = [
+            Part("commissioning", self.commissioning.start, self.commissioning.stop, lambda: self.commissioning.fault),
+            Part("batch keeper", self.keeper.start, self.keeper.stop, lambda: self.keeper.fault),
+            Part("proving", self.proving.start, lambda _left_s: self.proving.stop()),
+        ]
+        if (ring_log := self.ring_log) is not None:
+            beside.append(Part("recorder", ring_log.start, ring_log.stop, lambda: ring_log.fault))
+        senders: tuple[Sending | None, ...] = (self.broadcaster, self.uplink, self.webhook)
+        beside += [_sender_part(sender) for sender in senders if sender is not None]
+        beside.append(Part("survey of the bus", lambda: None, self.around.stop))
+        return vital, tuple(beside)
 
     def _warnings(self) -> tuple[str, ...]:
         """What is broken beside the weighing, as people read it."""
-        parts = (self._tokens, self.tare, self._reload, self.keeper, self.ring_log, self.broadcaster)
-        faults = [part.fault for part in parts if part is not None]
-        faults += (self.pipeline.roll_rate_fault, *self.proving.faults, self.commissioning.fault)
+        faults = [self._tokens.fault, self._reload.fault, self._web_fault, *self.proving.faults]
+        faults += [part.told() for part in (*self._vital, *self._beside)]
         return tuple(fault for fault in faults if fault)
 
     @property
@@ -200,29 +235,31 @@ class Gateway:
         loop.add_signal_handler(signal.SIGHUP, self._reload_told)
         bus = self._settings.bus
         log_event(Event.STARTED, version=self.status().version, interface=bus.interface, channel=bus.channel)
-        self.commissioning.start()
-        for part in self._beside:
+        for part in (*self._beside, *self._vital):
             part.start()
-        self.source.start()
-        self.pipeline.start()
         self.store.write_event("started", {"interface": self._settings.bus.interface})
         serving = asyncio.create_task(self._serve_web())
         try:
             await self._supervise(serving)
         except Exception as failure:  # noqa: BLE001 - whatever ends the watching, what was accepted reaches the disk
             self._failure = f"the supervisor died: {failure!r}"
-        self._stop_parts()
+        await in_own_thread(self._stop_parts)
         self._server.should_exit = True
         await serving
         self._notifier.close()
 
     def _reload_told(self) -> None:
-        """Reload, and tell systemd when it begins and ends; before the start is over all is fresh anyway."""
-        if not self._server.started:
-            return
+        """Reload beside the event loop: databases and calibrations take seconds to read. One at a time."""
+        if self._server.started and (self._reloading is None or self._reloading.done()):
+            self._reloading = asyncio.create_task(self._reload_beside())
+
+    async def _reload_beside(self) -> None:
+        """And tell systemd when it begins and ends."""
         self._notifier.send_reloading()
-        self._reload()
-        self._notifier.send(READY="1")
+        try:
+            await in_own_thread(self._reload)
+        finally:
+            self._notifier.send(READY="1")
 
     async def _serve_web(self) -> None:
         """uvicorn until it ends; it leaves by SystemExit where it cannot start, which must not pass a task."""
@@ -231,8 +268,8 @@ class Gateway:
 
     async def _supervise(self, serving: asyncio.Task[None]) -> None:
         """Until asked to stop or a part dies: readiness, watchdog by progress, status line."""
-        is_ready, seen, sentence = False, -1, ""
-        log_state = StateLog(self.board)
+        is_ready, seen = False, -1
+        look = Look(self)
         while not self._stopping.is_set() and self._failure is None:
             self._failure = self._dead_part(serving)
             if self._server.started and not is_ready:
@@ -243,18 +280,20 @@ class Gateway:
             if self.pipeline.progress != seen:
                 seen = self.pipeline.progress
                 self._notifier.send(WATCHDOG="1")
-            now = self.status()
-            log_state(now)
-            self.alarms.watch(now, self.proving.trend.trends)
-            self._look_around(now.state)
+            look.go_on()
             if self.commissioning.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
                 self.is_to_start_anew = True
                 self.request_stop()
-            if (told := now.sentence()) != sentence:
-                sentence = told
-                self._notifier.send(STATUS=told)
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._stopping.wait(), SUPERVISE_S)
+
+    def look(self, log_state: StateLog) -> None:
+        """What is to be done with the service as it is now; in a thread, for it may wait for a lock or a disk."""
+        now = self.status()
+        log_state(now)
+        self.alarms.watch(now, self.proving.trend.trends)
+        self._look_around(now.state)
+        self._notifier.send_status(now.sentence())
 
     def _look_around(self, state: State) -> None:
         """A sensor that is not heard may speak under another identifier, which the bus's filters keep out."""
@@ -264,34 +303,69 @@ class Gateway:
             self.around.forget()
 
     def _dead_part(self, serving: asyncio.Task[None]) -> str | None:
-        """Which part died, and of what; None while all live."""
-        if self.source.failure is not None:
-            return f"the bus reader died: {self.source.failure!r}"
-        if self.pipeline.failure is not None or not self.pipeline.is_alive():
-            return f"the pipeline died: {self.pipeline.failure!r}"
-        if not self.store.is_alive():
-            return "the database writer died"
-        for part in (self.uplink, self.webhook, self.broadcaster):
-            if part is not None and not part.is_alive():
-                return f"the {part.NAME} died"
-        if serving.done():
+        """Which vital part died, and of what; None while all live."""
+        for part in self._vital:
+            if (death := part.death()) is not None:
+                return f"the {part.name} {death}"
+        if serving.done() and not self._server.started:
             return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: is it taken?"
+        if serving.done() and self._web_fault is None:
+            self._web_fault = "the web server died; weighing goes on, a restart brings it back"
+            log_event(Event.WEB_DIED, level=logging.ERROR)
         return None
 
     def _stop_parts(self) -> None:
-        """Bus first, then what it fed; every accepted estimate reaches the disk."""
-        if self.is_to_start_anew:
-            self._notifier.send_reloading()
-        else:
-            self._notifier.send(STOPPING="1", STATUS="Stopping.")
-        self.source.stop()
-        self.around.stop()
-        self.commissioning.stop()  # what the end cuts short is no end of a window
-        self.pipeline.stop()
-        for part in self._beside:
-            part.stop()
+        """The bus first, then what it fed, then the disk: every accepted estimate is on it before anybody else stops.
+
+        One deadline for all. Whatever hangs is left behind.
+        """
+        deadline = Deadline()
+        self._notifier.send(STOPPING="1", STATUS="Stopping.")
+        self.commissioning.hear_no_more()  # what the end cuts short is no end of a window
+        self.source.stop(deadline.left_s(BUS_WITHIN_S))
+        self.pipeline.stop(deadline.left_s(PIPELINE_WITHIN_S))
+        self.store.flush(deadline.left_s(FLUSH_WITHIN_S))
+        late = stop_in_turn(self._beside, deadline)
         self.board.close()
         self.store.write_event("stopped", {"failure": self._failure})
-        n_lost = self.store.close()
-        level = logging.ERROR if n_lost or self._failure else logging.INFO
+        n_lost = self.store.close(max(CLOSE_WITHIN_S, deadline.left_s()))
+        level = logging.ERROR if n_lost or late or self._failure else logging.INFO
         log_event(Event.STOPPED, level=level, failure=self._failure, rows_lost=n_lost)
+
+
+class Look:
+    """Looks at the service again and again, in a thread; the next look waits for the one before and a second."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+        self._log_state = StateLog(gateway.board)
+        self._task: asyncio.Task[None] | None = None
+        self._begun_s = -LOOK_S
+
+    def go_on(self) -> None:
+        """Begin the next look where it is due. Raises what the last one raised."""
+        if self._task is not None and self._task.done():
+            task, self._task = self._task, None
+            task.result()
+        now_s = time.monotonic()
+        if self._task is None and now_s - self._begun_s >= LOOK_S:
+            self._begun_s = now_s
+            self._task = asyncio.create_task(in_own_thread(lambda: self._gateway.look(self._log_state)))
+
+
+def _died(failure: BaseException | None) -> str | None:
+    return None if failure is None else f"died: {failure!r}"
+
+
+def _ended(part: Store | Pipeline | Sending) -> str | None:
+    return None if part.is_alive() else "died"
+
+
+def _sender_part(sender: Sending) -> Part:
+    return Part(
+        sender.NAME,
+        sender.start,
+        sender.stop,
+        fault=lambda: sender.fault,
+        death=lambda: None if sender.is_alive() else f"the {sender.NAME} died",
+    )

@@ -1,11 +1,16 @@
-"""A service's life: one gateway after the other, each with the calibration that is in use when it begins."""
+"""A service's life: one gateway, with the calibration that is in use when it begins."""
+
+import os
+import sys
+from typing import Final
 
 from gateway.bus.live import OpenReceiver
 from gateway.config import Settings
 from gateway.service.commissioning import commissioned, with_commissioned
 from gateway.service.gateway import Gateway, OnStarted
 from gateway.service.reload import LoadSettings
-from gateway.web import forget_routes
+
+START_ANEW: Final = 75  # exit code by which systemd starts the service anew (deploy/springscale.service)
 
 
 def live(
@@ -14,25 +19,30 @@ def live(
     *,
     on_started: OnStarted = lambda gateway: None,
     open_receiver: OpenReceiver | None = None,
-) -> None:
-    """Serve until told to stop. Raises as ``setup_of`` and as :meth:`Gateway.run`.
+) -> bool:
+    """Serve until told to stop -> whether to start anew. Raises as ``setup_of`` and as :meth:`Gateway.run`.
 
-    A calibration made on the vehicle is taken up between two drives, where no window is open: the parts stop and begin
-    anew, within a second or two, as at any start. ``load`` reads the settings anew for a reload; ``open_receiver`` is
-    as of :class:`Gateway`.
+    A calibration made on the vehicle is taken up between two drives, where no window is open: the service ends and
+    begins anew, as at any start. ``load`` reads the settings anew for a reload; ``open_receiver`` is as of
+    :class:`Gateway`.
     """
-    while True:
-        chosen, setup, fault = commissioned(settings)
-        gateway = Gateway(
-            chosen,
-            setup,
-            load=lambda: with_commissioned(load()),
-            setup_fault=fault,
-            on_started=on_started,
-            open_receiver=open_receiver,
-        )
-        gateway.run()
-        if not gateway.is_to_start_anew:
-            return
-        del gateway
-        forget_routes()
+    chosen, setup, fault = commissioned(settings)
+    gateway = Gateway(
+        chosen,
+        setup,
+        load=lambda: with_commissioned(load()),
+        setup_fault=fault,
+        on_started=on_started,
+        open_receiver=open_receiver,
+    )
+    gateway.run()
+    return gateway.is_to_start_anew
+
+
+def start_anew() -> None:
+    """End this process so that another takes its place: systemd's by the exit code, else the same command once more."""
+    if "NOTIFY_SOCKET" in os.environ:
+        sys.exit(START_ANEW)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])

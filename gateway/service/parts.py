@@ -16,10 +16,8 @@ from gateway.core.flow import Flow
 from gateway.errors import StoreError
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
-from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle, Worker, why_not_allowed
+from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle, why_not_allowed
 from gateway.service.keeper import BatchKeeper
-from gateway.service.proving import TicketDesk
-from gateway.service.tare_desk import Subject
 from gateway.setup import Setup
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings, uplink_settings
@@ -41,7 +39,13 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with
         "estimator": setup.estimator,
         "calibration_id": setup.calibration.id if setup.calibration else None,
     }
-    outbox = Outbox(store.reader(), store, _queue_name(wanted), with_places=with_places, repeat_s=wanted.repeat_s)
+    outbox = Outbox(
+        store,
+        _queue_name(wanted),
+        with_places=with_places,
+        repeat_s=wanted.repeat_s,
+        with_latest=wanted.home_assistant is not None,
+    )
     return Uplink(wanted, outbox, birth)
 
 
@@ -75,7 +79,7 @@ def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: boo
     """None where none is configured."""
     if wanted is None:
         return None
-    outbox = Outbox(store.reader(), store, wanted.queue, with_places=with_places, only=wanted.kinds)
+    outbox = Outbox(store, wanted.queue, with_places=with_places, only=wanted.kinds)
     return Webhook(wanted, outbox, store.write_event)
 
 
@@ -127,22 +131,6 @@ def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow
     )
     flow.on_batch, keeper.listener = keeper.keep, desk
     return desk
-
-
-def tickets_of(
-    settings: Settings, commissioning: Commissioning, keeper: BatchKeeper, subject: Subject, store: Store
-) -> TicketDesk:
-    directory = settings.store.directory
-    return TicketDesk(
-        commissioning.book,
-        Jobs(directory, settings.commissioning, settings.batch.for_core()),
-        keeper.shelf,
-        subject,
-        store.reader().estimates,
-        on_event=store.write_event,
-        make_worker=lambda on_result: Worker(directory / "refit", on_result),
-        why_not_allowed=why_not_allowed(settings),
-    )
 
 
 def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:

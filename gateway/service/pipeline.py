@@ -13,7 +13,7 @@ from typing import Final
 from gateway.bus.live import Inbox
 from gateway.bus.signals import Decoder
 from gateway.core.flow import Flow
-from gateway.core.tare import Weighed
+from gateway.core.fusion import WeighedLoad
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
@@ -22,7 +22,7 @@ from gateway.service.watching import SignalWatch, StandingWatch
 from gateway.store import Store
 from gateway.web import Board, boot_clock_s
 
-DRAIN_S = 0.1  # how long the inbox may gather before it is decoded: a hundred frames in one array operation
+DRAIN_S = 0.5  # longest wait for frames: the inbox wakes the pipeline as soon as there are any
 ROLL_RATE_KNOWN_SHARE: Final = 0.9  # of a batch's usable samples; with fewer the sensor is at fault
 ROLL_RATE_LOST: Final = (
     "the roll rate is known in only {:.0%} of the last batch (silent, stuck, at the end of its range or too slow): "
@@ -57,7 +57,7 @@ class Pipeline:
         self.n_frames = 0  # frames whose estimates, if any, are handed over
         self.progress = 0  # grows with every turn of the loop: what the watchdog follows
         self._silent_s = 0.0
-        self._weighed_at: tuple[Weighed | None, float] = (None, 0.0)
+        self._weighed_at: tuple[WeighedLoad | None, float] = (None, 0.0)
         self._inbox = inbox
         self._store = store
         self._board = board
@@ -134,9 +134,9 @@ class Pipeline:
             self._count(found)
             if self.flow.weighed is not self._weighed_at[0]:
                 self._weighed_at = (self.flow.weighed, boot_clock_s())
-            record = estimate_to_json(found)
-            cursor = None if found.is_provisional else self._store.write_estimate(record)
-            self._board.publish(found, cursor)
+            self._board.publish(found)  # first: whoever hears of it by the journal finds it there
+            if not found.is_provisional:
+                self._store.write_estimate(estimate_to_json(found))
             self._on_batch(found)
 
     def _count(self, found: Estimate) -> None:

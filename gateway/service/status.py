@@ -86,7 +86,7 @@ class StatusReport:
             vehicle_id=self._setup.identity.vehicle_id,
             vin=self._setup.identity.vin,
             calibration_id=self._setup.calibrated.id if self._setup.calibrated else None,  # hashed once, not each time
-            tare_id=tare.id if (tare := self._pipeline.flow.tare) else None,
+            known_weights_id=known.id if (known := self._pipeline.flow.knowledge) else None,
             estimator=self._setup.estimator,
             bus=self._bus(),
             decode=self._decode(),

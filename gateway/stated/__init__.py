@@ -2,22 +2,28 @@
 
 from gateway.stated.vehicle import (
     DIVISION_KG,
-    PAYLOAD_LENGTH,
+    CarriesAnswer,
     Kilograms,
     Metres,
     MetresLeft,
+    PayloadHeightM,
     PayloadLengthM,
     Percent,
+    RoofRack,
+    TowBar,
     VehicleAnswers,
 )
 
 __all__ = [
     "DIVISION_KG",
-    "PAYLOAD_LENGTH",
+    "CarriesAnswer",
     "Kilograms",
     "Metres",
     "MetresLeft",
+    "PayloadHeightM",
     "PayloadLengthM",
     "Percent",
+    "RoofRack",
+    "TowBar",
     "VehicleAnswers",
 ]

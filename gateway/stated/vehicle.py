@@ -4,6 +4,8 @@ from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from gateway.core.cargo import Carries
+
 # Bounds that no road vehicle reaches, so that a fraction for percent, millimetres or tonnes are named at once
 Percent = Annotated[float, Field(ge=1.0, le=99.0)]
 Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0)]
@@ -11,11 +13,29 @@ WeightKg = Annotated[float, Field(gt=0.0, le=100_000.0)]
 Metres = Annotated[float, Field(ge=-10.0, le=30.0)]
 MetresLeft = Annotated[float, Field(ge=-2.0, le=2.0)]
 
-PAYLOAD_LENGTH: Final = (
-    "how far along the floor what it carries usually reaches: 1.2 for a pallet, the floor's length for parcels; "
-    "absent: as the known loads, with intervals that allow for more"
-)
-PayloadLengthM = Annotated[float, Field(ge=0.1, le=20.0)]
+# What a fitter says of the loads: their pitch inertia moves the answer as much as their mass does
+CarriesAnswer = Annotated[
+    Carries | None,
+    Field(
+        description="what it usually carries: `pallets`, `parcels` (all over the floor), `long_goods`, `tools` (in "
+        "racks) or `mixed`; absent: anything, often as compact as the known loads, with intervals that allow for it",
+        examples=["parcels"],
+    ),
+]
+PayloadLengthM = Annotated[
+    Annotated[float, Field(ge=0.1, le=20.0)] | None,
+    Field(
+        description="how far along the floor it usually reaches, where you know that better than `carries` says: 1.2 "
+        "for a pallet, the floor's length for parcels",
+        examples=[2.4],
+    ),
+]
+PayloadHeightM = Annotated[
+    Annotated[float, Field(ge=0.05, le=5.0)] | None,
+    Field(description="how high above the floor it usually reaches", examples=[1.2]),
+]
+RoofRack = Annotated[bool, Field(description="part of the load may lie on the roof")]
+TowBar = Annotated[bool, Field(description="part of the load may hang on a tow bar: a carrier, a trailer's tongue")]
 
 DIVISION_KG: Final = 20.0  # of a weighbridge for trucks; a reading is rounded to it
 
@@ -57,7 +77,11 @@ class VehicleAnswers(BaseModel):
         None, description="payloads it may carry", examples=[[0.0, 800.0]]
     )
     front_share_range_pct: tuple[Percent, Percent] | None = Field(None, description="front shares it may have")
-    payload_length_m: PayloadLengthM | None = Field(None, description=PAYLOAD_LENGTH, examples=[2.4])
+    carries: CarriesAnswer = None
+    payload_length_m: PayloadLengthM = None
+    payload_height_m: PayloadHeightM = None
+    roof_rack: RoofRack = False
+    tow_bar: TowBar = False
     front_axle_limit_kg: WeightKg | None = Field(None, description="permitted load of the front axle")
     rear_axle_limit_kg: WeightKg | None = Field(None, description="permitted load of the rear axle")
     gross_limit_kg: WeightKg | None = Field(None, description="permitted gross weight")

@@ -1,4 +1,4 @@
-"""Estimates, events and calibrations on disk, in SQLite: one writer, bounded in age and size.
+"""One journal of all records on disk, in SQLite: one writer, bounded in age and size.
 
 Records come in from any thread and never wait for the disk; pages of the history in order of arrival go out through
 read-only readers, what is not yet on disk among them. A disk that refuses is told of, and waited for in memory.

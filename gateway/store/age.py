@@ -62,14 +62,7 @@ class AgeClock:
 
 
 def _newest_stamp_ns(connection: sqlite3.Connection) -> int | None:
-    """When the newest row came that was received under a clock that was set."""
-    stamps = [
-        row[0]
-        for table, stamp in (("estimates", "received_ns"), ("events", "t_ns"))
-        if (
-            row := connection.execute(
-                f"SELECT {stamp} FROM {table} WHERE {stamp} >= ? ORDER BY seq DESC LIMIT 1", (CLOCK_UNSET_NS,)
-            ).fetchone()
-        )
-    ]
-    return max(stamps, default=None)
+    """When the newest record came that was received under a clock that was set."""
+    sql = "SELECT received_ns FROM journal WHERE received_ns >= ? ORDER BY seq DESC LIMIT 1"
+    found = connection.execute(sql, (CLOCK_UNSET_NS,)).fetchone()
+    return None if found is None else int(found[0])

@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from gateway.errors import StoreError
+from gateway.history import BATCHES, ESTIMATE, KINDS
 from gateway.log import Event, log_event
 from gateway.store.age import AgeClock
-from gateway.store.records import Stored, checksum, is_good, stored_row
+from gateway.store.questions import INSERT, Stored, is_good, stored_row
 from gateway.store.retention import Retention, remove_old, remove_share
-from gateway.store.rows import Chain, EstimateRow, Row, bound
+from gateway.store.rows import Chain, DeliveryRow, DocumentRow, JournalRow, Row, checksum
 from gateway.store.schema import connect_writer, pragma
 
 T = TypeVar("T")
@@ -35,6 +36,8 @@ class Opened:
 
     epoch: str
     last_seq: int
+    last_batch: int
+    newest: dict[str, int]  # the newest number of each kind
 
 
 class DamagedError(sqlite3.DatabaseError):
@@ -113,25 +116,28 @@ class Database:
             self.disconnect()
             raise
 
-    def add(self, rows: Sequence[Row]) -> tuple[int, int]:
-        """Commit rows in one transaction -> (rows that are new, estimates that were there already)."""
+    def add(self, rows: Sequence[Row], boot_id: str) -> tuple[list[JournalRow], int]:
+        """Commit rows in one transaction -> (records that are new, batches that were there already)."""
         connection = self._connected()
-        n_new = n_known = 0
+        stored: list[JournalRow] = []
+        n_known = 0
         chain = Chain(self.chain)
         with _transaction(connection):
             for row in rows:
-                if not isinstance(row, EstimateRow):
-                    n_new += connection.execute(row.INSERT, bound(row)).rowcount
-                    continue
-                linked = chain.linked(row)
-                fields = bound(linked)
-                is_new = connection.execute(row.INSERT, (*fields, checksum(fields))).rowcount > 0
-                n_new += is_new
-                n_known += not is_new
-                if not is_new:
-                    chain.skip(linked)
+                if isinstance(row, DeliveryRow):
+                    _keep_delivery(connection, row)
+                elif isinstance(row, DocumentRow):
+                    _keep_document(connection, row)
+                else:
+                    linked = chain.linked(row)
+                    if _add_record(connection, linked):
+                        stored.append(linked)
+                    else:
+                        chain.skip(linked)
+                        n_known += 1
+            _keep_receipt(connection, stored, boot_id)
         self.chain = chain
-        return n_new, n_known
+        return stored, n_known
 
     def prune(self, now_ns: int) -> int:
         """Remove what is too old, then the oldest until the size fits -> rows removed."""
@@ -173,11 +179,11 @@ class Database:
     @staticmethod
     def _move_aside(connection: sqlite3.Connection, rows: Sequence[Stored], now_ns: int) -> None:
         with _transaction(connection):
-            for seq, record_id, *_, text, _sum in rows:
+            for seq, _kind, record_id, *_, text, _crc in rows:
                 connection.execute(
                     "INSERT INTO damaged (seq, found_ns, id, text) VALUES (?, ?, ?, ?)", (seq, now_ns, record_id, text)
                 )
-                connection.execute("DELETE FROM estimates WHERE seq = ?", (seq,))
+                connection.execute("DELETE FROM journal WHERE seq = ?", (seq,))
             newest = _last_number(connection, "damaged")
             connection.execute("DELETE FROM damaged WHERE n <= ?", (newest - MOST_BAD_RECORDS,))
 
@@ -261,7 +267,41 @@ class Database:
 
     @staticmethod
     def _identify(connection: sqlite3.Connection, new_epoch: str) -> Opened:
-        known = connection.execute("SELECT id FROM epochs").fetchone()
+        known = connection.execute("SELECT id, last_batch FROM epochs").fetchone()
         if known is None:
             connection.execute("INSERT INTO epochs (id) VALUES (?)", (new_epoch,))
-        return Opened(new_epoch if known is None else known[0], _last_number(connection, "estimates"))
+        epoch, last_batch = known or (new_epoch, 0)
+        sql = "SELECT max(seq) FROM journal WHERE kind = ?"
+        newest = {kind: connection.execute(sql, (kind,)).fetchone()[0] or 0 for kind in KINDS}
+        return Opened(epoch, _last_number(connection, "journal"), last_batch, newest)
+
+
+def _add_record(connection: sqlite3.Connection, row: JournalRow) -> bool:
+    """False for a batch that is there already; a later revision takes the place of the one before it."""
+    if row.kind in KINDS and KINDS[row.kind].is_revised:
+        connection.execute("DELETE FROM journal WHERE id = ? AND seq < ?", (row.id, row.seq))
+    columns = row.columns()
+    return connection.execute(f"{INSERT} ON CONFLICT (id) DO NOTHING", (*columns, checksum(columns))).rowcount > 0
+
+
+def _keep_document(connection: sqlite3.Connection, row: DocumentRow) -> None:
+    columns = (row.name, row.received_ns, row.text)
+    sql = "INSERT OR REPLACE INTO documents (name, received_ns, text, crc) VALUES (?, ?, ?, ?)"
+    connection.execute(sql, (*columns, checksum(columns)))
+
+
+def _keep_delivery(connection: sqlite3.Connection, row: DeliveryRow) -> None:
+    sql = "INSERT INTO uplinks (name, seq) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET seq = excluded.seq"
+    connection.execute(sql, (row.name, row.seq))
+
+
+def _keep_receipt(connection: sqlite3.Connection, stored: Sequence[JournalRow], boot_id: str) -> None:
+    """When the newest estimate was received, and the number of the newest batch."""
+    batches = [row for row in stored if row.kind in BATCHES]
+    if batches:
+        connection.execute("UPDATE epochs SET last_batch = ?", (batches[-1].seq,))
+    estimates = [row for row in batches if row.kind == ESTIMATE]
+    if estimates:
+        newest = estimates[-1]
+        sql = "INSERT OR REPLACE INTO receipts (kind, seq, boot_id, boot_ns) VALUES (?, ?, ?, ?)"
+        connection.execute(sql, (ESTIMATE, newest.seq, boot_id, newest.boot_ns))

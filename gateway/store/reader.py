@@ -1,37 +1,33 @@
 """Answers from the store: read-only, bounded in time, blind to nothing that was accepted."""
 
-import json
 import sqlite3
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final, Protocol
 
 from gateway.errors import StoreError
-from gateway.history import Delivery, Page
-from gateway.records import json_line
-from gateway.store import records
+from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, SERVICE, Delivery, Follower, Page
+from gateway.store import questions
 from gateway.store.database import is_damaged
-from gateway.store.delivery import delivery
-from gateway.store.entries import EntryWindow, entries
-from gateway.store.rows import Chain, EntryRow, EstimateRow
+from gateway.store.questions import LAST, Window, without_spectra
+from gateway.store.rows import Chain, JournalRow, checksum
 from gateway.store.schema import connect_reader
 from gateway.units import NS_PER_S
 
 QUERY_LIMIT_S: Final = 2.0
 _STEPS_PER_LOOK: Final = 10_000  # SQLite instructions between two looks at the clock
-_FIRST_NS: Final = -(1 << 63)
-_LAST_NS: Final = (1 << 63) - 1
-
-HeldEstimates = Callable[[], tuple[str, tuple[EstimateRow, ...]]]
-HeldEntries = Callable[[], tuple[str, tuple[EntryRow, ...]]]
 
 
 @dataclass(frozen=True, slots=True)
 class Latest:
-    """The last answer and the last rejection, as JSON; age_s of the answer by the wall clock."""
+    """The last answer and the last rejection, as JSON.
+
+    ``age_s`` is the answer's, by a clock that never steps; None where the machine was started since: no clock tells
+    then how long ago it was.
+    """
 
     estimate: str | None
     rejection: str | None
@@ -47,33 +43,76 @@ class Event:
     detail: str
 
 
+class Behind(Protocol):
+    """The store as a reader sees it: what is in memory, and who hears what a question met on its way."""
+
+    @property
+    def path(self) -> Path: ...
+    def held(self) -> tuple[str, tuple[JournalRow, ...]]: ...
+    def boot(self) -> tuple[str, int]: ...
+    def head(self) -> str: ...
+    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> Follower: ...
+    def suspect_damage(self) -> None: ...
+    def suspect_loss(self) -> None: ...
+    def suspect_records(self, seqs: Sequence[int]) -> None: ...
+
+
 class StoreReader:
     """Read-only view of a store, safe in any thread.
 
     Each question opens its own connection, so no handle outlives a database that was set aside. A
     question that takes longer than ``limit_s`` raises TimeoutError; a database that cannot be read
-    raises StoreError. ``on_damage``, ``on_bad_records`` and ``on_lost`` hear what a question met on its way.
+    raises StoreError.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        held: HeldEstimates,
-        held_entries: HeldEntries,
-        clock_ns: Callable[[], int],
-        on_damage: Callable[[], None],
-        on_bad_records: Callable[[Sequence[int]], None],
-        on_lost: Callable[[], None],
-        limit_s: float = QUERY_LIMIT_S,
-    ) -> None:
-        self._path = path
-        self._held = held
-        self._held_entries = held_entries
-        self._clock_ns = clock_ns
-        self._on_damage = on_damage
-        self._on_bad_records = on_bad_records
-        self._on_lost = on_lost
+    def __init__(self, store: Behind, limit_s: float = QUERY_LIMIT_S) -> None:
+        self._store = store
         self._limit_s = limit_s
+
+    def page(
+        self,
+        kinds: Sequence[str],
+        *,
+        since_ns: int | None = None,
+        until_ns: int | None = None,
+        limit: int = 100,
+        cursor: str | None = None,
+        newest_first: bool = False,
+        with_spectra: bool = True,
+    ) -> Page:
+        """Records of these kinds with since_ns <= t_end_ns < until_ns, in the order of their arrival.
+
+        Following ``next_cursor`` misses nothing and repeats nothing while records arrive. A cursor of a
+        database that is gone begins from the first record. Raises ValueError for a cursor we never gave.
+        """
+        # What is held must be read before the file: a row that moves to disk meanwhile is then seen twice
+        # and merged by its number, instead of not at all.
+        epoch, held = self._store.held()
+        window = Window(
+            tuple(kinds),
+            seq_after(cursor, epoch),
+            None if since_ns is None else _within_64_bits(since_ns),
+            None if until_ns is None else _within_64_bits(until_ns),
+            newest_first,
+        )
+        with self._connection() as connection:
+            fresh = [row for row in _not_stored(connection, held) if window.holds(row)]
+            n_revised = sum(row.kind not in BATCHES for row in fresh)
+            stored = self._stored(connection, window, limit + 1 + n_revised, with_spectra=with_spectra)
+        newest: dict[str, JournalRow] = {}
+        for row in (*stored, *fresh):
+            if row.id not in newest or newest[row.id].seq < row.seq:
+                newest[row.id] = row
+        rows = sorted(newest.values(), key=lambda row: row.seq, reverse=newest_first)
+        has_more, shown = len(rows) > limit, rows[:limit]
+        cursors = tuple(f"{epoch}-{row.seq}" for row in shown)
+        return Page(
+            items=tuple(row.text if with_spectra or not row.boot_ns else without_spectra(row.text) for row in shown),
+            cursors=cursors,
+            previous=tuple(row.previous for row in shown),
+            next_cursor=cursors[-1] if has_more else None,
+            last_cursor=cursors[0 if newest_first else -1] if shown else cursor,
+        )
 
     def estimates(
         self,
@@ -85,39 +124,15 @@ class StoreReader:
         newest_first: bool = False,
         with_spectra: bool = True,
     ) -> Page:
-        """Estimates and rejections with since_ns <= t_end_ns < until_ns, in the order of their arrival.
-
-        Following ``next_cursor`` misses nothing and repeats nothing while rows arrive. A cursor of a
-        database that is gone begins from the first row. Raises ValueError for a cursor we never gave.
-        """
-        # What is held must be read before the file: a row that moves to disk meanwhile is then seen twice
-        # and merged by its number, instead of not at all.
-        epoch, held = self._held()
-        window = records.Window(
-            _seq_after(cursor, epoch),
-            None if since_ns is None else _within_64_bits(since_ns),
-            None if until_ns is None else _within_64_bits(until_ns),
-            newest_first,
-        )
-        with self._connection() as connection:
-            found = ({}, []) if connection is None else records.page(connection, window, limit + 1, with_spectra)
-            rows, bad = found
-            fresh = [row for row in _not_stored(connection, held) if window.holds(row)]
-        self._tell_bad(bad)
-        rows |= {
-            row.seq: records.Good(row.text if with_spectra else _without_spectra(row.text), row.previous)
-            for row in fresh
-        }
-        seqs = sorted(rows, reverse=newest_first)
-        shown = seqs[:limit]
-        cursors = tuple(f"{epoch}-{seq}" for seq in shown)
-        newest = 0 if newest_first else -1
-        return Page(
-            items=tuple(rows[seq].text for seq in shown),
-            cursors=cursors,
-            previous=tuple(rows[seq].previous for seq in shown),
-            next_cursor=cursors[-1] if len(seqs) > limit else None,
-            last_cursor=cursors[newest] if shown else cursor,
+        """Estimates and rejections, as ``page``."""
+        return self.page(
+            BATCHES,
+            since_ns=since_ns,
+            until_ns=until_ns,
+            limit=limit,
+            cursor=cursor,
+            newest_first=newest_first,
+            with_spectra=with_spectra,
         )
 
     def entries(
@@ -128,91 +143,108 @@ class StoreReader:
         until_ns: int | None = None,
         limit: int = 100,
         cursor: str | None = None,
-        upto: str | None = None,
         newest_first: bool = False,
     ) -> Page:
-        """Load events and trips, each in its last revision, with since_ns <= t_end_ns < until_ns, as they came.
+        """Load events, trips and alarms, each in its last revision, as ``page``; ``kind`` None: all."""
+        kinds = ENTRIES if kind is None else (kind,)
+        return self.page(
+            kinds, since_ns=since_ns, until_ns=until_ns, limit=limit, cursor=cursor, newest_first=newest_first
+        )
 
-        Cursors are of one row with those of estimates. Raises ValueError for a cursor we never gave.
-        """
-        epoch, held = self._held_entries()
-        window = EntryWindow(
-            kind,
-            _seq_after(cursor, epoch),
-            _seq_after(upto, epoch),
-            None if since_ns is None else _within_64_bits(since_ns),
-            None if until_ns is None else _within_64_bits(until_ns),
-            newest_first,
-        )
+    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> Follower:
+        """As ``Journal.follow``."""
+        return self._store.follow(kinds, after, on_news)
+
+    def head(self) -> str:
+        """Cursor of the newest record accepted."""
+        return self._store.head()
+
+    def behind(self, kinds: Sequence[str], seq: int, limit: int) -> list[JournalRow]:
+        """The first records on disk behind a number."""
         with self._connection() as connection:
-            found = entries(connection, held, window, limit + 1)
-        shown = found[:limit]
-        cursors = tuple(f"{epoch}-{seq}" for seq, _, _ in shown)
-        return Page(
-            items=tuple(text for _, _, text in shown),
-            cursors=cursors,
-            previous=(None,) * len(shown),
-            next_cursor=cursors[-1] if len(found) > limit else None,
-            last_cursor=cursors[0 if newest_first else -1] if shown else cursor,
-        )
+            return self._stored(connection, Window(tuple(kinds), seq), limit)
 
     def latest(self) -> Latest:
         """The last answer and the last rejection ever accepted."""
-        _, held = self._held()
+        _, held = self._store.held()
         with self._connection() as connection:
-            answer, rejection = (
-                _newest_held(held, is_rejected) or self._newest_stored(connection, is_rejected)
-                for is_rejected in (False, True)
-            )
+            answer, rejection = (self._newest(connection, held, kind) for kind in (ESTIMATE, REJECTION))
+            age_s = None if answer is None else self._age_s(connection, answer)
         return Latest(
-            estimate=None if answer is None else answer[1],
-            rejection=None if rejection is None else rejection[1],
-            age_s=None if answer is None else max(0.0, (self._clock_ns() - answer[0]) / NS_PER_S),
+            estimate=None if answer is None else answer.text,
+            rejection=None if rejection is None else rejection.text,
+            age_s=age_s,
         )
 
     def events(self, limit: int = 100) -> list[Event]:
-        """The last things that happened to the service and are on disk, newest first."""
-        rows = self._ask("SELECT t_ns, kind, text FROM events ORDER BY seq DESC LIMIT ?", (limit,))
-        return [Event(*row) for row in rows]
+        """The last things that happened to the service, newest first."""
+        _, held = self._store.held()
+        window = Window((SERVICE,), newest_first=True)
+        with self._connection() as connection:
+            stored = self._stored(connection, window, limit)
+        rows = {row.seq: row for row in (*stored, *held) if row.kind == SERVICE}
+        return [
+            Event(row.received_ns, *row.text.split("\n", 1))
+            for row in (rows[seq] for seq in sorted(rows, reverse=True)[:limit])
+        ]
+
+    def document(self, name: str) -> str | None:
+        """A document by its name; None where there is none that is as it was written."""
+        with self._connection() as connection:
+            if connection is None:
+                return None
+            sql = "SELECT CAST(name AS BLOB), received_ns, CAST(text AS BLOB), crc FROM documents WHERE name = ?"
+            found = connection.execute(sql, (name,)).fetchone()
+        return found[2].decode() if found and checksum(found[:3]) == found[3] else None
 
     def calibration(self, calibration_id: str) -> str | None:
         """A calibration's JSON by its hash."""
-        rows = self._ask("SELECT text FROM calibrations WHERE id = ?", (calibration_id,))
-        return rows[0][0] if rows else None
+        return self.document(f"calibration {calibration_id}")
 
-    def delivery(self, uplink: str, *, kinds: Sequence[str] = (), with_estimates: bool = True) -> Delivery:
+    def delivery(self, uplink: str, kinds: Sequence[str] = (*BATCHES, *ENTRIES)) -> Delivery:
         """How far ``uplink`` has delivered, as it is on disk; the cursor is None before its first delivery.
 
-        What waits is counted of estimates, and of entries of these ``kinds``.
+        What waits is counted of these ``kinds``.
         """
         with self._connection() as connection:
-            if connection is None:
-                return Delivery(None, 0, 0)
-            return delivery(connection, uplink, kinds, with_estimates=with_estimates, now_ns=self._clock_ns())
+            return Delivery(None, 0, 0) if connection is None else questions.delivery(connection, uplink, kinds)
 
-    def _newest_stored(self, connection: sqlite3.Connection | None, is_rejected: bool) -> tuple[int, str] | None:
+    def _stored(
+        self, connection: sqlite3.Connection | None, window: Window, limit: int, *, with_spectra: bool = True
+    ) -> list[JournalRow]:
+        """None where there is no database (yet)."""
+        if connection is None:
+            return []
+        return questions.page(connection, window, limit, self._store.suspect_records, with_spectra=with_spectra)
+
+    def _newest(
+        self, connection: sqlite3.Connection | None, held: Sequence[JournalRow], kind: str
+    ) -> JournalRow | None:
+        fresh = [row for row in held if row.kind == kind]
+        if fresh:
+            return fresh[-1]
+        found = self._stored(connection, Window((kind,), newest_first=True), 1)
+        return found[0] if found else None
+
+    def _age_s(self, connection: sqlite3.Connection | None, answer: JournalRow) -> float | None:
+        boot_id, now_ns = self._store.boot()
+        if answer.boot_ns:  # accepted by this very store
+            return (now_ns - answer.boot_ns) / NS_PER_S
         if connection is None:
             return None
-        answer, bad = records.newest(connection, is_rejected)
-        self._tell_bad(bad)
-        return answer
-
-    def _tell_bad(self, seqs: Sequence[int]) -> None:
-        if seqs:
-            self._on_bad_records(seqs)
-
-    def _ask(self, sql: str, parameters: tuple[Any, ...]) -> list[tuple[Any, ...]]:
-        with self._connection() as connection:
-            return [] if connection is None else connection.execute(sql, parameters).fetchall()
+        sql = "SELECT boot_ns FROM receipts WHERE kind = ? AND seq = ? AND boot_id = ?"
+        found = connection.execute(sql, (ESTIMATE, answer.seq, boot_id)).fetchone()
+        age_s = -1.0 if found is None else (now_ns - int(found[0])) / NS_PER_S
+        return age_s if age_s >= 0.0 else None
 
     @contextmanager
     def _connection(self) -> Iterator[sqlite3.Connection | None]:
         """A connection under the time limit; None where there is no database (yet)."""
-        if not self._path.exists():
+        if not self._store.path.exists():
             yield None
             return
         try:
-            with closing(connect_reader(self._path)) as connection:
+            with closing(connect_reader(self._store.path)) as connection:
                 self._limit_time(connection)
                 connection.execute("BEGIN")  # one snapshot for all that one question looks at
                 yield connection
@@ -227,13 +259,14 @@ class StoreReader:
         if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
             return TimeoutError(f"the question took longer than {self._limit_s:g} s: ask for less at a time")
         if is_damaged(error):
-            self._on_damage()
+            self._store.suspect_damage()
         else:
-            self._on_lost()
-        return StoreError(f"{self._path} cannot be read: {error}")
+            self._store.suspect_loss()
+        return StoreError(f"{self._store.path} cannot be read: {error}")
 
 
-def _seq_after(cursor: str | None, epoch: str) -> int | None:
+def seq_after(cursor: str | None, epoch: str) -> int | None:
+    """The number in a cursor; None for one of another database. Raises ValueError for a cursor we never gave."""
     if cursor is None:
         return None
     of_epoch, _, digits = cursor.partition("-")
@@ -244,28 +277,23 @@ def _seq_after(cursor: str | None, epoch: str) -> int | None:
 
 def _within_64_bits(t_ns: int) -> int:
     """Years before 1677 and after 2262 mean the first and the last instant there is."""
-    return min(max(t_ns, _FIRST_NS), _LAST_NS)
+    return min(max(t_ns, -LAST - 1), LAST)
 
 
-def _not_stored(connection: sqlite3.Connection | None, held: Sequence[EstimateRow]) -> Iterator[EstimateRow]:
-    """Those of the held rows that are not on disk: neither moved there meanwhile nor there already as another row."""
+def _not_stored(connection: sqlite3.Connection | None, held: Sequence[JournalRow]) -> Iterator[JournalRow]:
+    """Those of the held records that are not on disk, in their last revision: neither moved there meanwhile nor batches
+    that are there already under another number.
+    """
     chain = Chain()
     known: dict[str, int] = {}
+    last = {row.id: row.seq for row in held}
     for row in map(chain.linked, held):
-        on_disk = connection and connection.execute("SELECT seq FROM estimates WHERE id = ?", (row.id,)).fetchone()
+        if row.kind not in BATCHES:
+            if last[row.id] == row.seq:
+                yield row
+            continue
+        on_disk = connection and connection.execute("SELECT seq FROM journal WHERE id = ?", (row.id,)).fetchone()
         if known.setdefault(row.id, on_disk[0] if on_disk else row.seq) != row.seq:
             chain.skip(row)
         elif not on_disk:
             yield row
-
-
-def _newest_held(held: tuple[EstimateRow, ...], is_rejected: bool) -> tuple[int, str] | None:
-    """(received_ns, text) of the newest row of one outcome that is not on disk yet."""
-    of_outcome = [row for row in held if row.is_rejected is is_rejected]
-    return (of_outcome[-1].received_ns, of_outcome[-1].text) if of_outcome else None
-
-
-def _without_spectra(text: str) -> str:
-    record = json.loads(text)
-    record.pop("spectra", None)
-    return json_line(record)

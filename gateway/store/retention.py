@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.errors import StoreError
+from gateway.history import SERVICE
 from gateway.store.age import CLOCK_UNSET_NS
+from gateway.store.questions import count_pruned
 from gateway.units import NS_PER_S
 
 _SHARE: Final = 0.05  # of the rows, removed at a time until the size fits
@@ -34,41 +36,38 @@ class Retention:
 
 
 def remove_old(connection: sqlite3.Connection, kept: Retention, now_ns: int) -> int:
-    """Rows removed for their age: oldest first, ending at the first one young enough, so that each is paid for once.
+    """Records removed for their age: oldest first, ending at the first one young enough, so that each is paid for once.
 
-    Rows received before the clock was set have no known age, and what still has to be delivered is not removed
+    Records received before the clock was set have no known age, and what still has to be delivered is not removed
     for its age: only the limit of size removes them.
     """
     cut_ns = now_ns - int(min(kept.max_age_s * NS_PER_S, now_ns))
-    n_removed = 0
-    for table, stamp, last in (
-        ("estimates", "received_ns", _last_delivered(connection, kept.undelivered_to)),
-        ("entries", "received_ns", _last_delivered(connection, kept.undelivered_to)),
-        ("events", "t_ns", _LAST),
-    ):
-        first_kept = connection.execute(
-            f"SELECT seq FROM {table} WHERE {stamp} >= ? ORDER BY seq LIMIT 1", (cut_ns,)
-        ).fetchone()
-        seq = _LAST if first_kept is None else first_kept[0]
-        n_removed += connection.execute(
-            f"DELETE FROM {table} WHERE seq < ? AND seq <= ? AND {stamp} >= ?", (seq, last, CLOCK_UNSET_NS)
-        ).rowcount
-    return n_removed
+    first_kept = connection.execute(
+        "SELECT seq FROM journal WHERE received_ns >= ? ORDER BY seq LIMIT 1", (cut_ns,)
+    ).fetchone()
+    seq = _LAST if first_kept is None else first_kept[0]
+    last = _last_delivered(connection, kept.undelivered_to)
+    condition = f"journal.seq < ? AND received_ns >= {CLOCK_UNSET_NS} AND (journal.seq <= ? OR kind = '{SERVICE}')"
+    return _remove(connection, condition, (seq, last))
 
 
 def remove_share(connection: sqlite3.Connection) -> int:
-    """The oldest rows, some of each table -> how many."""
-    n_removed = 0
-    for table in ("estimates", "entries", "events"):
-        n_rows = connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
-        n_removed += connection.execute(
-            f"DELETE FROM {table} WHERE seq IN (SELECT seq FROM {table} ORDER BY seq LIMIT ?)",
-            (int(n_rows * _SHARE) + 1,),
-        ).rowcount
-    return n_removed
+    """The oldest twentieth of the records -> how many."""
+    n_rows = connection.execute("SELECT count(*) FROM journal").fetchone()[0]
+    last = connection.execute(
+        "SELECT seq FROM journal ORDER BY seq LIMIT 1 OFFSET ?", (int(n_rows * _SHARE),)
+    ).fetchone()
+    return 0 if last is None else _remove(connection, "journal.seq <= ?", (last[0],))
+
+
+def _remove(connection: sqlite3.Connection, condition: str, asked: tuple[int, ...]) -> int:
+    if connection.execute(f"SELECT 1 FROM journal WHERE {condition} LIMIT 1", asked).fetchone() is None:
+        return 0
+    count_pruned(connection, condition, asked)
+    return connection.execute(f"DELETE FROM journal WHERE {condition}", asked).rowcount
 
 
 def _last_delivered(connection: sqlite3.Connection, uplinks: tuple[str, ...]) -> int:
-    """Number of the last row that nobody waits for."""
+    """Number of the last record that nobody waits for."""
     known = (connection.execute("SELECT seq FROM uplinks WHERE name = ?", (name,)).fetchone() for name in uplinks)
     return min((-1 if row is None else int(row[0]) for row in known), default=_LAST)

@@ -1,105 +1,74 @@
-"""The rows the database holds, each knowing its own INSERT."""
+"""The rows that the store writes: records of the journal, documents, and places of uplinks."""
 
-from dataclasses import astuple, dataclass, replace
-from typing import Any, ClassVar
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 
 @dataclass(frozen=True, slots=True)
-class EstimateRow:
-    """One batch: an estimate or a rejection. ``text`` is its JSON, compact; ``seq`` orders and never repeats.
+class JournalRow:
+    """One record. ``seq`` orders all records and never repeats; ``previous`` links batches into a chain.
 
-    ``previous`` is the number of the one accepted before it, 0 where there is none: the chain shows what is missing.
+    ``boot_ns`` is when it was received, on a clock that never steps (receipts); it is no column of the journal.
     """
 
-    INSERT: ClassVar[str] = (
-        "INSERT INTO estimates (seq, id, t_end_ns, vehicle_id, estimator, calibration_id, is_rejected, previous,"
-        " received_ns, text, checksum) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING"
-    )
-
     seq: int
+    kind: str
     id: str
+    revision: int
     t_end_ns: int
-    vehicle_id: str | None
-    estimator: str
-    calibration_id: str | None
-    is_rejected: bool
     previous: int
     received_ns: int
     text: str
+    boot_ns: int = 0
+
+    def columns(self) -> tuple[Any, ...]:
+        """All but the checksum, in the order of the table."""
+        return (
+            self.seq, self.kind, self.id, self.revision, self.t_end_ns, self.previous, self.received_ns, self.text
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
-class EventRow:
-    """Something that happened to the service: start, stop, bus lost, disk full."""
+class DocumentRow:
+    """A text that is kept under a name, in its last version."""
 
-    INSERT: ClassVar[str] = "INSERT INTO events (t_ns, kind, text) VALUES (?, ?, ?)"
-
-    t_ns: int
-    kind: str
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class CalibrationRow:
-    """A calibration file's content under its hash, so that every estimate can be traced to it."""
-
-    INSERT: ClassVar[str] = (
-        "INSERT INTO calibrations (id, received_ns, text) VALUES (?, ?, ?) ON CONFLICT (id) DO NOTHING"
-    )
-
-    id: str
+    name: str
     received_ns: int
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class DeliveryRow:
-    """How far an uplink has delivered: every estimate up to number ``seq``."""
-
-    INSERT: ClassVar[str] = (
-        "INSERT INTO uplinks (name, seq) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET seq = excluded.seq"
-    )
+    """How far an uplink has delivered: every record up to number ``seq``."""
 
     name: str
     seq: int
 
 
-@dataclass(frozen=True, slots=True)
-class EntryRow:
-    """A load event or a trip in one revision, numbered in one row with the estimates; it takes the earlier's place."""
+Row = JournalRow | DocumentRow | DeliveryRow
 
-    INSERT: ClassVar[str] = (
-        "INSERT INTO entries (seq, id, kind, t_end_ns, received_ns, text) VALUES (?, ?, ?, ?, ?, ?)"
-        " ON CONFLICT (seq) DO NOTHING"
-    )
-
-    seq: int
-    id: str
-    kind: str
-    t_end_ns: int
-    received_ns: int
-    text: str
+JOURNAL_COLUMNS: Final = "seq, kind, id, revision, t_end_ns, previous, received_ns, text"
 
 
-Row = EstimateRow | EventRow | CalibrationRow | DeliveryRow | EntryRow
-
-
-def bound(row: Row) -> tuple[Any, ...]:
-    """The row's fields in the order of its INSERT."""
-    return astuple(row)
+def checksum(columns: Sequence[Any]) -> int:
+    """CRC-32 of a row's columns, the sum itself left out: finds every single flipped bit, and any burst of 32."""
+    parts = (column if isinstance(column, bytes) else str(column).encode() for column in columns)
+    return zlib.crc32(b"\x1f".join(parts))
 
 
 class Chain:
-    """Links estimates to the one before them; one that was there already and is not stored again is no link."""
+    """Links batches to the one before them; one that was there already and is not stored again is no link."""
 
     def __init__(self, known: "Chain | None" = None) -> None:
         """Go on from ``known``, which stays as it is."""
         self._skipped: dict[int, int] = {} if known is None else dict(known._skipped)
 
-    def linked(self, row: EstimateRow) -> EstimateRow:
+    def linked(self, row: JournalRow) -> JournalRow:
         """The row behind the last one that counts."""
-        return replace(row, previous=self._skipped.pop(row.previous, row.previous))
+        return replace(row, previous=self._skipped.pop(row.previous, row.previous)) if row.previous else row
 
-    def skip(self, row: EstimateRow) -> None:
+    def skip(self, row: JournalRow) -> None:
         """Whoever comes behind this row is linked to the one before it."""
         self._skipped[row.seq] = row.previous

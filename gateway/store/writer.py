@@ -11,19 +11,22 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
+from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, SERVICE, Delivery
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
 from gateway.store.database import FILE_NAME, Database, is_damaged
-from gateway.store.held import Held
+from gateway.store.follower import StoreFollower
 from gateway.store.reader import StoreReader
 from gateway.store.retention import Retention
-from gateway.store.rows import CalibrationRow, Chain, EntryRow, EstimateRow, EventRow
+from gateway.store.rows import Chain, DocumentRow, JournalRow
+from gateway.store.write_buffer import WriteBuffer
 
-IDLE_S: Final = 60.0  # without new rows: how often age is looked at
+IDLE_S: Final = 900.0  # without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5
 RETRY_LAST_S: Final = 30.0
 STOP_WITHIN_S: Final = 3.0
+BOOT_ID: Final = Path("/proc/sys/kernel/random/boot_id")
 PAGE_OF_BAD: Final = 1000  # numbers of bad records that wait to be set aside; readers name them again
 
 
@@ -35,10 +38,11 @@ class Store:
     """
 
     def __init__(self, directory: Path, retention: Retention, clock_ns: Callable[[], int]) -> None:
-        self._path = directory / FILE_NAME
+        self.path = directory / FILE_NAME
         self._database = Database(directory, retention)
         self._clock_ns = clock_ns
-        self._held = Held(retention.max_held, epoch=secrets.token_hex(4))
+        self._boot_id = _boot_id()
+        self._buffer = WriteBuffer(retention.max_held, epoch=secrets.token_hex(4))
         self._closing = threading.Event()
         self._suspect = threading.Event()
         self._lost = threading.Event()
@@ -74,65 +78,59 @@ class Store:
         """
         if record.get("provisional"):
             raise ValueError("provisional estimates go to latest and the stream, not into the store")
-        text, received_ns = json_line(record), self._clock_ns()
-        return self._held.add_estimate(
-            lambda seq, previous: EstimateRow(
-                seq=seq,
-                id=record["id"],
-                t_end_ns=record["t_end_ns"],
-                vehicle_id=record["vehicle_id"],
-                estimator=record["estimator"],
-                calibration_id=record["calibration_id"],
-                is_rejected=bool(record["rejected"]),
-                previous=previous,
-                received_ns=received_ns,
-                text=text,
-            )
-        )
+        kind = REJECTION if record["rejected"] else ESTIMATE
+        return self._append(kind, record["id"], record["t_end_ns"], json_line(record))
+
+    def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
+        """Accept a load event, trip or alarm in a new revision -> its cursor; it takes the place of the one before."""
+        return self._append(kind, entry_id, t_end_ns, text, revision)
 
     def write_event(self, kind: str, detail: Mapping[str, Any]) -> None:
         """Accept something that happened to the service."""
-        self._held.add(EventRow(self._clock_ns(), kind, json_line(detail)))
+        self._append(SERVICE, "", self._clock_ns(), f"{kind}\n{json_line(detail)}")
 
-    def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str) -> str:
-        """Accept a load event or a trip in a new revision -> its cursor; it takes the place of the one before."""
-        received_ns = self._clock_ns()
-        return self._held.add_entry(lambda seq: EntryRow(seq, entry_id, kind, t_end_ns, received_ns, text))
+    def write_document(self, name: str, text: str) -> None:
+        """Keep a text under a name, in place of what was there."""
+        self._buffer.add(DocumentRow(name, self._clock_ns(), text))
 
     def write_calibration(self, calibration_id: str, text: str) -> None:
         """Keep the calibration that estimates will name."""
-        self._held.add(CalibrationRow(calibration_id, self._clock_ns(), text))
+        self.write_document(f"calibration {calibration_id}", text)
 
     def write_delivery(self, uplink: str, cursor: str) -> bool:
         """Remember that ``uplink`` has delivered everything up to ``cursor``.
 
         False, and nothing is remembered, for a cursor of a database that is gone.
         """
-        return self._held.add_delivery(uplink, cursor)
+        return self._buffer.add_delivery(uplink, cursor)
+
+    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> StoreFollower:
+        """As ``Journal.follow``."""
+        return StoreFollower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
+
+    def head(self) -> str:
+        """Cursor of the newest record accepted."""
+        return self._buffer.head()
+
+    def delivery(self, uplink: str, kinds: Sequence[str] = (*BATCHES, *ENTRIES)) -> Delivery:
+        """As ``StoreReader.delivery``."""
+        return self.reader().delivery(uplink, kinds)
 
     def flush(self, timeout_s: float) -> bool:
         """Wait until all that was accepted is on disk; False where the time did not suffice."""
-        return self._held.wait_until_empty(timeout_s)
+        return self._buffer.wait_until_empty(timeout_s)
 
     def reader(self) -> StoreReader:
         """Answers questions from any thread, from what is on disk and what is held."""
-        return StoreReader(
-            self._path,
-            self._held_estimates,
-            self._held.entries,
-            self._clock_ns,
-            self._suspect_damage,
-            self._suspect_records,
-            self._suspect_loss,
-        )
+        return StoreReader(self)
 
     def health(self) -> StoreStatus:
         return StoreStatus(
             state=StoreState.OK if self._reason is None else StoreState.DEGRADED,
             reason=self._reason,
             n_written=self._n_written,
-            n_held=len(self._held),
-            n_dropped=self._held.n_dropped,
+            n_held=len(self._buffer),
+            n_dropped=self._buffer.n_dropped,
             n_duplicates=self._n_duplicates,
             n_pruned=self._n_pruned,
             size_bytes=self._size_bytes,
@@ -147,30 +145,43 @@ class Store:
     def close(self, timeout_s: float = STOP_WITHIN_S) -> int:
         """Write what is held, end the writer -> rows that could not be stored."""
         self._closing.set()
-        self._held.wake()
+        self._buffer.wake()
         self._thread.join(timeout_s)
-        n_lost = len(self._held)
+        n_lost = len(self._buffer)
         if n_lost:
             log_event(Event.STORE_LOST_ROWS, level=logging.ERROR, n_rows=n_lost, reason=self._reason or "no time")
         return n_lost
 
-    def _held_estimates(self) -> tuple[str, tuple[EstimateRow, ...]]:
-        """The epoch and what is not on disk yet, linked to what is."""
-        epoch, rows = self._held.estimates()
-        return epoch, tuple(map(Chain(self._database.chain).linked, rows))
+    def held(self) -> tuple[str, tuple[JournalRow, ...]]:
+        """The epoch and the records that are not on disk yet, linked to those that are."""
+        epoch, rows = self._buffer.held()
+        return epoch, self._linked(rows)
 
-    def _suspect_damage(self) -> None:
+    def boot(self) -> tuple[str, int]:
+        """This start of the machine, and the nanoseconds since then, sleep included."""
+        return self._boot_id, _boot_ns()
+
+    def suspect_damage(self) -> None:
+        """A reader found the file damaged."""
         self._suspect.set()
-        self._held.wake()
+        self._buffer.wake()
 
-    def _suspect_loss(self) -> None:
+    def suspect_loss(self) -> None:
         """A reader found no file it could open: the next attempt looks whether ours is still the one there."""
         self._lost.set()
-        self._held.wake()
+        self._buffer.wake()
 
-    def _suspect_records(self, seqs: Sequence[int]) -> None:
+    def suspect_records(self, seqs: Sequence[int]) -> None:
+        """A reader found these records to be other than they were written."""
         self._bad_seqs.extend(seqs)
-        self._held.wake()
+        self._buffer.wake()
+
+    def _append(self, kind: str, record_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
+        row = JournalRow(0, kind, record_id, revision, t_end_ns, 0, self._clock_ns(), text, _boot_ns())
+        return self._buffer.append(row)
+
+    def _linked(self, rows: Sequence[JournalRow]) -> tuple[JournalRow, ...]:
+        return tuple(map(Chain(self._database.chain).linked, rows))
 
     def _write_until_closed(self) -> None:
         pause_s = RETRY_FIRST_S
@@ -178,9 +189,9 @@ class Store:
             is_last = self._closing.is_set()
             if self._try():
                 pause_s = RETRY_FIRST_S
-                if is_last and not len(self._held):
+                if is_last and not len(self._buffer):
                     break
-                self._held.wait_for_rows(IDLE_S, self._has_other_work)
+                self._buffer.wait_for_rows(IDLE_S, self._has_other_work)
             elif is_last:
                 break
             else:
@@ -197,7 +208,7 @@ class Store:
         except StoreError as error:  # since the start somebody put a foreign file there
             return self._degrade(str(error))
         finally:
-            self._held.rest()  # whoever waits in flush finds the counters and the state as they are now
+            self._buffer.rest()  # whoever waits in flush finds the counters and the state as they are now
 
     def _attempt(self) -> bool:
         """Bring to disk what is held; False where the disk refuses, and then it is still held."""
@@ -210,19 +221,19 @@ class Store:
             self._set_bad_records_aside()
             self._commit()
         except sqlite3.Error as error:
-            self._held.give_back()
-            return self._set_damaged_aside(error) if is_damaged(error) else self._degrade(f"{self._path}: {error}")
+            self._buffer.give_back()
+            return self._set_damaged_aside(error) if is_damaged(error) else self._degrade(f"{self.path}: {error}")
         except OSError as error:
-            self._held.give_back()
+            self._buffer.give_back()
             return self._degrade(str(error))
         return True
 
     def _open_if_closed(self) -> None:
         if self._database.is_open:
             return
-        opened = self._database.open(self._held.epoch)
+        opened = self._database.open(self._buffer.epoch)
         if not self._has_numbers:
-            self._held.rebase(opened.epoch, opened.last_seq)
+            self._buffer.rebase(opened.epoch, opened.last_seq, opened.last_batch, opened.newest)
             self._has_numbers = True
 
     def _set_bad_records_aside(self) -> None:
@@ -233,15 +244,16 @@ class Store:
             log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, seq=seq)
 
     def _commit(self) -> None:
-        rows = self._held.take()
+        rows = self._buffer.take()
+        stored: list[JournalRow] = []
         if rows:
-            n_new, n_known = self._database.add(rows)
-            self._n_written += n_new
+            stored, n_known = self._database.add(rows, self._boot_id)
+            self._n_written += sum(row.kind != SERVICE for row in stored)
             self._n_duplicates += n_known
         if self._reason is not None:
             log_event(Event.STORE_RECOVERED, n_held=len(rows))
             self._reason = None
-        self._held.settle()
+        self._buffer.settle(stored)
         self._n_pruned += self._database.prune(self._clock_ns())
         self._size_bytes = self._database.size_bytes()
 
@@ -257,7 +269,19 @@ class Store:
         try:
             self._set_aside = self._database.set_aside()
         except OSError as refusal:
-            return self._degrade(f"{self._path} is damaged ({error}) and cannot be set aside: {refusal}")
-        fault = f"{self._path} is damaged ({error})"
+            return self._degrade(f"{self.path} is damaged ({error}) and cannot be set aside: {refusal}")
+        fault = f"{self.path} is damaged ({error})"
         log_event(Event.STORE_DAMAGED, level=logging.ERROR, fault=fault, set_aside=self._set_aside)
-        return self._degrade(f"{self._path} was damaged and set aside as {self._set_aside}, a new one is on its way")
+        return self._degrade(f"{self.path} was damaged and set aside as {self._set_aside}, a new one is on its way")
+
+
+def _boot_ns() -> int:
+    return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+
+
+def _boot_id() -> str:
+    """Another one after each start of the machine; a name of this process where the kernel does not tell."""
+    try:
+        return BOOT_ID.read_text().strip()
+    except OSError:
+        return secrets.token_hex(8)

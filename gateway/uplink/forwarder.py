@@ -10,6 +10,7 @@ from typing import ClassVar, Final, Generic, TypeVar
 from gateway.errors import StoreError
 from gateway.history import Delivery
 from gateway.status import UplinkStatus, WebhookStatus
+from gateway.units import NS_PER_S
 from gateway.uplink.back_off import BackOff
 from gateway.uplink.outbox import Outbox
 
@@ -42,7 +43,9 @@ class Forwarder(ABC, Generic[Report]):
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
         """End; what is not delivered goes out after the next start."""
         self._stop.set()
-        self._thread.join(timeout_s)
+        self._outbox.tell_news()
+        if self._thread.ident is not None:
+            self._thread.join(timeout_s)
 
     def is_alive(self) -> bool:
         """True while the thread runs."""
@@ -52,16 +55,35 @@ class Forwarder(ABC, Generic[Report]):
         """How it is; safe from any thread. What waits and what was pruned is of a few seconds ago."""
         return self._report
 
-    @abstractmethod
     def _run(self) -> None:
-        """Deliver until asked to stop; a fault that can pass is told in the report, and tried again."""
+        """Deliver until asked to stop. Whatever goes wrong is told in the report and tried again."""
+        while not self._stop.is_set():
+            try:
+                self._deliver()
+            except Exception as fault:  # noqa: BLE001 - no record, disk or receiver may end the thread
+                self._note(str(fault) or repr(fault))
+                self._outbox.rewind()
+                self._pause(self._back_off.next_s())
+
+    @property
+    def fault(self) -> str | None:
+        """Nothing here: what goes wrong stands in the report."""
+        return None
+
+    @abstractmethod
+    def _deliver(self) -> None:
+        """Until asked to stop, or until something goes wrong."""
+
+    @abstractmethod
+    def _note(self, fault: str) -> None:
+        """Keep what went wrong, and tell it where it is news."""
 
     def _n_pruned(self, found: Delivery) -> int:
         """How many of those that this sender would have delivered were removed before."""
         return found.n_pruned
 
     def _pause(self, pause_s: float) -> None:
-        """Until it is time to try again; what waits meanwhile is still counted."""
+        """Until it is time to try again, or to stop; what waits meanwhile is still counted."""
         end_s = time.monotonic() + pause_s
         while not self._stop.is_set():
             with suppress(StoreError, TimeoutError, OSError):  # told where letters are asked for
@@ -80,6 +102,12 @@ class Forwarder(ABC, Generic[Report]):
         self._report = replace(
             self._report,
             n_waiting=found.n_waiting,
-            waiting_age_s=found.waiting_age_s,
+            waiting_age_s=_age_s(found.oldest_ns),
             n_pruned=self._n_pruned(found),
         )
+
+
+def _age_s(oldest_ns: int | None) -> float | None:
+    """None where none waits, and where the clock was put back since."""
+    age_s = -1.0 if oldest_ns is None else (time.time_ns() - oldest_ns) / NS_PER_S
+    return age_s if age_s >= 0.0 else None

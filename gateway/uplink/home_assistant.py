@@ -1,6 +1,8 @@
 """What Home Assistant is told, so that the vehicle appears there by itself: MQTT device discovery.
 
-One retained message names the device and its entities, each a template over the estimates that are sent anyway. As
+One retained message names the device and its entities. The weights are templates over the newest estimate, which is
+retained under ``latest``: they are there after a restart of Home Assistant and while the vehicle is parked, which is no
+reason to hide them; "Weighed" tells how old they are, "Connected" whether the vehicle is there. As
 https://www.home-assistant.io/integrations/mqtt, "Device discovery payload", has it (Home Assistant 2024.11 and later).
 """
 
@@ -9,6 +11,8 @@ import json
 import re
 from collections.abc import Mapping
 from typing import Any, Final
+
+from gateway.uplink.outbox import LATEST
 
 _WEIGHT: Final = {
     "platform": "sensor",
@@ -23,17 +27,27 @@ _OVERLOAD: Final = (
     "{{ 'None' if value_json.weights.gross.kg is none else "
     "'ON' if value_json.weights.values() | selectattr('is_over_limit') | list else 'OFF' }}"
 )
+_CONNECTED: Final = "{{ 'ON' if value_json.state == 'online' else 'OFF' }}"
 # Name, template, and what Home Assistant has to know of it. None, an unknown number, is its "unknown"
 ENTITIES: Final[dict[str, tuple[str, str, dict[str, Any]]]] = {
     "payload": ("Payload", "{{ value_json.payload_kg }}", _WEIGHT | _REST),
     "payload_std": ("Payload standard deviation", "{{ value_json.payload_std_kg }}", _WEIGHT | _REST | _DIAGNOSTIC),
-    "front_share": ("Front share", "{{ value_json.front_share_pct }}", _SHARE),
+    "front_share": ("Front share", "{{ value_json.front_share_pct }}", _SHARE | {"suggested_display_precision": 2}),
     "gross": ("Gross weight", "{{ value_json.weights.gross.kg }}", _WEIGHT | _REST),
     "front_axle": ("Front axle", "{{ value_json.weights.front_axle.kg }}", _WEIGHT | _REST),
     "rear_axle": ("Rear axle", "{{ value_json.weights.rear_axle.kg }}", _WEIGHT | _REST),
     "overload": ("Overload", _OVERLOAD, {"platform": "binary_sensor", "device_class": "problem"}),
-    "weighed": ("Weighed", "{{ value_json.t_end }}", {"platform": "sensor", "device_class": "timestamp"} | _DIAGNOSTIC),
-    "refused": ("Why not weighed", "{{ value_json.rejected | join(', ') }}", {"platform": "sensor"} | _DIAGNOSTIC),
+    "weighed": ("Weighed", "{{ value_json.t_end }}", {"platform": "sensor", "device_class": "timestamp"}),
+    "refused": (
+        "Why not weighed",
+        "{{ value_json.rejected | join(', ') }}",
+        {"platform": "sensor", "state_topic": "estimates"} | _DIAGNOSTIC,
+    ),
+    "connected": (
+        "Connected",
+        _CONNECTED,
+        {"platform": "binary_sensor", "device_class": "connectivity", "state_topic": "status"} | _DIAGNOSTIC,
+    ),
 }
 
 
@@ -48,19 +62,27 @@ def discovery(prefix: str, topic: str, birth: Mapping[str, Any]) -> tuple[str, s
         "sw_version": birth.get("version"),
     }
     components = {
-        key: {"name": name, "unique_id": f"springscale_{vehicle}_{key}", "value_template": template, **more}
+        key: {
+            "name": name,
+            "unique_id": f"springscale_{vehicle}_{key}",
+            "value_template": template,
+            **_below(topic, more),
+        }
         for key, (name, template, more) in ENTITIES.items()
     }
     told = {
         "device": {key: known for key, known in device.items() if known is not None},
         "origin": {"name": "springscale", "sw_version": birth.get("version") or "unknown"},
         "components": components,
-        "state_topic": f"{topic}/estimates",
-        "availability_topic": f"{topic}/status",
-        "availability_template": "{{ value_json.state }}",
+        "state_topic": f"{topic}/{LATEST}",
         "qos": 1,
     }
     return f"{prefix}/device/springscale_{vehicle}/config", json.dumps(told)
+
+
+def _below(topic: str, more: Mapping[str, Any]) -> dict[str, Any]:
+    """A topic of an entity's own is one below the vehicle's."""
+    return {**more, "state_topic": f"{topic}/{more['state_topic']}"} if "state_topic" in more else dict(more)
 
 
 def _object_id(name: str) -> str:

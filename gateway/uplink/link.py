@@ -1,12 +1,16 @@
 """One MQTT 5 connection, driven by whoever owns it: paho-mqtt without its own thread or queue of retries."""
 
 import json
+import os
+import select
+import ssl
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 import paho.mqtt.client as mqtt
-from paho.mqtt.enums import CallbackAPIVersion
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
@@ -60,9 +64,15 @@ class MqttLink:
         self._loss: str | None = None
         self._most_bytes: int | None = None  # the broker's Maximum Packet Size
         self._under_way = _NOTHING
+        self._bell_lock = threading.Lock()
+        self._bell = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._client = self._make_client()
-        self._connect()
-        self._announce(birth)
+        try:
+            self._connect()
+            self._announce(birth)
+        except BaseException:
+            self._hang_up()
+            raise
         if settings.home_assistant is not None:
             self._introduce(*discovery(settings.home_assistant, settings.topic, birth))
 
@@ -81,11 +91,39 @@ class MqttLink:
 
         A broker may give its last answer by ending the connection: then that comes first, and LinkError with the next.
         """
-        code = self._client.loop(0.0 if self._answers else timeout_s)
+        code = self._move(0.0 if self._answers else min(timeout_s, self._settings.keep_alive_s / 4.0))
         if not self._answers and (code != mqtt.MQTT_ERR_SUCCESS or self._loss is not None):
-            raise LinkError(self._loss or mqtt.error_string(code))
+            raise LinkError(self._loss or mqtt.error_string(MQTTErrorCode(code)))
         answers, self._answers = self._answers, []
         return answers
+
+    def wake(self) -> None:
+        """End the turn under way; from any thread."""
+        with self._bell_lock:  # its number may be another file's once it is closed
+            if self._bell >= 0:
+                os.eventfd_write(self._bell, 1)
+
+    def _move(self, timeout_s: float) -> int:
+        """Wait until the socket moves, somebody wakes us, or the time is out; read and write what can be.
+
+        By poll(): select(), which paho would use, knows no file beyond the first 1024 of a process.
+        """
+        client, sock = self._client, self._client.socket()
+        if sock is None:
+            return int(mqtt.MQTT_ERR_NO_CONN)
+        waiting = select.poll()
+        waiting.register(sock, select.POLLIN | (select.POLLOUT if client.want_write() else 0))
+        waiting.register(self._bell, select.POLLIN)
+        has_rest = isinstance(sock, ssl.SSLSocket) and sock.pending() > 0
+        moved = dict(waiting.poll(0 if has_rest else round(1000.0 * timeout_s)))
+        if self._bell in moved:
+            os.eventfd_read(self._bell)
+        events = moved.get(sock.fileno(), 0)
+        codes = [client.loop_write()] if events & select.POLLOUT else []
+        if has_rest or events & ~select.POLLOUT:
+            codes.append(client.loop_read())
+        codes.append(client.loop_misc())
+        return next((int(code) for code in codes if code != mqtt.MQTT_ERR_SUCCESS), int(mqtt.MQTT_ERR_SUCCESS))
 
     def close(self) -> None:
         """Say goodbye, so that the will is not carried out."""
@@ -95,15 +133,23 @@ class MqttLink:
                 if any(answer.mid == farewell for answer in self.turn(_TURN_S)):
                     break
             self._client.disconnect()
-            self._client.loop(_TURN_S)
+            self._move(_TURN_S)
         except LinkError:  # it was broken already
             pass
+        self._hang_up()
 
     def abandon(self) -> None:
         """Drop a broken connection; the broker carries out the will."""
         sock = self._client.socket()
         if sock is not None:
             sock.close()
+        self._hang_up()
+
+    def _hang_up(self) -> None:
+        with self._bell_lock:
+            bell, self._bell = self._bell, -1
+            if bell >= 0:
+                os.close(bell)
 
     def _make_client(self) -> mqtt.Client:
         settings = self._settings

@@ -1,17 +1,20 @@
-"""What is still to be delivered. The store is the queue: the outbox only knows how far it has come."""
+"""What is still to be delivered. The journal is the queue: the outbox only knows how far it has come."""
 
 import json
+import logging
+import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
-from gateway.history import Delivery, Page
+from gateway.history import ALARM, ESTIMATE, KINDS, Delivery, Journal, Record
+from gateway.log import Event, log_event
 from gateway.records import json_line
 
-ESTIMATE: Final = "estimate"
-_BRANCHES: Final = {"event": "events", "trip": "trips", "alarm": "alarms"}
+SETTLES_S: Final = 30.0  # a record is on disk after that, or the disk refuses
+LATEST: Final = "latest"  # topic of the newest estimate, retained
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,22 +31,8 @@ class Letter:
     branch: str = "estimates"
     is_retained: bool = False
     kind: str = ESTIMATE
-
-
-class History(Protocol):
-    """The store's reading side, as far as the outbox needs it."""
-
-    def estimates(
-        self, *, cursor: str | None = None, limit: int, with_spectra: bool, newest_first: bool = False
-    ) -> Page: ...
-    def entries(self, *, cursor: str | None, limit: int, upto: str | None = None) -> Page: ...
-    def delivery(self, uplink: str, *, kinds: Sequence[str] = (), with_estimates: bool = True) -> Delivery: ...
-
-
-class Memory(Protocol):
-    """The store's writing side, as far as the outbox needs it."""
-
-    def write_delivery(self, uplink: str, cursor: str) -> bool: ...
+    is_answer: bool = False  # a batch that was weighed
+    is_extra: bool = False  # a copy: not counted, and nothing is lost with it
 
 
 class Lately:
@@ -68,7 +57,7 @@ class Lately:
 
 
 class Outbox:
-    """Hands out letters in order, and again from the last delivered one after :meth:`rewind`.
+    """Hands out letters in order, and again from the last delivered one after :meth:`rewind`. One thread's.
 
     Where the database was replaced (set aside as damaged, deleted), its numbers begin anew: what the
     new one remembers counts then, and without that everything it holds goes out; ids are idempotent.
@@ -76,114 +65,120 @@ class Outbox:
 
     def __init__(
         self,
-        history: History,
-        memory: Memory,
+        journal: Journal,
         name: str,
         *,
         with_places: bool = False,
         repeat_s: float = 0.0,
         only: Sequence[str] = (),
+        with_latest: bool = False,
     ) -> None:
-        """``with_places`` lets positions go out where the store keeps them; ``only`` names kinds, none: all go out.
+        """``with_places`` lets positions go out where the store keeps them; ``only`` names letters, none: all go out.
 
-        ``repeat_s``: a broker that is killed forgets what it took since it last saved.
+        ``repeat_s``: a broker that is killed forgets what it took since it last saved. ``with_latest`` sends the newest
+        estimate once more, to be retained.
         """
-        self._history = history
-        self._memory = memory
+        self._journal = journal
         self._name = name
         self._with_places = with_places
-        self._only = tuple(only)
+        self._with_latest = with_latest
+        self._kinds = tuple(kind.name for kind in KINDS.values() if not only or kind.letter in only)
         self._lately = Lately(repeat_s)
         self._delivered: str | None = None  # until the store was asked
-        self._handed_out: str | None = None
+        self._under_way: str | None = None  # the last letter handed out, until it is delivered
+        self._news = threading.Event()
+        self._on_news: Callable[[], None] = lambda: None
+        self._follower = journal.follow(self._kinds, None, self.tell_news)
+        self._is_placed = False
+        self._looked: tuple[tuple[str, str | None], float, Delivery] | None = None
 
     def next_letters(self, limit: int) -> list[Letter]:
-        """Up to ``limit`` letters behind the last one handed out. Raises what the store's reader raises."""
-        while True:
-            letters, end = self._wanted_behind(self._handed_out, limit)
-            if end is not None and _epoch(self._handed_out) != _epoch(end):
-                self._take_place(_epoch(end))
-                letters, end = self._wanted_behind(self._handed_out, limit)
-            if letters:
-                self._handed_out = letters[-1].cursor
-            elif end is not None and end != self._handed_out:
-                self._pass_over(end)
-                continue
-            return letters
+        """Up to ``limit`` letters behind the last one handed out. Raises StoreError or TimeoutError."""
+        self._news.clear()
+        epoch = _epoch(self._journal.head())
+        if not self._is_placed or _epoch(self._follower.place) != epoch:
+            self._take_place(epoch)
+        letters: list[Letter] = []
+        while not letters and (records := self._follower.read(limit)):
+            letters = [letter for record in records if (letter := self._letter(record)) is not None]
+        if letters:
+            self._under_way = letters[-1].cursor
+        elif self._under_way is None and self._delivered != self._follower.place:
+            self._delivered = self._follower.place  # nothing up to there is wanted
+            self._journal.write_delivery(self._name, self._delivered)
+        return self._with_retained(letters) if self._with_latest else letters
+
+    def wait(self, timeout_s: float) -> None:
+        """Until there may be another letter, ``tell_news`` is called, or the time is out."""
+        self._news.wait(timeout_s)
+
+    def call(self, on_news: Callable[[], None]) -> None:
+        """Besides, call ``on_news`` with each new record, from the thread that writes it."""
+        self._on_news = on_news
 
     def delivered(self, letter: Letter) -> None:
-        """The broker has this letter and all before it."""
+        """The receiver has this letter and all before it."""
         self._lately.delivered(self._delivered, time.monotonic())
         self._delivered = letter.cursor
-        self._memory.write_delivery(self._name, letter.cursor)
+        if letter.cursor == self._under_way:
+            self._under_way = None
+        self._journal.write_delivery(self._name, letter.cursor)
 
     def rewind(self) -> None:
         """The link broke: what was handed out and not delivered goes out again, and what was delivered lately."""
-        self._delivered = self._handed_out = self._lately.before_it(self._delivered)
+        self._under_way = None
+        self._delivered = self._lately.before_it(self._delivered)
+        self._follower.go_to(self._delivered)
+        self._is_placed = self._delivered is not None
 
     def look(self) -> Delivery:
-        """How much waits and how much retention removed undelivered, as the store has it."""
-        if not self._only:
-            return self._history.delivery(self._name)
-        kinds = [kind for kind in self._only if kind in _BRANCHES]
-        return self._history.delivery(self._name, kinds=kinds, with_estimates=ESTIMATE in self._only)
+        """How much waits and how much retention removed undelivered, as the store has it.
 
-    def _pass_over(self, end: str) -> None:
-        """Nothing up to there is wanted; what was handed out before is delivered when more is asked for."""
-        self._handed_out = self._delivered = end
-        self._memory.write_delivery(self._name, end)
-
-    def _wanted_behind(self, cursor: str | None, limit: int) -> tuple[list[Letter], str | None]:
-        """Letters, and how far the store was looked through for them; None where there is nothing at all."""
-        if self._only and ESTIMATE not in self._only:
-            return self._entries_behind(cursor, limit)
-        letters = self._behind(cursor, limit)
-        wanted = [one for one in letters if not self._only or one.kind in self._only]
-        return wanted, letters[-1].cursor if letters else None
-
-    def _entries_behind(self, cursor: str | None, limit: int) -> tuple[list[Letter], str | None]:
-        """The newest estimate is asked for first: what has a lower number than it is there by then."""
-        newest = self._history.estimates(limit=1, with_spectra=False, newest_first=True).cursors
-        beside = self._history.entries(cursor=cursor, limit=limit)
-        if not beside.items:
-            return [], newest[0] if newest and not _is_behind(newest[0], cursor) else None
-        letters = [self._entry(place, text) for place, text in zip(beside.cursors, beside.items, strict=True)]
-        return [one for one in letters if one.kind in self._only], beside.cursors[-1]
-
-    def _behind(self, cursor: str | None, limit: int) -> list[Letter]:
-        """Estimates, and what was told beside them, by their numbers; where there is more of one, the other waits.
-
-        Whichever is asked for last has all up to the end of the other: what came between two questions is no gap.
+        The store is asked only where something came or went lately.
         """
-        page = self._history.estimates(cursor=cursor, limit=limit, with_spectra=False)
-        beside = self._history.entries(cursor=cursor, limit=limit, upto=page.next_cursor)
-        ends = [beside.next_cursor]
-        if beside.cursors and not (page.cursors and _is_behind(beside.cursors[-1], page.cursors[-1])):
-            page = self._history.estimates(cursor=cursor, limit=limit, with_spectra=False)
-            ends.append(beside.cursors[-1])
-        letters = [
-            _letter(place, previous, self._shown(json.loads(text)))
-            for place, previous, text in zip(page.cursors, page.previous, page.items, strict=True)
-        ]
-        letters += (self._entry(place, text) for place, text in zip(beside.cursors, beside.items, strict=True))
-        last = min((_number(place) for place in (*ends, page.next_cursor) if place), default=None)
-        kept = [one for one in letters if last is None or _number(one.cursor) <= last]
-        return sorted(kept, key=lambda one: _number(one.cursor))
+        state, now_s = (self._journal.head(), self._delivered), time.monotonic()
+        if self._looked is None or self._looked[0] != state:
+            self._looked = (state, now_s, self._journal.delivery(self._name, self._kinds))
+        elif now_s - self._looked[1] < SETTLES_S:  # what came may not have been on disk
+            self._looked = (state, self._looked[1], self._journal.delivery(self._name, self._kinds))
+        return self._looked[2]
 
-    def _entry(self, cursor: str, text: str) -> Letter:
-        return _entry_letter(cursor, self._shown(json.loads(text)))
-
-    def _shown(self, record: dict[str, Any]) -> dict[str, Any]:
-        """What may leave the box."""
-        return record if self._with_places else without_places(record)
+    def tell_news(self) -> None:
+        """Look for letters now; from any thread."""
+        self._news.set()
+        self._on_news()
 
     def _take_place(self, epoch: str) -> None:
         """Go on where the database that is there now remembers us; an uplink it never saw begins at its first row."""
-        known = self._history.delivery(self._name).cursor
+        known = self._journal.delivery(self._name, self._kinds).cursor
         if _epoch(known) != epoch:
             known = f"{epoch}-0"
-            self._memory.write_delivery(self._name, known)  # from here on, what retention removes is counted
-        self._delivered = self._handed_out = known
+            self._journal.write_delivery(self._name, known)  # from here on, what retention removes is counted
+        self._delivered = known
+        self._follower.go_to(known)
+        self._is_placed = True
+
+    def _letter(self, record: Record) -> Letter | None:
+        """None, and told, for one that is as it was written and yet no record of this program."""
+        try:
+            return letter_of(record, self._shown(json.loads(record.text)))
+        except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as fault:
+            log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, seq=record.number, fault=repr(fault))
+            return None
+
+    def _shown(self, record: dict[str, Any]) -> dict[str, Any]:
+        """What may leave the box: no spectra, and positions only where they are wanted."""
+        record.pop("spectra", None)
+        return record if self._with_places else without_places(record)
+
+    def _with_retained(self, letters: list[Letter]) -> list[Letter]:
+        """The newest estimate among these goes out a second time, first, under ``latest``, where it is retained."""
+        newest = next((one for one in reversed(letters) if one.is_answer), None)
+        if newest is None:
+            return letters
+        again = replace(newest, branch=LATEST, is_retained=True, is_extra=True)
+        place = letters.index(newest)
+        return [*letters[:place], again, *letters[place:]]
 
 
 def without_places(record: dict[str, Any]) -> dict[str, Any]:
@@ -197,29 +192,20 @@ def _bare(part: Any) -> Any:
     return [_bare(one) for one in part] if isinstance(part, list) else part
 
 
-def _number(cursor: str) -> int:
-    return int(cursor.partition("-")[2])
-
-
-def _entry_letter(cursor: str, record: dict[str, Any]) -> Letter:
-    """Alarms have a topic for each cause, where the last one is retained."""
-    kind = record["id"].partition("-")[0]
-    letter = Letter(cursor, f"{record['id']}-{record['revision']}", json_line(record), _BRANCHES[kind], kind=kind)
-    if kind != "alarm":
-        return letter
-    below = [part for part in (record["kind"], record["where"]) if part]
-    return replace(letter, branch="/".join((letter.branch, *below)), is_retained=True)
-
-
-def _letter(cursor: str, previous: int | None, record: dict[str, Any]) -> Letter:
-    stream, _, number = cursor.partition("-")
-    sequence = {"stream": stream, "number": int(number), "previous": previous}
-    return Letter(cursor, record["id"], json_line(record | {"sequence": sequence}))
-
-
-def _is_behind(cursor: str, other: str | None) -> bool:
-    """Whether it comes no later than another of the same database."""
-    return other is not None and _epoch(cursor) == _epoch(other) and _number(cursor) <= _number(other)
+def letter_of(record: Record, shown: dict[str, Any]) -> Letter:
+    """Batches tell their place in the chain; alarms have a topic for each cause, where the last one is retained."""
+    kind = KINDS[record.kind]
+    if not kind.is_revised:
+        sequence = {
+            "stream": _epoch(record.cursor), "number": record.number, "previous": record.previous
+        }  # fmt: skip
+        text = json_line(shown | {"sequence": sequence})
+        return Letter(record.cursor, record.id, text, kind.branch, kind=kind.letter, is_answer=record.kind == ESTIMATE)
+    branch = kind.branch
+    if record.kind == ALARM:
+        branch = "/".join((branch, *(part for part in (shown["kind"], shown["where"]) if part)))
+    letter_id = f"{record.id}-{shown['revision']}"
+    return Letter(record.cursor, letter_id, json_line(shown), branch, kind.is_retained, kind.letter)
 
 
 def _epoch(cursor: str | None) -> str:

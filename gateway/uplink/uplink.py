@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final, Protocol
 
-from gateway.errors import ConfigurationError, StoreError
 from gateway.log import Event, log_event
 from gateway.status import UplinkStatus
 from gateway.uplink.back_off import BackOff
@@ -16,7 +15,8 @@ from gateway.uplink.link import Answer, LinkError, MqttLink
 from gateway.uplink.outbox import Letter, Outbox
 from gateway.uplink.settings import UplinkSettings
 
-POLL_S: Final = 0.5  # how long a new estimate may lie before it is seen
+IDLE_S: Final = 5.0  # a turn with nothing to do; a new record ends it
+TURN_S: Final = 0.5  # likewise while an answer is awaited
 ANSWER_TIMEOUT_S: Final = 30.0  # a broker that takes longer is as good as gone
 
 
@@ -25,6 +25,7 @@ class Link(Protocol):
 
     def send(self, letter: Letter) -> int: ...
     def turn(self, timeout_s: float) -> list[Answer]: ...
+    def wake(self) -> None: ...
     def close(self) -> None: ...
     def abandon(self) -> None: ...
 
@@ -51,33 +52,26 @@ class Uplink(Forwarder[UplinkStatus]):
         self._birth = {"state": "online", **birth}
         self._connect = connect
 
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            try:
-                self._one_connection()
-            except (LinkError, ConfigurationError, StoreError, TimeoutError, OSError) as fault:
-                self._note(str(fault))
-                self._outbox.rewind()
-                self._pause(self._back_off.next_s())
-
-    def _one_connection(self) -> None:
+    def _deliver(self) -> None:
         """Deliver until asked to stop, or until LinkError."""
         link = self._connect(self._settings, self._birth)
         self._report = replace(
             self._report, is_connected=True, n_connections=self._report.n_connections + 1, last_fault=None
         )
         log_event(Event.UPLINK_CONNECTED, broker=self._settings.broker)
+        self._outbox.call(link.wake)
         try:
-            self._deliver(link)
+            self._deliver_in_turn(link)
             link.close()
         except BaseException:
             self._report = replace(self._report, n_cuts=self._report.n_cuts + 1)
             link.abandon()
             raise
         finally:
+            self._outbox.call(lambda: None)
             self._report = replace(self._report, is_connected=False)
 
-    def _deliver(self, link: Link) -> None:
+    def _deliver_in_turn(self, link: Link) -> None:
         """One letter at a time: the next leaves when the broker has answered for the last, so order cannot break."""
         waiting: deque[Letter] = deque()
         while not self._stop.is_set():
@@ -87,12 +81,12 @@ class Uplink(Forwarder[UplinkStatus]):
             if waiting:
                 self._deliver_one(link, waiting.popleft())
             else:
-                link.turn(POLL_S)
+                link.turn(IDLE_S)
 
     def _deliver_one(self, link: Link, letter: Letter) -> None:
         """Until the broker has answered for it. Raises LinkError where it did not, or may take it another time."""
         answer = self._answer_for(link, link.send(letter))
-        if answer is None:
+        if answer is None or letter.is_extra:  # a broker that does not want the copy gets the letter all the same
             return
         report = self._report
         if answer.is_accepted:
@@ -111,7 +105,7 @@ class Uplink(Forwarder[UplinkStatus]):
         """None where the service stopped meanwhile."""
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while not self._stop.is_set():
-            for answer in link.turn(POLL_S):
+            for answer in link.turn(TURN_S):
                 if answer.mid == mid:
                     return answer
             if time.monotonic() > end_s:
@@ -119,7 +113,7 @@ class Uplink(Forwarder[UplinkStatus]):
         return None
 
     def _note(self, fault: str) -> None:
-        """Keep what went wrong, and tell it where it is news; a connection that was there had no fault."""
+        """As the forwarder's; a connection that was there had no fault."""
         if fault != self._report.last_fault:
             was_connected = self._report.n_connections > 0 and self._report.last_fault is None
             event = Event.UPLINK_LOST if was_connected else Event.UPLINK_NOT_REACHED

@@ -4,7 +4,8 @@ Estimates come in through the board, the history through a reader, the service's
 to whoever has a token. The application is made by ``create_app``, from the door, the live board and the routes.
 """
 
-from gateway.web.app import create_app, forget_routes
+from gateway.history import Reader
+from gateway.web.app import create_app
 from gateway.web.door import (
     Scope,
     Tls,
@@ -15,8 +16,8 @@ from gateway.web.door import (
     server_config,
 )
 from gateway.web.live import Board, boot_clock_s
-from gateway.web.reader import Reader
-from gateway.web.routes import KnownLoad, KnownLoads, LatestWeights, Scales, weigh_latest
+from gateway.web.routes.known_loads import KnownLoad, KnownLoads
+from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 from gateway.web.settings import WebSettings
 
 __all__ = [
@@ -33,7 +34,6 @@ __all__ = [
     "WebSettings",
     "boot_clock_s",
     "create_app",
-    "forget_routes",
     "refuse_open_address",
     "renew_certificate",
     "server_config",

@@ -6,10 +6,12 @@ from contextlib import asynccontextmanager
 from typing import Any, Final
 
 from fastapi import FastAPI
-from fastapi.dependencies import models
 from starlette.types import ASGIApp
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.errors import AlarmRefusedError, CommissioningRefusedError
+from gateway.history import Reader
+from gateway.records import json_line
 from gateway.status import Status
 from gateway.web import pages
 from gateway.web.door import (
@@ -24,49 +26,51 @@ from gateway.web.door import (
     problems,
 )
 from gateway.web.live import Board, LatestFirst
-from gateway.web.reader import Reader
-from gateway.web.routes import (
-    KNOWN_LOADS_PATH,
-    AlarmDesk,
-    CommissioningDesk,
-    FrameLog,
-    KnownLoads,
-    NoAlarmDesk,
-    NoCommissioningDesk,
-    NoFrameLog,
-    NoTareDesk,
-    NoTicketDesk,
-    NoTrend,
+from gateway.web.routes.absent import absent
+from gateway.web.routes.alarms import AlarmDesk, alarms_router
+from gateway.web.routes.cab import cab_router
+from gateway.web.routes.calibration import (
+    KnownWeightService,
+    NoKnownWeights,
     NoVerificationDesk,
-    Scales,
-    TareDesk,
-    TicketDesk,
     TrendDesk,
     VerificationDesk,
-    alarms_router,
-    api_router,
-    cab_router,
-    commissioning_router,
-    events_router,
-    export_router,
-    health_router,
-    j1939_router,
-    known_loads_router,
-    metrics_registry,
-    reasons_router,
-    record_router,
-    rfms_router,
-    spectra_router,
-    tare_router,
-    tickets_router,
+    known_weights_router,
     trend_router,
-    vehicle_router,
     verification_router,
-    vss_router,
-    weights_router,
 )
+from gateway.web.routes.commissioning import CommissioningDesk, commissioning_router
+from gateway.web.routes.estimates import api_router
+from gateway.web.routes.events import events_router
+from gateway.web.routes.export import export_router
+from gateway.web.routes.health import health_router
+from gateway.web.routes.j1939 import j1939_router
+from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
+from gateway.web.routes.metrics import metrics_registry
+from gateway.web.routes.reasons import reasons_router
+from gateway.web.routes.record import FrameLog, record_router
+from gateway.web.routes.rfms import rfms_router
+from gateway.web.routes.spectra import spectra_router
+from gateway.web.routes.vehicle import vehicle_router
+from gateway.web.routes.vss import vss_router
+from gateway.web.routes.weights import Scales, weights_router
 from gateway.web.settings import WebSettings
 
+_NOT_HERE: Final = CommissioningRefusedError("not_allowed", "there is no service behind this page that could calibrate")
+_NO_ALARM: Final = AlarmRefusedError("no_such_alarm", "it is none of the alarms that can be acknowledged")
+NO_TREND: Final = json_line({"calibration_id": None, "parameters": []})
+NO_LINES: Final = json_line({"items": []})
+NOT_COMMISSIONED: Final = json_line(
+    {
+        "is_allowed": False,
+        "why_not": str(_NOT_HERE),
+        "is_offered": False,
+        "is_pending": False,
+        "underway": None,
+        "active": None,
+        "history": [],
+    }
+)
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
 
@@ -80,14 +84,15 @@ def create_app(
     settings: WebSettings | None = None,
     calibrated: CalibratedVehicle | None = None,
     tokens: TokenFile | None = None,
-    tare: TareDesk | None = None,
+    known_weights: KnownWeightService | None = None,
     commissioning: CommissioningDesk | None = None,
     known_loads: KnownLoads | None = None,
     record: FrameLog | None = None,
     verification: VerificationDesk | None = None,
     trend: TrendDesk | None = None,
-    tickets: TicketDesk | None = None,
     alarms: AlarmDesk | None = None,
+    *,
+    draws_trailers: bool = False,
 ) -> FastAPI:
     """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
     service is (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the
@@ -118,27 +123,31 @@ def create_app(
     )
     problems.install(app)
     scales = Scales(calibrated)
-    app.include_router(api_router(board, reader, status, chosen))
-    app.include_router(reasons_router())
-    app.include_router(vehicle_router(status, calibrated))
-    app.include_router(spectra_router(board, calibrated))
-    app.include_router(tare_router(tare or NoTareDesk()))
-    app.include_router(verification_router(verification or NoVerificationDesk()))
-    app.include_router(trend_router(trend or NoTrend()))
-    app.include_router(tickets_router(tickets or NoTicketDesk()))
-    app.include_router(commissioning_router(commissioning or NoCommissioningDesk()))
-    app.include_router(export_router(reader))
-    app.include_router(events_router(reader))
-    app.include_router(alarms_router(reader, alarms or NoAlarmDesk()))
-    app.include_router(record_router(record or NoFrameLog()))
-    app.include_router(weights_router(board, scales))
-    app.include_router(cab_router(board, reader, status, scales))
-    app.include_router(j1939_router(board, scales))
-    app.include_router(vss_router(board, scales))
-    app.include_router(rfms_router(board, reader, status, scales))
-    app.include_router(health_router(status, metrics_registry(board, scales, status, responses)))
+    metrics = metrics_registry(board, scales, status, responses)
+    routers = [
+        api_router(board, reader, status, chosen),
+        reasons_router(),
+        vehicle_router(status, calibrated),
+        spectra_router(board, calibrated),
+        known_weights_router(known_weights or NoKnownWeights()),
+        verification_router(verification or NoVerificationDesk()),
+        trend_router(trend or absent(told=NO_TREND)),
+        commissioning_router(commissioning or absent(_NOT_HERE, told=NOT_COMMISSIONED, lines=NO_LINES)),
+        export_router(reader),
+        events_router(reader),
+        alarms_router(reader, alarms or absent(_NO_ALARM, standing="[]")),
+        record_router(record or absent(segments=(), open=None)),
+        weights_router(board, scales),
+        cab_router(board, reader, status, scales),
+        j1939_router(board, scales, draws_trailers=draws_trailers),
+        vss_router(board, scales),
+        rfms_router(board, reader, status, scales),
+        health_router(status, metrics),
+    ]
     if known_loads is not None:
-        app.include_router(known_loads_router(known_loads))
+        routers.append(known_loads_router(known_loads))
+    for router in routers:
+        app.include_router(router)
     pages.install(app, KNOWN_LOADS_PATH if known_loads else "")
     _describe(app, tokens)
     return app
@@ -171,14 +180,3 @@ def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
         return told[is_guarded]
 
     app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's documented way to extend the description
-
-
-def forget_routes() -> None:
-    """Let go of the applications that are over.
-
-    FastAPI remembers the last thousand routes that it looked at, and so all that stands behind them: a service that
-    begins anew would hold every one before it.
-    """
-    for remembered in vars(models).values():
-        if hasattr(remembered, "cache_clear"):
-            remembered.cache_clear()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import jsonschema_rs
 import pytest
+from starlette.types import Message
 from support.alarms import LIMIT_KG, AlarmBench, of_load
 from support.web import Client
 
@@ -15,7 +16,7 @@ from gateway.records import Why
 from gateway.status import State, Status
 from gateway.web import Scope, TokenFile, create_app
 from gateway.web.live.stream import EventStream
-from gateway.web.routes.alarms.routes import Alarm
+from gateway.web.routes.alarms import Alarm
 
 URL = "/api/v1/alarms"
 OVER = LIMIT_KG + 60.0
@@ -114,9 +115,21 @@ def test_metrics_name_every_alarm_that_is_watched(alarmed: Alarmed) -> None:
 
 def test_a_stream_that_is_resumed_tells_what_was_missed(alarmed: Alarmed) -> None:
     async def first() -> bytes:
-        stream = EventStream(alarmed.bench.board.fanout, alarmed.bench.store.reader(), "0000-0", 30.0)
-        found = [event.wire async for event in stream._missed("0000-0")]
-        return b"".join(found)
+        board = alarmed.bench.board
+        response = EventStream(board.fanout, alarmed.bench.store.reader(), "0000-0", 30.0)
+        sent: list[bytes] = []
+
+        async def send(message: Message) -> None:
+            sent.append(message.get("body", b""))
+            if b"event: alarm" in sent[-1]:
+                board.close()
+
+        async def receive() -> Message:
+            await asyncio.Event().wait()
+            return {"type": "http.disconnect"}
+
+        await response({"type": "http"}, receive, send)
+        return b"".join(sent)
 
     told = asyncio.run(first()).decode()
     assert "event: alarm" in told

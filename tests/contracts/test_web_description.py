@@ -14,17 +14,15 @@ from schemathesis import GenerationMode
 from schemathesis.schemas import APIOperation, BaseSchema
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 from support.alarms import LIMIT_KG, SUBJECT, of_load
-from support.calibrated import calibration_file
 from support.commissioning import Bench
 from support.estimates import make_estimate
+from support.known_weights import KnownWeightBench
 from support.patience import PATIENCE_S
-from support.tare import FakePipeline
 from support.web import Gateway
 
 from gateway.core.alarms import AlarmRules
 from gateway.records import Why
 from gateway.service.alarm_desk import AlarmDesk
-from gateway.service.tare_desk import Subject, TareDesk
 from gateway.web import Scope, TokenFile, WebSettings
 
 COMMISSIONING = "/api/v1/calibration/commissioning"
@@ -34,7 +32,10 @@ CHANGES = [
     "POST /api/v1/calibration/tare",
     "DELETE /api/v1/calibration/tare",
     "POST /api/v1/calibration/tickets",
-    "DELETE /api/v1/calibration/tickets/{ticket_id}",
+    "DELETE /api/v1/calibration/tickets/{entry_id}",
+    "POST /api/v1/known-weights",
+    "POST /api/v1/known-weights/{entry_id}/confirm",
+    "DELETE /api/v1/known-weights/{entry_id}",
     "POST /api/v1/calibration/verifications",
     f"POST {COMMISSIONING}",
     f"DELETE {COMMISSIONING}",
@@ -65,6 +66,7 @@ PATHS = [
     "/api/v1/vss",
     "/api/v1/calibration/tare",
     "/api/v1/calibration/tickets",
+    "/api/v1/known-weights",
     "/api/v1/calibration/trend",
     "/api/v1/calibration/verifications",
     "/api/v1/calibration/verifications/{record_id}",
@@ -96,22 +98,20 @@ def headers(token_file: TokenFile) -> dict[str, str]:
     return {"Authorization": f"Bearer {token_file.create('schemathesis', Scope.OPERATE)}"}
 
 
-def tare_desk(directory: Path) -> TareDesk:
-    """A desk whose vehicle can be tared at any time."""
-    subject = Subject(calibration_file().for_core(), "ratio_index", "van-17")
-    return TareDesk(directory, subject, FakePipeline(), stale_after_s=900.0, on_event=lambda kind, detail: None)
-
-
 @pytest.fixture(scope="module")
 def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
     with (
         tempfile.TemporaryDirectory() as directory,
         Gateway(
-            Path(directory), PATIENT, token_file, tare_desk(Path(directory)), Bench(Path(directory)).desk
+            Path(directory),
+            PATIENT,
+            token_file,
+            KnownWeightBench(Path(directory), 276.0).service,
+            Bench(Path(directory)).desk,
         ) as gateway,
     ):
         gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
-        AlarmDesk(AlarmRules(), SUBJECT, gateway.store, gateway.board)(of_load(0, LIMIT_KG + 60.0))
+        AlarmDesk(AlarmRules(), SUBJECT, gateway.store)(of_load(0, LIMIT_KG + 60.0))
         assert gateway.store.flush(PATIENCE_S)
         gateway.board.close()  # so that the stream has an end
         yield schemathesis.openapi.from_asgi("/openapi.json", gateway.app)
@@ -125,14 +125,18 @@ def test_no_path_escapes(schema: BaseSchema) -> None:
     assert set(operations(schema)) == set(LABELS)
 
 
-# OpenAPI cannot say that two parameters exclude one another, as rFMS has it.
-EXCLUDED = {"GET /rfms/vehiclestatuses": [positive_data_acceptance]}
+# OpenAPI cannot say that two parameters exclude one another, as rFMS has it, nor which kind wants which weight.
+EXCLUDED = {
+    "GET /rfms/vehiclestatuses": [positive_data_acceptance],
+    "POST /api/v1/known-weights": [positive_data_acceptance],
+}
 LABELS = [*(f"GET {path}" for path in PATHS), *CHANGES]
 WITHOUT_PARAMETERS = ("latest", "status", "reasons", "vehicle", "vss", "live", "ready", "metrics", "record", "trend")
 WITHOUT_PARAMETERS += (
     "GET /api/v1/calibration/tare",
     "GET /api/v1/calibration/verifications",
     "GET /api/v1/calibration/tickets",
+    "GET /api/v1/known-weights",
 )
 WITHOUT_PARAMETERS += (f"GET {COMMISSIONING}", f"GET {COMMISSIONING}/lines")
 WITHOUT_PARAMETERS += (f"DELETE {COMMISSIONING}", f"POST {COMMISSIONING}/fit")

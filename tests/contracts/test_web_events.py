@@ -26,8 +26,7 @@ def gateway(tmp_path: Path):
         for one in DAY:
             opened.publish(one)
             for entry in ledger.add(one):
-                cursor = opened.store.write_entry(entry.kind, entry.id, entry.t_end_ns, json_line(entry.record))
-                opened.board.publish_entry(entry.kind, json_line(entry.record), cursor)
+                opened.store.write_entry(entry.kind, entry.id, entry.t_end_ns, json_line(entry.record))
         yield opened
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.estimates import posterior_of
 from support.half_car_road import batch_over_road
 from support.web import Client, Gateway
 
@@ -15,7 +16,7 @@ from gateway.calibration.file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.spectrum import spectra_of
-from gateway.estimate import Correction, Estimate, Quantity
+from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import spectra_from_json
 from gateway.records import Spectra, Why
 from gateway.web import Board, create_app
@@ -93,14 +94,14 @@ def test_the_next_batch_has_a_model_of_its_own(client: Client, board: Board, wei
     assert second["model"]["pitch_rate_radps_rthz"] != first["model"]["pitch_rate_radps_rthz"]
 
 
-def test_the_model_carries_what_a_tare_took_off(client: Client, board: Board, weighed: Estimate) -> None:
+def test_the_model_is_of_what_was_measured(client: Client, board: Board, weighed: Estimate) -> None:
     board.publish(weighed)
-    untared = told(client)["model"]
-    raw = Correction("t1", Quantity(15.0), Quantity(-0.3), raw_payload=Quantity(270.0), raw_front_share=Quantity(47.0))
-    board.publish(replace(weighed, payload=Quantity(255.0), front_share=Quantity(47.3), tare=raw))
+    plain = told(client)["model"]
+    known = posterior_of(255.0, 47.3, 6.0, 0.2)
+    board.publish(replace(weighed.answered(known), measured=posterior_of(270.0, 47.0, 9.0, 0.3), known_weights_id="cd"))
     answer = told(client)
     assert answer["payload_kg"] == 255.0
-    assert answer["model"] == untared
+    assert answer["model"] == plain
 
 
 NO_MODEL = {

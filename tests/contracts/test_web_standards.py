@@ -268,11 +268,27 @@ def test_j1939_counts_are_the_weights_in_its_resolutions(gateway: Gateway) -> No
     assert told["id"] == loaded(0).id
 
 
-@pytest.mark.parametrize(("payload_kg", "raw", "kg"), [(-3.2, 0, 0.0), (200_000.0, 65535, None)])
+@pytest.mark.parametrize(("payload_kg", "raw", "kg"), [(-3.2, 0, 0.0), (200_000.0, 65024, None)])
 def test_j1939_counts_stay_in_their_range(gateway: Gateway, payload_kg: float, raw: int, kg: float | None) -> None:
     gateway.publish(loaded(0, payload_kg=payload_kg))
     cargo = client(gateway).get("/api/v1/weights/j1939").json()["parameters"][2]
     assert (cargo["spn"], cargo["raw"], cargo["kg"]) == (181, raw, kg)
+
+
+def test_j1939_tells_no_early_look_and_nothing_of_what_is_drawn(gateway: Gateway) -> None:
+    """The bus and the page disagreed."""
+    gateway.publish(loaded(0))
+    calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0))
+    drawing = create_app(
+        gateway.board, gateway.store.reader(), lambda: gateway.status, calibrated=calibrated, draws_trailers=True
+    )
+    *known, combination = Client(drawing).get("/api/v1/weights/j1939").json()["parameters"]
+    assert (combination["raw"], combination["kg"]) == (0xFFFF, None)
+    assert all(each["kg"] for each in known)
+    gateway.board.publish(replace(loaded(1), t_start_ns=10**15, t_end_ns=2 * 10**15, is_provisional=True))
+    assert gateway.board.shown().estimate.is_provisional
+    early = client(gateway).get("/api/v1/weights/j1939").json()["parameters"]
+    assert {each["raw"] for each in early} == {0xFFFF}
 
 
 def test_j1939_says_not_available_for_what_is_not_known(gateway: Gateway) -> None:

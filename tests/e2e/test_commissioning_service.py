@@ -1,6 +1,5 @@
 """A vehicle commissioned at a running service over HTTP: the same numbers as calibrated from logs at a desk."""
 
-import gc
 import json
 from pathlib import Path
 from typing import Any
@@ -104,8 +103,6 @@ def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, 
         said["undone"] = running.ask("/api/v1/calibration/commissioning/undo", {}, "POST")
         running.wait_until(lambda told: running.n_starts == 3 and not told["is_pending"])
         said["after"] = running.ask("/api/v1/status")
-        gc.collect()
-        said["held"] = [ref for ref in running.ended if ref() is not None]
 
     serve(config, meet)
 
@@ -120,7 +117,6 @@ def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, 
     assert box.warnings == desk.warnings
     assert said["undone"]["active"] is None
     assert said["after"]["calibration_id"] is None
-    assert said["held"] == [], "a service that began anew holds those before it in memory"
     assert_weighs_the_same(config, tmp_path, desk)
 
 

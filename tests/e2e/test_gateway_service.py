@@ -298,7 +298,7 @@ BROKEN = [b"", b"{", b"\xff\xfe", b'{"note": "\\ud83d"}', b"[" * 5000, None]
 
 
 @pytest.mark.parametrize("content", BROKEN, ids=repr)
-@pytest.mark.parametrize("name", ["tare.json", "tokens.json"])
+@pytest.mark.parametrize("name", ["known_weights.json", "tokens.json"])
 def test_a_broken_side_file_is_told_and_set_aside_while_the_weighing_begins(
     config: Path, name: str, content: bytes | None
 ) -> None:

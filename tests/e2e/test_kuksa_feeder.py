@@ -1,5 +1,6 @@
 """deploy/kuksa/feeder.py from a real service into a small databroker, made of the stubs that its client comes with."""
 
+import math
 import subprocess
 import sys
 import time
@@ -7,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +63,8 @@ class Databroker(v2_grpc.VALServicer):
         self.port = port
         self.now: dict[str, float | int | None] = {}
         self.published: list[str] = []
+        self.refused: list[str] = []
+        self.narrowed: dict[str, float] = {}  # greatest values of an integrator's own specification
         self._metadata = Metadata(paths)
         self.start()
 
@@ -75,12 +79,33 @@ class Databroker(v2_grpc.VALServicer):
         self._server.stop(None).wait()
         self.now = {}
 
-    def PublishValue(self, request: Any, _context: Any) -> Any:
-        told = request.data_point.value
+    def PublishValue(self, request: Any, context: Any) -> Any:
+        """As the databroker's source has it (databroker/src/broker.rs, validate): not available is always valid; else
+        the type must be the signal's, and the value within its type and within min and max of its specification.
+        """
+        path, told = request.signal_id.path, request.data_point.value
         kind = told.WhichOneof("typed_value")
-        self.now[request.signal_id.path] = getattr(told, kind) if kind else None
-        self.published.append(request.signal_id.path)
+        if kind is not None:
+            fault = _refusal(path, kind, getattr(told, kind), self.narrowed.get(path, math.inf))
+            if fault is not None:
+                self.refused.append(path)
+                context.abort(grpc.StatusCode.INVALID_ARGUMENT, fault)
+        self.now[path] = getattr(told, kind) if kind else None
+        self.published.append(path)
         return v2.PublishValueResponse()
+
+
+def _refusal(path: str, kind: str, value: float, most: float) -> str | None:
+    """Why a value of this protobuf type is not taken; None where it is."""
+    if value > most:
+        return "Value out of min/max bounds"
+    if kind != ("uint32" if path in CORE else "float"):
+        return "Wrong Type"
+    if path in CORE:
+        return None if 0 <= value <= 0xFFFF else "Value out of bounds of its type"
+    node = OVERLAY[path]
+    is_within = node.get("min", value) <= value <= node.get("max", value)
+    return None if is_within else "Value out of min/max bounds"
 
 
 @contextmanager
@@ -170,3 +195,36 @@ def test_a_service_that_goes_away_leaves_nothing_that_looks_known(tmp_path: Path
         service.uvicorn.should_exit = True
         assert wait_until(lambda: broker.now[PAYLOAD] is None)
     assert "does not answer" in (tmp_path / "log").read_text()
+
+
+def test_a_value_that_the_databroker_refuses_holds_nothing_else_up(tmp_path: Path, gateway: Gateway) -> None:
+    """An integrator's specification may be narrower than ours: told, not available there, and the rest goes on."""
+    with (
+        databroker([*CORE, *OVERLAY]) as broker,
+        serving(gateway.app) as service,
+        feeding(service.url, broker.port, tmp_path / "log"),
+    ):
+        broker.narrowed = {PAYLOAD: 103.5}
+        gateway.publish(make_estimate(3))
+        assert wait_until(lambda: broker.now.get(PAYLOAD) == 103.0)
+        known = {path for path, value in broker.now.items() if value is not None}
+        assert len(known) > 1
+        gateway.publish(make_estimate(4))
+        assert wait_until(lambda: PAYLOAD in broker.refused)
+        assert wait_until(lambda: broker.now[PAYLOAD] is None)  # and not the 103 kg of before
+        assert wait_until(lambda: known - {PAYLOAD} == {p for p, value in broker.now.items() if value is not None})
+    assert f"refuses {PAYLOAD} = 104" in (tmp_path / "log").read_text()
+
+
+def test_every_signal_keeps_to_its_type_and_bounds(tmp_path: Path, gateway: Gateway) -> None:
+    """A payload below 0 is an estimate like any other: the overlay must allow it."""
+    with (
+        databroker([*CORE, *OVERLAY]) as broker,
+        serving(gateway.app) as service,
+        feeding(service.url, broker.port, tmp_path / "log"),
+    ):
+        light = make_estimate(3)
+        payload = replace(light.payload, number=-12.0, interval95=(-24.0, 0.0))
+        gateway.publish(replace(light, payload=payload))
+        assert wait_until(lambda: broker.now.get(PAYLOAD) == -12.0)
+    assert broker.refused == []

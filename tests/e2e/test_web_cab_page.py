@@ -11,7 +11,8 @@ from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
 from support.web import Gateway, serving
 
-from gateway.records import Why
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Why, json_line
 from gateway.status import AlarmsStatus, OwnReading, Standing, State
 from gateway.web import Scope, TokenFile
 
@@ -175,6 +176,17 @@ def test_standing_it_says_that_it_cannot_see_what_is_loaded_now(gateway: Gateway
         expect(page.locator("#not-seen")).to_be_hidden()
         expect(page.locator("#main")).to_have_attribute("data-is", "current")
         page.close()
+
+
+def test_a_number_of_before_the_machine_was_started_is_old(gateway: Gateway, phone: Watched) -> None:
+    """Nobody knows how old it is."""
+    gateway.board.restore(json_line(estimate_to_json(loaded(0, 300.0, 48.0))), None, None)
+    with serving(gateway.app) as server:
+        phone.page.goto(f"{server.url}/cab")
+        expect(phone.page.locator("#bar")).to_contain_text("These numbers are old.")
+        expect(phone.page.locator("#bar")).to_contain_text("Weighed before the gateway was started.")
+        expect(phone.page.locator("#aboard")).to_contain_text("weighed before the gateway was started.")
+        assert phone.complaints == []
 
 
 def test_an_old_number_is_crossed_through_and_said_loudly(gateway: Gateway, phone: Watched) -> None:

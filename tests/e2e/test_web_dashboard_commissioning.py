@@ -38,6 +38,12 @@ def news(gateway: Gateway, watched: Watched) -> None:
     watched.page.evaluate("import('/assets/dashboard/feed.js').then((feed) => feed.askCommissioning())")
 
 
+def say_what_is_carried(page: Any) -> None:
+    page.get_by_label("What it usually carries").select_option("parcels")
+    page.get_by_label("How far along the floor").fill("2.4")
+    page.get_by_label("Part of it may lie on the roof").check()
+
+
 def fill(page: Any, *answers: str) -> None:
     """The vehicle's form."""
     for label, said in zip(
@@ -68,6 +74,7 @@ def test_a_fitter_walks_through_it(gateway: Gateway, bench: Bench, browser: Any,
         page.get_by_role("button", name="Go on").click()
         expect(page.locator("#commissioning-refusal")).to_contain_text("unsprung masses")
         page.get_by_label("Under the rear axle").fill("710")
+        say_what_is_carried(page)
         page.get_by_role("button", name="Go on").click()
         expect(page.locator("#commissioning-claim")).to_be_visible()
         bench.drive(0, 60, is_provisional=True)

@@ -19,6 +19,7 @@ from benchmarks.accuracy.delivery_page import delivery_page
 from benchmarks.accuracy.disturbances_page import WELL, disturbances_page, held_or_refused, is_mended
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
+from benchmarks.accuracy.phones import CAN, phones_page
 from benchmarks.accuracy.sensitivity import sensitivity_page
 from benchmarks.accuracy.siblings import siblings_page
 from benchmarks.accuracy.siblings.study import Way
@@ -34,6 +35,7 @@ PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "alarm_rules": alarms_page,
     "sensitivity": sensitivity_page,
     "budget": budget_page,
+    "phone_accuracy": phones_page,
 }
 
 
@@ -92,6 +94,16 @@ def test_a_sister_is_worth_more_than_priors_and_her_intervals_hold() -> None:
         assert rows[way]["payload_coverage"]["share"] >= 0.93
         assert rows[way]["front_share_coverage"]["share"] >= 0.93
         assert rows[way]["n_rejected"] <= 0.12 * rows[way]["n_batches"]
+
+
+def test_a_phone_errs_little_more_than_a_can_imu_and_its_intervals_hold() -> None:
+    rows = {row["sensor"]: row for row in numbers("phone_accuracy")["rows"]}
+    assert len(rows) == 4
+    for row in rows.values():
+        assert row["payload"]["mean_abs_pct_of_rated"] < 2.0 * rows[CAN]["payload"]["mean_abs_pct_of_rated"]
+        assert row["payload"]["coverage95"] >= 0.95
+        assert row["front_share"]["coverage95"] >= 0.95
+        assert row["n_rejected"] < 0.5 * row["n_batches"]
 
 
 def test_alarms_are_told_of_what_is_too_heavy_and_hardly_of_what_is_not() -> None:

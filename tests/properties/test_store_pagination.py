@@ -13,8 +13,8 @@ from support.patience import PATIENCE_S
 
 from gateway.records import Why
 from gateway.store import Store
-from gateway.store.held import Held
-from gateway.store.rows import EstimateRow, EventRow
+from gateway.store.rows import DocumentRow, JournalRow
+from gateway.store.write_buffer import WriteBuffer
 
 
 def number(text: str) -> int:
@@ -64,8 +64,8 @@ def test_two_readers_beside_a_writer_see_the_same_once(tmp_path: Path) -> None:
     assert followers == [list(range(n_rows))] * 2
 
 
-def row(seq: int, previous: int) -> EstimateRow:
-    return EstimateRow(seq, str(seq), seq, None, "ratio_index", None, False, previous, 0, "{}")
+def row(n: int) -> JournalRow:
+    return JournalRow(0, "estimate", str(n), 1, n, 0, 0, "{}")
 
 
 @given(
@@ -73,14 +73,14 @@ def row(seq: int, previous: int) -> EstimateRow:
     capacity=st.integers(1, 6),
 )
 def test_what_was_accepted_is_written_held_or_counted(steps: list[str], capacity: int) -> None:
-    held = Held(capacity, epoch="ab")
+    held = WriteBuffer(capacity, epoch="ab")
     n_accepted = n_written = 0
     in_flight: tuple[object, ...] = ()
     for step in steps:
         if step == "add":
-            held.add_estimate(row)
+            held.append(row(n_accepted))
         elif step == "event":
-            held.add(EventRow(0, "test", "{}"))
+            held.add(DocumentRow("test", 0, "{}"))
         elif step == "take" and not in_flight:
             in_flight = held.take()
         elif step == "settle":
@@ -91,7 +91,7 @@ def test_what_was_accepted_is_written_held_or_counted(steps: list[str], capacity
             held.give_back()
             in_flight = ()
         n_accepted += step in ("add", "event")
-        seqs = [r.seq for r in held.estimates()[1]]
+        seqs = [r.seq for r in held.held()[1]]
         assert seqs == sorted(set(seqs))
         assert n_accepted == n_written + len(held) + held.n_dropped
         assert len(held) <= max(capacity, len(in_flight))

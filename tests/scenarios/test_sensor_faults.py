@@ -84,7 +84,7 @@ class Shelf:
     def write_estimate(self, record: dict[str, Any]) -> int:
         return 1
 
-    def publish(self, found: Estimate, cursor: int | None) -> None:
+    def publish(self, found: Estimate) -> None:
         self.told.append(found)
 
 

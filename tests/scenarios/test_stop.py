@@ -1,24 +1,27 @@
 """SIGTERM ends the service with code 0 whatever its threads are doing."""
 
+import asyncio
 import os
 import re
 import signal
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from support.log import names
 from support.paper_van import paper_van_config
 from support.patience import PATIENCE_S
 from support.ports import first_answer, free_port
 
-from gateway.bus.broadcast import broadcaster
-from gateway.bus.live import source
-from gateway.bus.ring import ring_log
-from gateway.service import keeper, pipeline
-from gateway.service.proving import trend_keeper
-from gateway.store import writer
-from gateway.uplink import forwarder
+from gateway.config import load_settings
+from gateway.log import Event
+from gateway.service import gateway
+from gateway.service.part import CLOSE_WITHIN_S, STOP_WITHIN_S, Deadline, Part, stop_in_turn
+from gateway.setup import setup_of
 from gateway.web.door import serving
 
 ROOT = Path(__file__).parents[2]
@@ -56,6 +59,64 @@ def test_all_parts_together_may_take_no_longer_than_systemd_waits() -> None:
     unit = (ROOT / "deploy/springscale.service").read_text()
     systemd_waits_s = re.search(r"^TimeoutStopSec=(\d+)$", unit, re.MULTILINE)
     assert systemd_waits_s is not None
-    parts = (source, pipeline, keeper, trend_keeper, ring_log, broadcaster, forwarder, forwarder, writer, serving)
-    parts_take_s = sum(part.STOP_WITHIN_S for part in parts)  # uplink and webhook are both forwarders
-    assert parts_take_s < float(systemd_waits_s[1])
+    assert float(systemd_waits_s[1]) > STOP_WITHIN_S + serving.STOP_WITHIN_S
+    first_s = gateway.BUS_WITHIN_S + gateway.PIPELINE_WITHIN_S + gateway.FLUSH_WITHIN_S
+    assert first_s + CLOSE_WITHIN_S < STOP_WITHIN_S
+
+
+def test_parts_stop_in_the_reverse_of_their_start_and_one_that_hangs_holds_nobody(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They stopped as they had started, and a lock held by a stalled disk held them all."""
+    monkeypatch.setattr("gateway.service.part.PART_WITHIN_S", 0.05)
+    stopped: list[str] = []
+    for_ever = threading.Event()
+    parts = [Part(name, lambda: None, lambda left_s, name=name: stopped.append(name)) for name in ("first", "last")]
+    parts.insert(1, Part("stuck", lambda: None, lambda left_s: for_ever.wait()))
+    assert stop_in_turn(parts, Deadline()) == ["stuck"]
+    assert stopped == ["last", "first"]
+    assert names(caplog) == [Event.PART_LATE]
+    for_ever.set()
+
+
+def test_a_held_lock_of_the_commissioning_does_not_keep_the_stop_from_the_pipeline(config: Path) -> None:
+    """The window under way and all that was heard reach the disk first."""
+    settings = load_settings(config)
+    gateways: list[gateway.Gateway] = []
+
+    def on_started(running: gateway.Gateway) -> None:
+        gateways.append(running)
+        running.commissioning.book.lock.acquire()  # by this thread, and never given back
+        running.request_stop()
+
+    begun_s = time.monotonic()
+    gateway.Gateway(settings, setup_of(settings), on_started=on_started).run()
+    assert time.monotonic() - begun_s < PATIENCE_S
+    assert not gateways[0].pipeline.is_alive()
+    assert not gateways[0].store.is_alive()
+
+
+@pytest.mark.parametrize("name", ["webhook", "uplink", "broadcaster"])
+def test_the_death_of_a_sender_is_shown_and_the_weighing_goes_on(
+    config: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ended the process."""
+    settings = load_settings(config)
+    dead = SimpleNamespace(
+        NAME=name,
+        fault=None,
+        start=lambda: None,
+        stop=lambda left_s: None,
+        is_alive=lambda: False,
+        report=lambda: None,
+    )
+    monkeypatch.setattr(gateway, f"{name}_of", lambda *known, **named: dead)
+    told: list[tuple[str, ...]] = []
+
+    def on_started(running: gateway.Gateway) -> None:
+        told.append(running.status().warnings)
+        asyncio.get_running_loop().call_later(3.0 * gateway.SUPERVISE_S, running.request_stop)
+
+    gateway.Gateway(settings, setup_of(settings), on_started=on_started).run()
+    ((warning,),) = told
+    assert warning.startswith(f"the {name} died; weighing goes on")

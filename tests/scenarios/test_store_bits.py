@@ -12,9 +12,10 @@ from support.patience import PATIENCE_S, wait_until
 from support.sequence import without_sequence
 
 from gateway.errors import StoreError
+from gateway.history import BATCHES
 from gateway.log import Event
 from gateway.records import Why, json_line
-from gateway.store import Store, records, schema
+from gateway.store import Store, questions, schema
 from gateway.uplink import Outbox
 
 N_RECORDS = 12
@@ -61,7 +62,7 @@ def ask(store: Store) -> set[str]:
     told |= set(reader.estimates(since_ns=0, limit=1000).items)
     latest = reader.latest()
     told |= {text for text in (latest.estimate, latest.rejection) if text is not None}
-    letters = Outbox(reader, store, "fleet").next_letters(1000)
+    letters = Outbox(store, "fleet").next_letters(1000)
     reader.delivery("fleet")
     reader.events()
     assert {without_sequence(letter.text) for letter in letters} <= set(PLAIN)
@@ -121,7 +122,9 @@ def test_pages_are_full_and_lead_on_over_bad_records(tmp_path: Path, database: b
     (tmp_path / "springscale.db").write_bytes(flipped)
     with closing(schema.connect_reader(tmp_path / "springscale.db")) as connection:
         for newest_first in (False, True):
-            good, bad = records.page(connection, records.Window(None, None, None, newest_first), 5, with_spectra=True)
+            bad: list[int] = []
+            window = questions.Window(BATCHES, newest_first=newest_first)
+            good = questions.page(connection, window, 5, bad.extend)
             assert len(good) == 5
             assert len(bad) == (1 if newest_first else 4)
 
@@ -130,7 +133,7 @@ def test_an_index_that_does_not_know_a_bad_row_is_made_anew(tmp_path: Path, data
     (tmp_path / "springscale.db").write_bytes(database)
     with closing(sqlite3.connect(tmp_path / "springscale.db")) as other:
         other.execute("PRAGMA writable_schema = ON")
-        page = other.execute("SELECT rootpage FROM sqlite_schema WHERE name = 'estimates_by_time'").fetchone()[0]
+        page = other.execute("SELECT rootpage FROM sqlite_schema WHERE name = 'journal_by_time'").fetchone()[0]
         size = other.execute("PRAGMA page_size").fetchone()[0]
     spoilt = bytearray((tmp_path / "springscale.db").read_bytes())
     t_end_ns = RECORDS[4]["t_end_ns"].to_bytes(6, "big")
@@ -143,21 +146,6 @@ def test_an_index_that_does_not_know_a_bad_row_is_made_anew(tmp_path: Path, data
         assert wait_until(lambda: store.health().n_bad_records == 1)
         assert store.health().set_aside is None
         assert len(store.reader().estimates(since_ns=0).items) == N_RECORDS - 1
-
-
-def test_records_from_before_there_were_sums_are_shown_where_their_parts_agree(tmp_path: Path) -> None:
-    path = tmp_path / "springscale.db"
-    with closing(schema.connect_writer(path, schema.MIGRATIONS[:2])) as old:
-        old.execute("INSERT INTO epochs VALUES ('abcd')")
-        for n, record in enumerate(RECORDS[:4]):
-            text = TEXTS[n] if n != 2 else TEXTS[n].replace('"id":"', '"id":"x')
-            fields = (n, record["id"], record["t_end_ns"], "van-17", "ratio_index", "sha256:ab", n % 3 == 0, 5, text)
-            old.execute("INSERT INTO estimates VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", fields)
-    with closing(schema.connect_reader(path)) as not_yet, closing(schema.connect_reader(path)):
-        good, bad = records.page(not_yet, records.Window(None, None, None, False), 10, with_spectra=False)
-        assert ([row.text for row in good.values()], bad) == ([PLAIN[0], PLAIN[1], PLAIN[3]], [2])
-    with closing(Store.open(tmp_path)) as store:
-        assert store.reader().estimates().items == (TEXTS[0], TEXTS[1], TEXTS[3])
 
 
 def test_no_more_damaged_databases_are_kept_than_are_worth_looking_at(

@@ -16,7 +16,7 @@ from support.patience import PATIENCE_S
 from gateway.errors import StoreError
 from gateway.log import Event
 from gateway.status import StoreState
-from gateway.store import Retention, Store, StoreReader, schema
+from gateway.store import Retention, Store, StoreReader
 
 
 def test_a_full_disk_degrades_to_memory_and_heals(tmp_path: Path) -> None:
@@ -151,35 +151,16 @@ def test_damage_found_while_reading_sets_the_file_aside_and_keeps_the_numbering(
     store.close()
 
 
-def test_a_newer_schema_is_refused_and_untouched(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", [6, 99])
+def test_another_schema_is_refused_and_untouched(tmp_path: Path, version: int) -> None:
     Store.open(tmp_path).close()
     path = tmp_path / "springscale.db"
     with closing(sqlite3.connect(path)) as database:
-        database.execute("PRAGMA user_version = 99")
-    with pytest.raises(StoreError, match="schema 99"):
+        database.execute(f"PRAGMA user_version = {version}")
+    with pytest.raises(StoreError, match=f"schema {version}"):
         Store.open(tmp_path)
     with closing(sqlite3.connect(path)) as database:
-        assert database.execute("PRAGMA user_version").fetchone()[0] == 99
-
-
-def test_an_older_schema_is_brought_up_to_date(tmp_path: Path) -> None:
-    path = tmp_path / "springscale.db"
-    with closing(schema.connect_writer(path)) as old:
-        old.execute("INSERT INTO events (t_ns, kind, text) VALUES (1, 'kept', '{}')")
-    later = (*schema.MIGRATIONS, "ALTER TABLE events ADD COLUMN origin TEXT DEFAULT 'gateway'")
-    with closing(schema.connect_writer(path, later)) as new:
-        assert new.execute("SELECT kind, origin FROM events").fetchall() == [("kept", "gateway")]
-        assert schema.pragma(new, "user_version") == len(later)
-
-
-def test_a_migration_that_fails_leaves_the_old_schema(tmp_path: Path) -> None:
-    path = tmp_path / "springscale.db"
-    schema.connect_writer(path).close()
-    broken = (*schema.MIGRATIONS, "CREATE TABLE half (x); nonsense")
-    with pytest.raises(sqlite3.OperationalError):
-        schema.connect_writer(path, broken)
-    with closing(schema.connect_writer(path)) as database:
-        assert database.execute("SELECT 1 FROM sqlite_schema WHERE name = 'half'").fetchone() is None
+        assert database.execute("PRAGMA user_version").fetchone()[0] == version
 
 
 def test_another_programs_database_is_refused(tmp_path: Path) -> None:
@@ -202,16 +183,7 @@ def test_a_question_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     for n in range(5000):
         store.write_estimate(make_record(n))
     assert store.flush(PATIENCE_S)
-    reader = StoreReader(
-        tmp_path / "springscale.db",
-        held=lambda: ("ab", ()),
-        held_entries=lambda: ("ab", ()),
-        clock_ns=lambda: 0,
-        on_damage=lambda: None,
-        on_bad_records=lambda seqs: None,
-        on_lost=lambda: None,
-        limit_s=-1.0,
-    )
+    reader = StoreReader(store, limit_s=-1.0)
     with pytest.raises(TimeoutError, match="ask for less"):
         reader.estimates(limit=5000, with_spectra=False)
     store.close()

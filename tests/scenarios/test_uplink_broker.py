@@ -33,7 +33,7 @@ from gateway.uplink.back_off import BackOff
 
 store = Store.open(pathlib.Path(sys.argv[1]))
 settings = UplinkSettings("127.0.0.1", int(sys.argv[2]), "springscale/van-17", "springscale-van-17", tls=False)
-Uplink(settings, Outbox(store.reader(), store, "fleet"), {}, back_off=BackOff(0.01, 0.1)).start()
+Uplink(settings, Outbox(store, "fleet"), {}, back_off=BackOff(0.01, 0.1)).start()
 print("started", flush=True)
 time.sleep(600)
 """
@@ -45,9 +45,7 @@ def settings_of(port: int, **changed: object) -> UplinkSettings:
 
 
 def started(store: Store, settings: UplinkSettings) -> Uplink:
-    uplink = Uplink(
-        settings, Outbox(store.reader(), store, "fleet"), {"vehicle_id": "van-17"}, back_off=BackOff(0.01, 0.1)
-    )
+    uplink = Uplink(settings, Outbox(store, "fleet"), {"vehicle_id": "van-17"}, back_off=BackOff(0.01, 0.1))
     uplink.start()
     return uplink
 

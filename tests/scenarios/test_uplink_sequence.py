@@ -16,7 +16,7 @@ from support.patience import PATIENCE_S, wait_until
 from support.sequence import BackEnd
 
 from gateway.records import json_line
-from gateway.store import Retention, Store, schema
+from gateway.store import Retention, Store
 from gateway.uplink import Outbox
 from gateway.uplink.outbox import Letter
 
@@ -45,7 +45,7 @@ def write(store: Store, *numbers: int) -> None:
 
 def deliver(store: Store, back_end: BackEnd, is_lost: Callable[[Letter], bool] = lambda letter: False) -> None:
     """All that waits; what is lost is lost behind the broker's acknowledgement, or refused."""
-    outbox = Outbox(store.reader(), store, "fleet")
+    outbox = Outbox(store, "fleet")
     while letters := outbox.next_letters(7):
         for letter in letters:
             jsonschema.validate(json.loads(letter.text), SCHEMA)
@@ -107,7 +107,7 @@ def test_what_memory_had_to_drop_leaves_a_gap(tmp_path: Path) -> None:
     with closing(Store.open(tmp_path / "mount" / "state", Retention(max_held=5))) as store:
         for n in range(9):
             store.write_estimate(make_record(n))
-        outbox = Outbox(store.reader(), store, "fleet")
+        outbox = Outbox(store, "fleet")
         for letter in outbox.next_letters(100):
             back_end.take(letter.text)
     assert (len(back_end.missing), len(back_end.ids)) == (1, 4)  # the queue's own place takes one of five
@@ -165,8 +165,8 @@ def test_a_damaged_link_is_a_damaged_record(tmp_path: Path) -> None:
     with closing(Store.open(tmp_path)) as store:
         write(store, *range(4))
     with closing(sqlite3.connect(tmp_path / "springscale.db")) as other:
-        other.execute("UPDATE estimates SET previous = previous + 1 WHERE seq = (SELECT max(seq) FROM estimates)")
-        other.execute("UPDATE estimates SET previous = NULL WHERE seq = (SELECT min(seq) FROM estimates)")
+        other.execute("UPDATE journal SET previous = previous + 1 WHERE seq = (SELECT max(seq) FROM journal)")
+        other.execute("UPDATE journal SET previous = 1 WHERE seq = (SELECT min(seq) FROM journal)")
         other.commit()
     back_end = BackEnd()
     with closing(Store.open(tmp_path)) as store:
@@ -183,29 +183,6 @@ def test_a_database_that_was_replaced_is_another_stream(tmp_path: Path) -> None:
             deliver(store, back_end)
     assert back_end.missing == []
     assert len(back_end.ids) == 6
-
-
-def test_records_from_before_the_numbers_were_linked_are_delivered(tmp_path: Path) -> None:
-    path = tmp_path / "springscale.db"
-    with closing(Store.open(tmp_path)) as store:
-        write(store, 0, 1)
-    with closing(sqlite3.connect(path)) as database:
-        rows = database.execute("SELECT * FROM estimates").fetchall()
-        names = [row[1] for row in database.execute("PRAGMA table_info(estimates)")]
-    path.unlink()
-    with closing(schema.connect_writer(path, schema.MIGRATIONS[:3])) as old:
-        old.execute("INSERT INTO epochs VALUES ('abcd')")
-        kept = [name for name in names if name not in ("previous", "checksum")]
-        for row in rows:
-            fields = [dict(zip(names, row, strict=True))[name] for name in kept]
-            sql = f"INSERT INTO estimates ({', '.join(kept)}) VALUES ({', '.join('?' * len(kept))})"
-            old.execute(sql, fields)
-    back_end = BackEnd()
-    with closing(Store.open(tmp_path)) as store:
-        write(store, 2)
-        deliver(store, back_end)
-    assert back_end.missing == []
-    assert len(back_end.ids) == 3
 
 
 def test_kills_leave_no_gap_and_what_is_lost_afterwards_does(tmp_path: Path) -> None:

@@ -35,8 +35,8 @@ from gateway.uplink.webhook import Webhook, WebhookSettings
 
 store = Store.open(pathlib.Path(sys.argv[1]))
 settings = WebhookSettings(False, "127.0.0.1", int(sys.argv[2]), "/hook", pathlib.Path(sys.argv[3]), ("alarm", "event"))
-outbox = Outbox(store.reader(), store, settings.queue, only=settings.kinds)
-Webhook(settings, outbox, back_off=BackOff(0.01, 0.05), poll_s=0.02).start()
+outbox = Outbox(store, settings.queue, only=settings.kinds)
+Webhook(settings, outbox, back_off=BackOff(0.01, 0.05)).start()
 print("started", flush=True)
 time.sleep(600)
 """
@@ -60,11 +60,10 @@ class Sending:
         self.kept: list[tuple[str, dict[str, str]]] = []
         self.webhook = Webhook(
             settings,
-            Outbox(self.store.reader(), self.store, settings.queue, only=settings.kinds),
+            Outbox(self.store, settings.queue, only=settings.kinds),
             lambda kind, detail: self.kept.append((kind, dict(detail))),
             BackOff(0.005, 0.02),
             clock_s=lambda: self.clock_s,
-            poll_s=0.02,
         )
         self.webhook.start()
 
@@ -184,9 +183,9 @@ def test_one_that_does_not_answer_in_time_is_left_and_asked_again(
         assert sending.webhook.report().n_failed == 1
 
 
-def test_a_letter_that_the_receiver_finds_wrong_holds_nobody_up(tmp_path: Path, secret_file: Path) -> None:
+def test_a_letter_that_the_receiver_will_never_take_holds_nobody_up(tmp_path: Path, secret_file: Path) -> None:
     with (
-        Receiver([status(422)] * TRIES) as receiver,
+        Receiver([status(413)] * TRIES) as receiver,
         Sending(tmp_path / "state", receiver.port, secret_file) as sending,
     ):
         wanted = tell(sending.store, *range(6))
@@ -205,11 +204,24 @@ def test_refused_for_long_enough_the_queue_moves_on(tmp_path: Path, secret_file:
         assert wait_until(lambda: len(receiver.seen) >= 2 * TRIES)
         assert set(receiver.seen) == {wanted[0]}
         sending.clock_s = 3601.0
-        assert wait_until(lambda: sending.webhook.report().n_dead >= 2)
+        assert wait_until(lambda: sending.webhook.report().n_dead == 1)
+        n_seen = len(receiver.seen)
+        assert wait_until(lambda: len(receiver.seen) >= n_seen + 3 * TRIES)
+        assert sending.webhook.report().n_dead == 1  # each letter has the whole time of its own
         receiver.faults.clear()
         assert wait_until(lambda: receiver.ids[-1:] == wanted[-1:])
         dead = [one.id for one in sending.webhook.report().dead]
     assert dead + receiver.ids == wanted
+
+
+@pytest.mark.parametrize("code", [400, 401, 403, 422, 500])
+def test_no_alarm_is_given_up_at_a_receiver_that_refuses_all(tmp_path: Path, secret_file: Path, code: int) -> None:
+    """Its clock or its secret is off: a 400 buried twenty alarms in 32 s."""
+    with Receiver([status(code)] * 40) as receiver, Sending(tmp_path / "state", receiver.port, secret_file) as sending:
+        wanted = tell(sending.store, *range(20))
+        assert wait_until(lambda: len(receiver.ids) == len(wanted))
+        assert receiver.ids == wanted
+        assert sending.webhook.report().n_dead == 0
 
 
 def test_retry_after_is_heeded(tmp_path: Path, secret_file: Path) -> None:
@@ -255,8 +267,8 @@ def test_every_revision_of_an_alarm_that_is_told_in_time_comes(tmp_path: Path, s
     bench = AlarmBench(tmp_path / "state")
     with Receiver() as receiver:
         settings = WebhookSettings(False, "127.0.0.1", receiver.port, "/hook", secret_file, ("alarm",))
-        outbox = Outbox(bench.store.reader(), bench.store, settings.queue, only=settings.kinds)
-        webhook = Webhook(settings, outbox, poll_s=0.02)
+        outbox = Outbox(bench.store, settings.queue, only=settings.kinds)
+        webhook = Webhook(settings, outbox)
         webhook.start()
         _step(receiver, 1, lambda: bench.weigh(of_load(0, LIMIT_KG + 60.0)))
         _step(receiver, 2, lambda: bench.weigh(of_load(1, LIMIT_KG + 60.0, n_batches=2)))

@@ -13,7 +13,7 @@ from gateway.core.weights import weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.service.alarm_desk import AlarmDesk
-from gateway.service.tare_desk import Subject
+from gateway.service.subject import Subject
 from gateway.store import Store
 from gateway.web import Board
 from support.days import at, batch
@@ -63,9 +63,7 @@ class AlarmBench:
     def start(self) -> None:
         """As a new start of the service would."""
         self.store, self.board = Store.open(self.directory), Board()
-        self.desk = AlarmDesk(
-            self.rules, SUBJECT, self.store, self.board, lambda: at(self.clock_s / 60.0), lambda: self.clock_s
-        )
+        self.desk = AlarmDesk(self.rules, SUBJECT, self.store, lambda: at(self.clock_s / 60.0), lambda: self.clock_s)
 
     def restart(self) -> None:
         self.store.close()

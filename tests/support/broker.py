@@ -1,7 +1,6 @@
 """A real mosquitto on a loopback port, a listener at it, and a link to it that can be cut."""
 
 import contextlib
-import shutil
 import socket
 import subprocess
 import threading
@@ -15,10 +14,11 @@ from paho.mqtt.enums import CallbackAPIVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
+from support.parts import found
 from support.patience import PATIENCE_S, wait_until
 from support.ports import free_port
 
-MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin:/usr/bin:/usr/local/bin")
+MOSQUITTO = found("mosquitto")
 needs_mosquitto = pytest.mark.skipif(MOSQUITTO is None, reason="mosquitto is not installed")
 
 

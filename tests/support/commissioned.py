@@ -5,7 +5,6 @@ import json
 import threading
 import urllib.error
 import urllib.request
-import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,6 @@ class Running:
         self.settings = settings
         self.gateway: Gateway | None = None
         self.n_starts = 0
-        self.ended: list[weakref.ref[Gateway]] = []  # those at work before
 
     @property
     def now(self) -> Gateway:
@@ -80,8 +78,6 @@ def serve(config: Path, meet: Callable[[Running], None]) -> None:
     failures: list[BaseException] = []
 
     def on_started(gateway: Gateway) -> None:
-        if running.gateway is not None:
-            running.ended.append(weakref.ref(running.gateway))
         running.gateway = gateway
         running.n_starts += 1
         loop = asyncio.get_running_loop()
@@ -98,6 +94,7 @@ def serve(config: Path, meet: Callable[[Running], None]) -> None:
             failures.append(failure)
         stop[0]()
 
-    live(settings, lambda: load_settings(config), on_started=on_started)
+    while live(settings, lambda: load_settings(config), on_started=on_started):
+        pass
     if failures:
         raise failures[0]

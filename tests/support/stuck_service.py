@@ -9,7 +9,7 @@ import scipy.fft
 from gateway.cli import main
 from gateway.core.flow import Flow
 from gateway.estimate import Estimate
-from gateway.service.pipeline import Pipeline
+from gateway.service import gateway
 
 N_THREADS = 3  # so that one of them is inside whenever the process ends
 
@@ -31,5 +31,5 @@ def never_flush(_flow: Flow) -> Iterable[Estimate]:
 
 if __name__ == "__main__":
     Flow.flush = never_flush  # type: ignore[assignment,method-assign]  # a fault, put in
-    Pipeline.stop.__defaults__ = (0.2,)
+    gateway.PIPELINE_WITHIN_S = 0.2
     main()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from gateway.calibration.verification_file import VerificationRule
 from gateway.service.proving.verification_desk import VerificationDesk
-from gateway.service.tare_desk import Subject
+from gateway.service.subject import Subject
 from gateway.store import Store
 from support.calibrated import calibration_file
 from support.epochs import START_NS

@@ -19,8 +19,8 @@ from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
-from gateway.web.routes import CommissioningDesk
-from gateway.web.routes.calibration import TareDesk, TicketDesk, VerificationDesk
+from gateway.web.routes.calibration import KnownWeightService, VerificationDesk
+from gateway.web.routes.commissioning import CommissioningDesk
 from gateway.web.routes.record import FrameLog
 from support.patience import PATIENCE_S
 
@@ -33,13 +33,12 @@ class Gateway:
         directory: Path,
         settings: WebSettings | None = None,
         tokens: TokenFile | None = None,
-        tare: TareDesk | None = None,
+        known_weights: KnownWeightService | None = None,
         commissioning: CommissioningDesk | None = None,
         calibrated: CalibratedVehicle | None = None,
         known_loads: KnownLoads | None = None,
         record: FrameLog | None = None,
         verification: VerificationDesk | None = None,
-        tickets: TicketDesk | None = None,
     ) -> None:
         self.clock_s = 1000.0
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
@@ -48,22 +47,21 @@ class Gateway:
         self._settings = settings
         self._known: dict[str, Any] = {
             "tokens": tokens,
-            "tare": tare,
+            "known_weights": known_weights,
             "commissioning": commissioning,
             "calibrated": calibrated,
             "known_loads": known_loads,
             "record": record,
             "verification": verification,
-            "tickets": tickets,
         }
         self.app = self._make_app()
 
     def publish(self, *estimates: Estimate) -> list[str]:
-        """As the pipeline does: into the store, then onto the board."""
+        """As the pipeline does: onto the board, then into the journal."""
         cursors = []
         for estimate in estimates:
+            self.board.publish(estimate)
             cursors.append(self.store.write_estimate(estimate_to_json(estimate)))
-            self.board.publish(estimate, cursors[-1])
         return cursors
 
     def restart_board(self) -> None:

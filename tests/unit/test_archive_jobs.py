@@ -8,14 +8,17 @@ from typing import Any
 import pytest
 from support.archive import MIDNIGHT_NS, S, write_manifest
 from support.calibrated import calibration_file
+from support.known_weights import with_all_sources
 
 from gateway.archive import Place, place_of
 from gateway.archive.jobs import Job, hash_of, plan
 from gateway.archive.manifest import Assignment, Manifest, load_manifest
 from gateway.archive.software import code_id, software
 from gateway.archive.survey import LogFacts, LogFile, in_goes
-from gateway.calibration.tare_file import TareEntry, TareHistory
+from gateway.calibration.known_weights_file import KnownWeight, KnownWeights
+from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
+from gateway.estimate_json import posterior_to_json
 from gateway.records import iso_utc
 
 HOUR = 3600 * S
@@ -112,39 +115,53 @@ def test_settings_content_and_neighbours_make_another_job(van: Assignment) -> No
     assert len({job.slot.job for job in jobs}) == len(jobs)
 
 
-def tare(at_ns: int, calibration_id: str, ended_ns: int | None = None, **changed: Any) -> TareEntry:
-    end = None if ended_ns is None else {"at": iso_utc(ended_ns), "by": "x", "why": "undone"}
-    told = {
-        **{"id": "", "at": iso_utc(at_ns), "by": "x", "note": None, "vehicle_id": None, "estimator": "ratio_index"},
-        **{"calibration_id": calibration_id, "payload_kg": 1.0, "payload_std_kg": 1.0, "front_share_pct": 0.1},
-        **{"front_share_std_pct": 0.1, "n_batches": 1, "batch_ids": (), "t_start": "", "t_end": "", "ended": end},
-    }
-    entry = TareEntry.model_validate({**told, **changed})
+def known(van: Assignment, at_ns: int, confirmed_ns: int = 0, ended_ns: int = 0, **changed: Any) -> KnownWeight:
+    """One that its estimate contradicted where it was confirmed later."""
+    assert van.setup.calibration is not None
+    entry = KnownWeight.model_validate(
+        {
+            **{"id": "", "kind": "ticket", "at": iso_utc(at_ns), "by": "x", "estimator": "ratio_index"},
+            **{"calibration_id": van.setup.calibration.id, "t_start": iso_utc(at_ns), "t_end": iso_utc(at_ns)},
+            **{"batch_ids": ("1-a",), "n_batches": 1, "payload_kg": 300.0, "payload_std_kg": 5.0},
+            **{"posterior": posterior_to_json(with_all_sources(290.0)), "is_contradicted": confirmed_ns > 0},
+            **{"estimated_payload_kg": 290.0, "estimated_payload_std_kg": 30.0},
+            **{"confirmed": {"at": iso_utc(confirmed_ns), "by": "x"} if confirmed_ns else None},
+            **{"ended": {"at": iso_utc(ended_ns), "by": "x"} if ended_ns else None, **changed},
+        }
+    )
     return entry.model_copy(update={"id": entry.content_id()})
 
 
-def test_a_tare_counts_while_it_was_in_use_and_for_its_calibration_alone(van: Assignment) -> None:
+def test_a_known_weight_counts_while_it_was_in_use_and_for_its_calibration_alone(van: Assignment) -> None:
     assert van.setup.calibration is not None
-    mine = van.setup.calibration.id
-    first, second = tare(MIDNIGHT_NS - HOUR, mine), tare(MIDNIGHT_NS + HOUR, mine, MIDNIGHT_NS + 2 * HOUR)
-    later, foreign = tare(MIDNIGHT_NS + 40 * 24 * HOUR, mine), tare(MIDNIGHT_NS - HOUR, "sha256:other")
-    tared = replace(van, tares=TareHistory(entries=(first, foreign, second, later)))
-    november, december = jobs_of(tared, [MIDNIGHT_NS, MIDNIGHT_NS + 31 * 24 * HOUR])
-    in_use = {hours: november.tare_at(MIDNIGHT_NS + hours * HOUR) for hours in (-2, 0, 1, 2, 3)}
+    first = known(van, MIDNIGHT_NS - HOUR)
+    second = known(van, MIDNIGHT_NS + HOUR, MIDNIGHT_NS + 2 * HOUR, MIDNIGHT_NS + 3 * HOUR)
+    later = known(van, MIDNIGHT_NS + 40 * 24 * HOUR)
+    foreign = known(van, MIDNIGHT_NS - HOUR, calibration_id="sha256:other")
+    entries = KnownWeights(entries=(first, foreign, second, later))
+    told = replace(van, known_weights=entries)
+    november, december = jobs_of(told, [MIDNIGHT_NS, MIDNIGHT_NS + 31 * 24 * HOUR])
+    in_use = {hours: november.knowledge_at(MIDNIGHT_NS + hours * HOUR) for hours in (-2, 0, 1, 2, 3, 4)}
+
+    def id_of(*entries: KnownWeight) -> str:
+        knowledge = Knowledge.of([one.observation for one in entries])
+        assert knowledge is not None
+        return knowledge.id
+
     assert {hours: found and found.id for hours, found in in_use.items()} == {
         -2: None,
-        0: first.id,
-        1: first.id,  # made at this instant: it counts from the next batch on
-        2: second.id,
-        3: first.id,
+        0: id_of(first),
+        1: id_of(first),
+        2: id_of(first),  # stated an hour ago, and held until now: it counts from the next batch on
+        3: id_of(first, second),
+        4: id_of(first),
     }
-    assert [span.tare.id for span in december.tares] == [first.id, later.id]
+    assert [span.knowledge.id for span in december.known_weights] == [id_of(first), id_of(first, later)]
 
 
-def test_a_tare_made_later_leaves_earlier_months_as_they_are(van: Assignment) -> None:
-    assert van.setup.calibration is not None
+def test_a_known_weight_stated_later_leaves_earlier_months_as_they_are(van: Assignment) -> None:
     starts = [MIDNIGHT_NS - HOUR, MIDNIGHT_NS]
-    later = replace(van, tares=TareHistory(entries=(tare(MIDNIGHT_NS + HOUR, van.setup.calibration.id),)))
+    later = replace(van, known_weights=KnownWeights(entries=(known(van, MIDNIGHT_NS + HOUR),)))
     before, after = jobs_of(van, starts), jobs_of(later, starts)
     assert before[0].slot == after[0].slot
     assert before[1].slot != after[1].slot

@@ -154,7 +154,7 @@ def test_a_pinned_key_must_have_signed_the_manifest_itself(tmp_path: Path) -> No
             r"none\.json: no such calibration file",
         ),
         (
-            'signals = "springscale:reference"\nvehicles = [{id = "a", tare = "none.json"}]',
+            'signals = "springscale:reference"\nvehicles = [{id = "a", known_weights = "none.json"}]',
             r"none\.json: no such file",
         ),
         ("batch.window_s = 5\nvehicles = []", r"batch\.window_s: 5 is below 20"),

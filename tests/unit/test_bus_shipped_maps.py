@@ -84,6 +84,14 @@ FRAMES = {
         (0x610, struct.pack("<ff", 1.0, -2.5), {P: -2.5 * RAD, R: 1.0 * RAD}),
         (0x621, struct.pack("<ff", 123.0, 36.0), {V: 10.0}),
     ],
+    "phone": [
+        # 20 bits each: -1500 x 0.0005 as 2**20 - 1500, 19620 x 0.0005
+        (0x150, bits((0, 2**20 - 1500), (40, 19_620)), {A: 9.81, X: -0.75}),
+        # 500 x 0.002 and -1000 x 0.002
+        (0x151, bits((0, 500), (20, 2**20 - 1000)), {R: 1.0 * RAD, P: -2.0 * RAD}),
+        (0x152, bits((0, 13_890), length=4), {V: 13.89}),
+        (0x153, struct.pack("<ii", 455_000_000, -1_222_500_000), {LAT: 45.5, LON: -122.25}),
+    ],
     "race_technology": [
         (0x094A6C21 | EXTENDED_ID, struct.pack("<hhhh", 0, 0, 0, 1000), {A: 9.80665}),
         (0x094A6D21 | EXTENDED_ID, struct.pack("<hhhh", 0, 70, -150, 25), {P: -1.5 * RAD, R: 0.25 * RAD}),

@@ -6,9 +6,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from support.calibrated import calibration_file
 
+import gateway
 from gateway.calibration.file import CrossSpectrumPart, load_calibration
 from gateway.calibration.file.calibration_file import content_id
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
@@ -103,6 +105,38 @@ FAULTS: list[tuple[Change, str]] = [
 @pytest.mark.parametrize(("change", "said"), FAULTS, ids=[said for _, said in FAULTS])
 def test_what_is_wrong_is_named(tmp_path: Path, change: Change, said: str) -> None:
     assert said in fault_of(written(tmp_path, change))
+
+
+def _spread(content: dict[str, Any], fill: Callable[[tuple[int, int]], Any]) -> None:
+    n = len(content["cross_spectrum"]["names"])
+    content["cross_spectrum"]["covariance"] = fill((n, n)).tolist()
+
+
+ABSURD: list[tuple[Change, str]] = [
+    (lambda c: c["cross_spectrum"].update(band_hz=[0.0, 0.0]), "cross_spectrum.band_hz is [0.0, 0.0]"),
+    (lambda c: c["cross_spectrum"].update(band_hz=[15.0, 1.0]), "cross_spectrum.band_hz"),
+    (lambda c: c["cross_spectrum"].update(speed_seen_mps=[0.0, 0.0]), "cross_spectrum.speed_seen_mps"),
+    (lambda c: _spread(c, np.zeros), "cross_spectrum.covariance is an array of"),
+    (lambda c: _spread(c, np.ones), "positive definite"),
+    (lambda c: c["cross_spectrum"]["parameters"].__setitem__(0, 900.0), "cross_spectrum.parameters"),
+    (lambda c: c["ratio_index"].update(acceleration_bands=[[0.0, 0.0], [2.0, 0.1]]), "ratio_index.acceleration_bands"),
+    (lambda c: c["ratio_index"].update(speed_range_mps=[0.0, 0.0]), "ratio_index.speed_range_mps"),
+    (lambda c: c["vehicle"].update(wheelbase_m=3000.0), "vehicle.wheelbase_m is 3000.0"),
+    (lambda c: c["seen"].update(payload_kg=[400.0, 0.0]), "seen.payload_kg"),
+]
+
+
+@pytest.mark.parametrize(("change", "said"), ABSURD, ids=[said for _, said in ABSURD])
+def test_numbers_of_no_vehicle_are_refused_by_name_though_the_hash_is_right(
+    tmp_path: Path, change: Change, said: str
+) -> None:
+    """They reached the model, and printed pages of warnings."""
+    content = json.loads((Path(gateway.__file__).parent / "demo" / "paper_van.json").read_text())
+    change(content)
+    content["id"] = content_id(content)
+    path = tmp_path / "van.json"
+    path.write_text(json.dumps(content))
+    assert said in fault_of(path)
 
 
 def test_an_unknown_regression_term_is_refused(tmp_path: Path) -> None:

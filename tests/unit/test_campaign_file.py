@@ -80,6 +80,13 @@ def test_a_sensor_whose_place_to_the_side_is_not_stated_is_unsure(tmp_path: Path
     assert placed(sensor_offset_left_std_m="0.5") == (0.0, 0.5)
 
 
+def test_what_is_carried_reaches_the_vehicle(tmp_path: Path) -> None:
+    said = {"carries": '"long_goods"', "payload_height_m": "0.6", "tow_bar": "true"}
+    vehicle = loaded(tmp_path, campaign_text(vehicle=said)).vehicle
+    assert (vehicle.carries, vehicle.payload_height_m, vehicle.payload_length_m) == ("long_goods", 0.6, None)
+    assert (vehicle.roof_rack, vehicle.tow_bar) == (False, True)
+
+
 def test_a_payload_whose_place_to_the_side_nobody_noted_lies_about_the_middle(tmp_path: Path) -> None:
     noted = LOADED_RUN | {"payload_left_m": "-0.25"}
     campaign = loaded(tmp_path, campaign_text('signals = "s"', {"track_width_m": "1.5"}, LOADED_RUN, noted))
@@ -98,6 +105,7 @@ FAULTS = [
     (campaign_text(vehicle={"empty_mass_kg": '"heavy"'}), "vehicle.empty_mass_kg: "),
     (campaign_text(vehicle={"empty_front_share_pct": "0.5e3"}), "vehicle.empty_front_share_pct: "),
     (campaign_text(vehicle={"payload_range_kg": "[450.0, 0.0]"}), "payload_range_kg must rise"),
+    (campaign_text(vehicle={"carries": '"elephants"'}), "vehicle.carries"),
     (campaign_text('signals = "s"', None, {"log": '"a.log"'}), "runs[1].payload_kg: missing"),
     (campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN | {"payload_kg": "-5.0"}), "runs[2].payload_kg: "),
     (campaign_text('signals = "s"', None, EMPTY_RUN | {"payload_kg": "90.0"}), "needs payload_position_m"),

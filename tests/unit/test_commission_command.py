@@ -12,6 +12,7 @@ from support.commissioning import Bench, fitted
 from support.web import Gateway, serving
 
 from gateway.cli.asked import commission as command
+from gateway.core.cargo import is_said
 from gateway.errors import ConfigurationError, SpringscaleError
 
 VEHICLE = ("--front-axle-kg", "690", "--rear-axle-kg", "710", "--wheelbase-m", "2.75", "--sensor-m", "1.2")
@@ -49,6 +50,19 @@ def test_one_call_answers_everything(url: str, bench: Bench) -> None:
     assert "van-17 without a line, one window, made 2026-09-21T14:13:20Z by local (yard)" in made
     assert "another calibration counts from the next drive on" in made
     assert "undone" in run(url, "undo").stdout
+
+
+def test_what_it_carries_can_be_said_and_reaches_the_vehicle_that_is_fitted(url: str, bench: Bench) -> None:
+    loads = ("--carries", "parcels", "--payload-length-m", "2.4", "--payload-height-m", "1.2", "--roof-rack")
+    begun = json.loads(run(url, "start", "--line", "none", *VEHICLE, *loads, "--empty", "--json").stdout)
+    said = begun["underway"]["vehicle"]
+    assert [said[key] for key in ("carries", "payload_length_m", "payload_height_m")] == ["parcels", 2.4, 1.2]
+    assert (said["roof_rack"], said["tow_bar"]) == (True, False)
+    bench.drive(0)
+    stated = bench.worker.jobs[-1].vehicle.stated
+    assert (stated.carries, stated.payload_length_m, stated.payload_height_m) == ("parcels", 2.4, 1.2)
+    assert (stated.roof_rack, stated.tow_bar, is_said(stated)) == (True, False, True)
+    assert run(url, "start", "--carries", "elephants").exit_code == 2
 
 
 def test_what_it_may_carry_can_be_said(url: str) -> None:

@@ -384,7 +384,7 @@ def test_a_book_that_cannot_be_believed_is_set_aside(tmp_path: Path, caplog: pyt
 
 
 def test_a_book_that_cannot_be_set_aside_is_not_written_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As the tare's file never was: a folder that was read-only at the start may be writable when somebody begins."""
+    """A folder that was read-only at the start may be writable when somebody begins."""
 
     def refuse(_self: KeptFiles, _name: str) -> str:
         raise OSError(30, "Read-only file system")

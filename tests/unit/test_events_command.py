@@ -1,4 +1,4 @@
-"""springscale events: from logs what the service would have told of the same frames, under the same tare."""
+"""springscale events: from logs what the service would have told of the same frames, under the same known weights."""
 
 import gzip
 import json
@@ -9,9 +9,9 @@ import pytest
 from click.testing import CliRunner
 from support.bus_drive import white_noise
 from support.calibrated import calibration_file
+from support.known_weights import SUBJECT, KnownWeightBench
 
 from gateway.bus.logs import write_candump
-from gateway.calibration.tare_file import FILE_NAME, TareEntry, TareHistory
 from gateway.cli import springscale
 from gateway.cli.text.events import entry_sentence
 from gateway.core.events import Entry, EntryKind
@@ -46,18 +46,6 @@ def told(folder: Path, *logs: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in said(folder, *logs, "--json").splitlines()]
 
 
-def tare_in_use(folder: Path, payload_kg: float) -> None:
-    entry = TareEntry(
-        id="", at="2026-09-21T00:00:00.000000Z", by="yard", note=None, vehicle_id="van-17", estimator="ratio_index",
-        calibration_id=calibration_file().id, payload_kg=payload_kg, payload_std_kg=3.0, front_share_pct=0.0,
-        front_share_std_pct=0.1, n_batches=1, batch_ids=("1-a",), t_start="2026-09-21T00:00:00.000000Z",
-        t_end="2026-09-21T00:05:00.000000Z",
-    )  # fmt: skip
-    history = TareHistory(entries=(entry.model_copy(update={"id": entry.content_id()}),))
-    (folder / "state").mkdir()
-    (folder / "state" / FILE_NAME).write_text(history.model_dump_json())
-
-
 def test_each_drive_is_a_trip_with_what_was_aboard(tmp_path: Path, drives: tuple[str, str]) -> None:
     first, second = told(tmp_path, *drives)
     assert [one["id"].partition("-")[0] for one in (first, second)] == ["trip", "trip"]
@@ -69,9 +57,13 @@ def test_each_drive_is_a_trip_with_what_was_aboard(tmp_path: Path, drives: tuple
     assert lines[1].endswith(", still going")
 
 
-def test_loads_are_less_the_tare_that_the_service_has_in_use(tmp_path: Path, drives: tuple[str, str]) -> None:
-    tare_in_use(tmp_path, 12.0)
-    assert [one["payload_kg"] for one in told(tmp_path, *drives)] == [188.0, 188.0]
+def test_loads_take_the_known_weights_of_the_service_into_account(tmp_path: Path, drives: tuple[str, str]) -> None:
+    plain = [one["payload_kg"] for one in told(tmp_path, *drives)]
+    bench = KnownWeightBench(tmp_path / "state", subject=SUBJECT)
+    bench.empty()  # read as 12 kg
+    bench.store.close()
+    loads_kg = [one["payload_kg"] for one in told(tmp_path, *drives)]
+    assert all(before - 12.0 < kg < before - 1.0 for before, kg in zip(plain, loads_kg, strict=True))
 
 
 UNREADABLE = {

@@ -31,10 +31,13 @@ def told(**changed: Any) -> dict[str, Any]:
     return found
 
 
+RETAINED = {"springscale/van-17/latest", "springscale/van-17/status"}
+
+
 def states(estimate: Estimate) -> dict[str, str]:
     """What each entity shows after a record, as Home Assistant renders templates: in a sandbox, JSON as value_json."""
     templates = SandboxedEnvironment()
-    record = json.loads(json.dumps(estimate_to_json(estimate)))
+    record = json.loads(json.dumps(estimate_to_json(estimate))) | {"state": "online"}
     components = told()["components"]
     return {
         key: templates.from_string(component["value_template"]).render(value_json=record)
@@ -65,10 +68,13 @@ def test_the_message_has_what_device_discovery_asks_for() -> None:
     assert found["device"]["identifiers"] == ["springscale_van-17"]
     assert found["device"]["serial_number"] == "WVWZZZ1KZAW000001"
     assert found["origin"]["name"] == "springscale"
-    assert (found["state_topic"], found["availability_topic"]) == (
-        "springscale/van-17/estimates",
-        "springscale/van-17/status",
-    )
+    assert found["state_topic"] == "springscale/van-17/latest"
+    assert not any("availability" in key for key in found)  # a parked vehicle's weights are there
+    components = found["components"]
+    assert components["refused"]["state_topic"] == "springscale/van-17/estimates"
+    assert components["connected"]["state_topic"] == "springscale/van-17/status"
+    assert components["front_share"]["suggested_display_precision"] == 2
+    assert components["weighed"]["device_class"] == "timestamp"
     names = [component["unique_id"] for component in found["components"].values()]
     assert len(set(names)) == len(names)
     for component in found["components"].values():
@@ -92,7 +98,7 @@ def test_it_is_retained_at_a_real_broker_and_estimates_still_go_out(tmp_path: Pa
     with running_broker(tmp_path) as broker:
         settings = uplink_settings(section.model_copy(update={"port": broker.port}), VehicleSection(id="van-17"))
         assert settings is not None
-        uplink = Uplink(settings, Outbox(store.reader(), store, "fleet"), BIRTH)
+        uplink = Uplink(settings, Outbox(store, "fleet"), BIRTH)
         uplink.start()
         assert wait_until(lambda: uplink.report().n_delivered == 1), uplink.report()
         listener = Listener(broker.port, "ha/#")
@@ -106,6 +112,29 @@ def test_it_is_retained_at_a_real_broker_and_estimates_still_go_out(tmp_path: Pa
 
 
 @needs_mosquitto
+def test_the_last_weights_are_there_for_who_comes_later_though_the_last_batch_was_refused(tmp_path: Path) -> None:
+    """After its restart Home Assistant showed nothing until the next estimate."""
+    section = UplinkSection(host="127.0.0.1", tls=False, home_assistant="ha")
+    store = Store.open(tmp_path / "state")
+    for record in (make_record(1), make_record(2), make_record(3, Why.TOO_SLOW)):
+        store.write_estimate(record)
+    with running_broker(tmp_path) as broker:
+        settings = uplink_settings(section.model_copy(update={"port": broker.port}), VehicleSection(id="van-17"))
+        assert settings is not None
+        uplink = Uplink(settings, Outbox(store, "fleet", with_latest=True), BIRTH)
+        uplink.start()
+        assert wait_until(lambda: uplink.report().n_delivered == 3), uplink.report()
+        uplink.stop()
+        listener = Listener(broker.port, "springscale/van-17/#")
+        assert wait_until(lambda: {message.topic for message in listener.heard} == RETAINED)
+        listener.close()
+    store.close()
+    (latest,) = [message for message in listener.heard if message.topic.endswith("latest")]
+    assert latest.retain
+    assert json.loads(latest.payload)["id"] == make_record(2)["id"]
+
+
+@needs_mosquitto
 def test_a_broker_that_does_not_want_it_there_gets_the_estimates_all_the_same(tmp_path: Path) -> None:
     (tmp_path / "acl").write_text("topic read #\ntopic write springscale/#\n")
     section = UplinkSection(host="127.0.0.1", tls=False, home_assistant="homeassistant")
@@ -116,7 +145,7 @@ def test_a_broker_that_does_not_want_it_there_gets_the_estimates_all_the_same(tm
     with running_broker(tmp_path, extra) as broker:
         settings = uplink_settings(section.model_copy(update={"port": broker.port}), VehicleSection(id="van-17"))
         assert settings is not None
-        uplink = Uplink(settings, Outbox(store.reader(), store, "fleet"), BIRTH)
+        uplink = Uplink(settings, Outbox(store, "fleet"), BIRTH)
         uplink.start()
         assert wait_until(lambda: uplink.report().n_delivered == 1), uplink.report()
         uplink.stop()

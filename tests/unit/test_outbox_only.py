@@ -33,7 +33,7 @@ def tell(store: Store, *what: str) -> None:
 
 
 def outbox(store: Store, *only: str) -> Outbox:
-    return Outbox(store.reader(), store, NAME, only=only)
+    return Outbox(store, NAME, only=only)
 
 
 def drained(box: Outbox, limit: int = 2) -> list[str]:

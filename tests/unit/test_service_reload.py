@@ -1,11 +1,17 @@
 """A reload applies what can change live, names what waits for a restart, and survives every mistake."""
 
+import asyncio
 import logging
+import os
+import signal
 import socket
 import ssl
+import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
+import httpx
 import numpy as np
 import pytest
 import trustme
@@ -22,8 +28,10 @@ from gateway.config import Settings, load_settings
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.errors import ConfigurationError
 from gateway.log import LOGGER, set_log_level
+from gateway.notify import Notifier
+from gateway.service import life
 from gateway.service.commissioning import commissioned, with_commissioned
-from gateway.service.notify import Notifier
+from gateway.service.gateway import Gateway as Service
 from gateway.service.reload import Reloader, changed_keys, tls_of
 from gateway.setup import setup_of
 from gateway.web import server_config
@@ -186,8 +194,9 @@ def with_half_car() -> Result:
         names=PARAMETERS,
         parameters=np.zeros(len(PARAMETERS)),
         covariance=np.eye(len(PARAMETERS)),
-        payload_inflation=1.0,
-        front_share_inflation=1.0,
+        directions=np.zeros((len(PARAMETERS), 0)),
+        model_std=(5.0, 0.1, 0.002),
+        model_per_reach=(1.0, 1.0),
         misfit_limit=3.0,
         acceleration_rms_mps2=0.5,
         pitch_rate_rms_radps=0.05,
@@ -234,3 +243,52 @@ def test_a_reload_asks_for_the_signature_of_every_other_calibration(tmp_path: Pa
     reload = Reloader(before, lambda: with_commissioned(after), uvicorn.Config("no:app"), setup_of(before))
     assert not reload()
     assert "vehicle.json" in str(reload.fault)
+
+
+def test_a_reload_that_takes_long_keeps_nobody_waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Databases and calibrations were read in the event loop, which answered nobody meanwhile."""
+    settings = settings_of(
+        tmp_path, PLAIN + f'[bus]\ninterface = "virtual"\nchannel = "{tmp_path.name}"\n[web]\nport = 0\n'
+    ).model_copy(deep=True)
+    reading, has_read = threading.Event(), threading.Event()
+    answered: list[int] = []
+
+    def load() -> Settings:
+        reading.set()
+        assert has_read.wait(PATIENCE_S)
+        return settings
+
+    def on_started(service: Service) -> None:
+        loop = asyncio.get_running_loop()
+
+        def ask() -> None:
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert reading.wait(PATIENCE_S)
+            answered.append(httpx.get(f"{service.url}/health/live", trust_env=False).status_code)
+            has_read.set()
+            loop.call_soon_threadsafe(service.request_stop)
+
+        threading.Thread(target=ask, daemon=True).start()
+
+    monkeypatch.chdir(tmp_path)
+    service = Service(settings, setup_of(settings), load=load, on_started=on_started)
+    service.run()
+    assert answered == [200]
+
+
+def test_who_is_to_start_anew_under_systemd_leaves_with_the_code_that_the_unit_knows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A service that began anew inside its process had to clear private caches of FastAPI."""
+    unit = (Path(__file__).parents[2] / "deploy/springscale.service").read_text()
+    assert f"RestartForceExitStatus={life.START_ANEW}\n" in unit
+    assert f"SuccessExitStatus={life.START_ANEW}\n" in unit
+    monkeypatch.setenv("NOTIFY_SOCKET", "/run/nobody")
+    with pytest.raises(SystemExit) as leaving:
+        life.start_anew()
+    assert leaving.value.code == life.START_ANEW
+    monkeypatch.delenv("NOTIFY_SOCKET")
+    called: list[list[str]] = []
+    monkeypatch.setattr(life.os, "execv", lambda path, arguments: called.append(arguments))
+    life.start_anew()
+    assert called == [[sys.executable, *sys.orig_argv[1:]]]

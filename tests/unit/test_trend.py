@@ -23,7 +23,7 @@ from gateway.log import Event
 from gateway.records import Why
 from gateway.service.proving import trend_keeper
 from gateway.service.proving.trend_keeper import TrendKeeper
-from gateway.service.tare_desk import Subject
+from gateway.service.subject import Subject
 from gateway.units import NS_PER_S
 
 MONDAY_NS = 1_790_035_200 * NS_PER_S  # 2026-09-22 is a Tuesday

@@ -1,12 +1,15 @@
 """The uplink's own logic against a link that does what the test says."""
 
+import os
 import random
+import resource
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.broker import needs_mosquitto, running_broker
 from support.estimates import make_record
 from support.log import fields_of, names
 from support.patience import PATIENCE_S, wait_until
@@ -62,6 +65,7 @@ class FakeBroker:
         answers, self._answers = self._answers, []
         return answers
 
+    def wake(self) -> None: ...
     def close(self) -> None: ...
     def abandon(self) -> None: ...
 
@@ -80,7 +84,7 @@ def fill(store: Store, n: int) -> list[str]:
 
 def deliver(store: Store, broker: FakeBroker, is_done: Callable[[Uplink], bool]) -> Uplink:
     """Runs an uplink until ``is_done`` and stops it."""
-    uplink = Uplink(SETTINGS, Outbox(store.reader(), store, "fleet"), {}, broker, BackOff(0.001, 0.002))
+    uplink = Uplink(SETTINGS, Outbox(store, "fleet"), {}, broker, BackOff(0.001, 0.002))
     uplink.start()
     assert wait_until(lambda: is_done(uplink)), uplink.report()
     uplink.stop()
@@ -177,7 +181,7 @@ def test_what_waits_is_counted_while_there_is_no_link(store: Store, monkeypatch:
     def unreachable(_settings: UplinkSettings, _birth: Any) -> FakeBroker:
         raise LinkError("no route to host")
 
-    uplink = Uplink(SETTINGS, Outbox(store.reader(), store, "fleet"), {}, unreachable, BackOff(60.0, 60.0))
+    uplink = Uplink(SETTINGS, Outbox(store, "fleet"), {}, unreachable, BackOff(60.0, 60.0))
     uplink.start()
     assert wait_until(lambda: uplink.report().n_waiting == 3)
     store.write_estimate(make_record(9))
@@ -195,11 +199,12 @@ def test_the_age_of_what_waits_is_that_of_the_oldest(tmp_path: Path) -> None:
         store.write_estimate(make_record(n))
         assert store.flush(PATIENCE_S)
         now_ns[0] += pause_s * 10**9
-    assert store.reader().delivery("fleet").waiting_age_s == 65.0
-    for cursor, age_s in zip(store.reader().estimates().cursors, (25.0, 5.0, None), strict=True):
-        store.write_delivery("fleet", cursor)
-        assert store.flush(PATIENCE_S)
-        assert store.reader().delivery("fleet").waiting_age_s == age_s
+    first_ns = 1_790_000_000 * 10**9
+    for cursor, wait_s in zip((None, *store.reader().estimates().cursors), (0, 40, 60, None), strict=True):
+        if cursor is not None:
+            store.write_delivery("fleet", cursor)
+            assert store.flush(PATIENCE_S)
+        assert store.reader().delivery("fleet").oldest_ns == (None if wait_s is None else first_ns + wait_s * 10**9)
     store.close()
 
 
@@ -230,14 +235,14 @@ def test_what_retention_removes_undelivered_is_counted(tmp_path: Path) -> None:
 def test_a_database_that_was_replaced_is_delivered_from_its_first_row(tmp_path: Path) -> None:
     store = Store.open(tmp_path / "a")
     fill(store, 3)
-    outbox = Outbox(store.reader(), store, "fleet")
+    outbox = Outbox(store, "fleet")
     for letter in outbox.next_letters(10):
         outbox.delivered(letter)
     assert store.flush(PATIENCE_S)
     store.close()
     other = Store.open(tmp_path / "b")
     ids = fill(other, 2)
-    outbox._history, outbox._memory = other.reader(), other
+    outbox._journal, outbox._follower = other, other.follow(outbox._kinds, outbox._follower.place, lambda: None)
     assert [letter.id for letter in outbox.next_letters(10)] == ids
     other.close()
 
@@ -328,7 +333,7 @@ def test_the_log_tells_of_a_link_when_it_comes_and_when_it_goes(store: Store, ca
         return accepted(n, letter)
 
     broker = FakeBroker(answer)
-    uplink = Uplink(SETTINGS, Outbox(store.reader(), store, "fleet"), {}, connect, BackOff(0.001, 0.002))
+    uplink = Uplink(SETTINGS, Outbox(store, "fleet"), {}, connect, BackOff(0.001, 0.002))
     uplink.start()
     assert wait_until(lambda: uplink.report().n_delivered == 3)
     uplink.stop()
@@ -341,3 +346,25 @@ def test_the_log_tells_of_a_link_when_it_comes_and_when_it_goes(store: Store, ca
     ]
     assert fields_of(caplog, Event.UPLINK_NOT_REACHED) == {"broker": "broker.example:8883", "fault": "no name"}
     assert fields_of(caplog, Event.UPLINK_LOST) == {"broker": "broker.example:8883", "fault": "cut"}
+
+
+@needs_mosquitto
+def test_a_link_works_in_a_process_with_more_than_a_thousand_open_files(store: Store, tmp_path: Path) -> None:
+    """select() knows no file beyond 1023: a process of a hundred vehicles' uplinks lost every link at once."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, hard), hard))
+    ids = fill(store, 3)
+    taken = [os.open(os.devnull, os.O_RDONLY) for _ in range(1100)]
+    try:
+        with running_broker(tmp_path) as broker:
+            section = UplinkSection(host="127.0.0.1", port=broker.port, tls=False)
+            settings = uplink_settings(section, VehicleSection(id="van-17"))
+            assert settings is not None
+            uplink = Uplink(settings, Outbox(store, "fleet"), {})
+            uplink.start()
+            assert wait_until(lambda: uplink.report().n_delivered == len(ids)), uplink.report()
+            uplink.stop()
+    finally:
+        for file in taken:
+            os.close(file)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

@@ -47,7 +47,7 @@ def delivered(outbox: Outbox, n: int, clock: Clock) -> list[str]:
 
 
 def test_what_was_delivered_lately_is_said_again(store: Store, clock: Clock) -> None:
-    outbox = Outbox(store.reader(), store, "fleet", repeat_s=1.5)
+    outbox = Outbox(store, "fleet", repeat_s=1.5)
     assert delivered(outbox, 4, clock) == IDS[:4]
     clock.now_s += 1000.0  # a dead link may be noticed late: what counts is the time before the last delivery
     outbox.rewind()
@@ -56,7 +56,7 @@ def test_what_was_delivered_lately_is_said_again(store: Store, clock: Clock) -> 
 
 
 def test_a_second_break_in_the_middle_begins_no_later(store: Store, clock: Clock) -> None:
-    outbox = Outbox(store.reader(), store, "fleet", repeat_s=1.5)
+    outbox = Outbox(store, "fleet", repeat_s=1.5)
     delivered(outbox, 4, clock)
     outbox.rewind()
     assert delivered(outbox, 1, clock) == IDS[2:3]
@@ -65,19 +65,19 @@ def test_a_second_break_in_the_middle_begins_no_later(store: Store, clock: Clock
 
 
 def test_without_it_nothing_that_was_delivered_comes_again(store: Store, clock: Clock) -> None:
-    outbox = Outbox(store.reader(), store, "fleet")
+    outbox = Outbox(store, "fleet")
     delivered(outbox, 4, clock)
     outbox.rewind()
     assert [letter.id for letter in outbox.next_letters(9)] == IDS[4:]
 
 
 def test_a_replaced_database_is_not_asked_for_the_old_ones_places(store: Store, clock: Clock, tmp_path: Path) -> None:
-    outbox = Outbox(store.reader(), store, "fleet", repeat_s=10.0)
+    outbox = Outbox(store, "fleet", repeat_s=10.0)
     delivered(outbox, 4, clock)
     another = Store.open(tmp_path / "another")
     another.write_estimate(make_record(9))
     assert another.flush(PATIENCE_S)
-    outbox._history, outbox._memory = another.reader(), another
+    outbox._journal, outbox._follower = another, another.follow(outbox._kinds, outbox._follower.place, lambda: None)
     outbox.rewind()
     assert [letter.id for letter in outbox.next_letters(9)] == [make_record(9)["id"]]
     another.close()

@@ -50,8 +50,8 @@ def test_what_is_no_secret_is_refused(text: str) -> None:
     ("status", "verdict"),
     [
         (200, Verdict.TAKEN), (202, Verdict.TAKEN), (204, Verdict.TAKEN),
-        (301, Verdict.REFUSED), (400, Verdict.UNWANTED), (401, Verdict.REFUSED), (403, Verdict.REFUSED),
-        (404, Verdict.REFUSED), (410, Verdict.REFUSED), (413, Verdict.UNWANTED), (422, Verdict.UNWANTED),
+        (301, Verdict.REFUSED), (400, Verdict.REFUSED), (401, Verdict.REFUSED), (403, Verdict.REFUSED),
+        (404, Verdict.REFUSED), (410, Verdict.UNWANTED), (413, Verdict.UNWANTED), (422, Verdict.REFUSED),
         (429, Verdict.AWAY), (500, Verdict.REFUSED), (502, Verdict.AWAY), (503, Verdict.AWAY), (504, Verdict.AWAY),
     ],
 )  # fmt: skip

@@ -136,7 +136,7 @@ def test_a_vehicle_that_nobody_can_ask_tells_its_overload(tmp_path: Path) -> Non
     setup = loaded(tmp_path, "gross_limit_kg = 1850.0")
     with Gateway(tmp_path / "state", calibrated=setup.calibrated) as gateway:
         gateway.publish(batch(setup))
-        [letter] = Outbox(gateway.store.reader(), gateway.store, "fleet").next_letters(10)
+        [letter] = Outbox(gateway.store, "fleet").next_letters(10)
         told = json.loads(letter.text)["weights"]
         ask = Client(gateway.app)
         metrics = ask.get("/metrics").text

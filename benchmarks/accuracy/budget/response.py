@@ -11,6 +11,7 @@ from gateway.core.cross_spectrum.likelihood import Whittle
 from gateway.core.cross_spectrum.located import Answer, answer_at
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.core.cross_spectrum.model.strokes import with_strokes
+from gateway.core.cross_spectrum.shape import EVIDENCE
 from gateway.posterior import Source
 from gateway.records import F64
 
@@ -45,7 +46,8 @@ def day_covariance(found: Weighed, calibration: CrossSpectrumCalibration) -> F64
 def _at(found: Weighed, calibration: CrossSpectrumCalibration) -> Answer:
     point, ground = found.located.point, calibration.ground
     spectra = with_strokes(found.spectra.without_roll, calibration.parameters, point.load, ground)
-    return answer_at(Whittle(spectra, ground), point)
+    expected = calibration.parameters[DRIFTING]
+    return answer_at(Whittle(spectra, ground), point, calibration, expected, EVIDENCE, is_shape_known=False)
 
 
 def _held_back(at: Answer) -> F64:

@@ -46,7 +46,7 @@ def letters_of(folder: Path, estimates: Sequence[Estimate]) -> list[Letter]:
         for estimate in estimates:
             store.write_estimate(estimate_to_json(estimate))
         store.flush(kept.TIMEOUT_S)
-        return Outbox(store.reader(), store, "measured").next_letters(len(estimates))
+        return Outbox(store, "measured").next_letters(len(estimates))
     finally:
         store.close()
 

@@ -4,7 +4,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from gateway.bus.broadcast.weight_frames import Sender, WeightFrames
 from gateway.bus.sink import BusSink
@@ -22,7 +22,7 @@ class Broadcaster:
     ``weighed_now`` returns None for what is too old to be told. ``fault`` says why nothing is sent, for people.
     """
 
-    NAME = "sender of weights"
+    NAME: ClassVar = "sender of weights"
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class Broadcaster:
         every_s: float,
         weighed_now: Callable[[], Estimate | None],
     ) -> None:
-        self.fault: str | None = None
+        self._fault: str | None = None
         self.n_sent = 0  # frames
         self._place = (interface, channel, options)
         self._frames = WeightFrames(sender)
@@ -46,10 +46,15 @@ class Broadcaster:
         """Begin to send."""
         self._thread.start()
 
-    def stop(self) -> None:
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
         """Send no more; a bus that takes no frame may keep its thread a little longer than this waits."""
         self._stopping.set()
-        self._thread.join(STOP_WITHIN_S)
+        self._thread.join(within_s)
+
+    @property
+    def fault(self) -> str | None:
+        """Why nothing is sent, for people."""
+        return self._fault
 
     def is_alive(self) -> bool:
         """True while the thread runs."""
@@ -59,8 +64,8 @@ class Broadcaster:
         while not self._stopping.is_set():
             try:
                 self._send_until_stopped()
-            except BusError as fault:
-                self._note(f"[broadcast] weights are not sent: {fault}")
+            except Exception as fault:  # noqa: BLE001 - no bus may end the thread
+                self._note(f"[broadcast] weights are not sent: {fault if isinstance(fault, BusError) else repr(fault)}")
                 self._stopping.wait(RETRY_S)
 
     def _send_until_stopped(self) -> None:
@@ -75,8 +80,8 @@ class Broadcaster:
 
     def _note(self, fault: str | None) -> None:
         """Tell a fault, and its end, once."""
-        if fault != self.fault:
+        if fault != self._fault:
             level = logging.INFO if fault is None else logging.WARNING
             event = Event.BROADCASTING if fault is None else Event.NOT_BROADCASTING
             log_event(event, level=level, interface=self._place[0], channel=self._place[1], fault=fault)
-        self.fault = fault
+        self._fault = fault

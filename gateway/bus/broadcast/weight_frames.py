@@ -1,6 +1,5 @@
 """Weights as frames of SAE J1939: VW, one an axle, and CVW, laid out and scaled by dbc/j1939_weights.dbc."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -9,15 +8,13 @@ from typing import Any, Final
 import cantools
 import numpy as np
 
-from gateway.estimate import Estimate
+from gateway.estimate import Estimate, Weights
+from gateway.j1939 import AXLE_WEIGHT, NOT_AVAILABLE, counts_of
 from gateway.records import EXTENDED_ID, Frames
 
 DATABASE: Final = "j1939_weights.dbc"
-# SAE J1939-71, table 1, numbers of two bytes
-NOT_AVAILABLE: Final = 0xFFFF
-ERROR: Final = 0xFE00  # here: more than two bytes can say
-LAST_NUMBER: Final = 0xFAFF
 WHOLE_AXLE: Final = 0xF  # where four bits would name a tyre
+UNWEIGHED: Final = Weights()
 _PRIORITY_SHIFT: Final = 26
 _GROUP: Final = 0x3FFFF00  # the bits of an identifier that name the parameter group
 
@@ -43,29 +40,19 @@ class WeightFrames:
         self._sender = sender
 
     def of(self, shown: Estimate | None, t_ns: int) -> Frames:
-        """Frames (3,) stamped ``t_ns``; every number is "not available" where ``shown`` does not know it, or is None.
-
-        An early look at a batch is not sent: a bus has no word for "provisional". A payload that an estimate finds a
-        little below nothing is sent as 0.
-        """
-        weighed = Estimate(0, 0, "") if shown is None or shown.is_provisional else shown
-        weights, first = weighed.weights, self._sender.first_axle
-        cargo_kg = weighed.payload.number
-        cargo_kg = 0.0 if cargo_kg < 0.0 else cargo_kg
+        """Frames (3,) stamped ``t_ns``; "not available" is every number that ``shown`` does not know, or None."""
+        weights = UNWEIGHED if shown is None else shown.weights
+        counts = counts_of(shown, weights, draws_trailers=self._sender.draws_trailers)
+        first = self._sender.first_axle
+        of_axle = {count.axle: count.raw for count in counts if count.axle is not None}
+        whole = {count.parameter.signal: count.raw for count in counts if count.axle is None}
         messages = [
-            ("VW", first, {"AxleWeight": weights.front_axle.kg, "CargoWeight": cargo_kg}),
-            ("VW", first + 1, {"AxleWeight": weights.rear_axle.kg, "CargoWeight": cargo_kg}),
-            (
-                "CVW",
-                None,
-                {
-                    "PoweredVehicleWeight": weights.gross.kg,
-                    "GrossCombinationVehicleWeight": math.nan if self._sender.draws_trailers else weights.gross.kg,
-                },
-            ),
+            ("VW", {"TireLocation": WHOLE_AXLE, "AxleLocation": first, AXLE_WEIGHT.signal: of_axle[1]} | whole),
+            ("VW", {"TireLocation": WHOLE_AXLE, "AxleLocation": first + 1, AXLE_WEIGHT.signal: of_axle[2]} | whole),
+            ("CVW", whole),
         ]
         payload = np.frombuffer(b"".join(self._encoded(*message) for message in messages), np.uint8).reshape(-1, 8)
-        can_id = [self._identifier(name) for name, _, _ in messages]
+        can_id = [self._identifier(name) for name, _ in messages]
         n = len(messages)
         return Frames(np.full(n, t_ns, np.int64), np.array(can_id, np.uint32), np.full(n, 8, np.uint8), payload)
 
@@ -73,19 +60,8 @@ class WeightFrames:
         group: int = self._database.get_message_by_name(name).frame_id & _GROUP
         return self._sender.priority << _PRIORITY_SHIFT | group | self._sender.source_address | EXTENDED_ID
 
-    def _encoded(self, name: str, axle: int | None, weights_kg: Mapping[str, float]) -> bytes:
+    def _encoded(self, name: str, known: Mapping[str, int]) -> bytes:
         """The eight bytes; bits that belong to nothing are set, as J1939 has it."""
         message = self._database.get_message_by_name(name)
-        places = {} if axle is None else {"TireLocation": WHOLE_AXLE, "AxleLocation": axle}
-        raw = {
-            signal.name: places.get(signal.name, _raw(weights_kg.get(signal.name, math.nan), float(signal.scale)))
-            for signal in message.signals
-        }
+        raw = {signal.name: known.get(signal.name, NOT_AVAILABLE) for signal in message.signals}
         return bytes(message.encode(raw, scaling=False, padding=True, strict=False))
-
-
-def _raw(weight_kg: float, kg_per_bit: float) -> int:
-    if math.isnan(weight_kg):
-        return NOT_AVAILABLE
-    raw = round(weight_kg / kg_per_bit)
-    return raw if 0 <= raw <= LAST_NUMBER else ERROR

@@ -23,6 +23,7 @@ from gateway.records import EXTENDED_ID
 LOOK_S: Final = 2.0
 EVERY_S: Final = 60.0
 POLL_S: Final = 0.1
+STOP_WITHIN_S: Final = 1.0
 EVERY_IDENTIFIER: Final = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))
 
 
@@ -56,11 +57,11 @@ class Around:
         """What was heard is no longer of interest; the next silence is looked into at once."""
         self._heard, self._begun_s = (), -EVERY_S
 
-    def stop(self) -> None:
-        """End a look that is under way."""
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
+        """End a look that is under way; a channel that does not open keeps its thread a little longer."""
         self._stopping.set()
         if self._thread is not None:
-            self._thread.join()
+            self._thread.join(within_s)
 
     def _run(self, open_receiver: OpenReceiver) -> None:
         bursts = []

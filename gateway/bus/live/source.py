@@ -24,7 +24,7 @@ from gateway.bus.live.socketcan import open_socketcan, packets_received
 from gateway.bus.signals import SignalMap
 from gateway.log import Event, log_event
 
-POLL_S: Final = 0.1  # longest wait inside a receiver: how soon a stop is heeded
+POLL_S: Final = 0.3  # longest wait inside a receiver: how soon a stop is heeded
 FIRST_PAUSE_S: Final = 0.25
 LONGEST_PAUSE_S: Final = 5.0
 START_WAIT_S: Final = 2.0

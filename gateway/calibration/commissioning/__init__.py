@@ -6,6 +6,6 @@
 """
 
 from gateway.calibration.commissioning.answers import OF_THE_LINE, vehicle_table
-from gateway.calibration.commissioning.job import JOB, RESULT, Drive, Found, Job, Learned, Planned, Result
+from gateway.calibration.commissioning.job import JOB, RESULT, Drive, Found, Job, Learned, Result
 
-__all__ = ["JOB", "OF_THE_LINE", "RESULT", "Drive", "Found", "Job", "Learned", "Planned", "Result", "vehicle_table"]
+__all__ = ["JOB", "OF_THE_LINE", "RESULT", "Drive", "Found", "Job", "Learned", "Result", "vehicle_table"]

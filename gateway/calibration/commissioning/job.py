@@ -34,7 +34,6 @@ class Job(_Table):
     settings: dict[str, Any]
     like: tuple[Path, ...] = ()
     is_fit: bool = True
-    is_planned: bool = Field(False, description="after the fit, tell which load would help most")
     goal_std_share: float = Field(gt=0.0, description="of the largest payload: the standard deviation that is aimed at")
     most_memory_mb: float = Field(gt=0.0)
     command: str
@@ -69,25 +68,12 @@ class Learned(_Table):
         return min(1.0, self.needed_std_kg / self.payload_std_kg)
 
 
-class Planned(_Table):
-    """How well it weighs now, and with the load that would help most; ``is_enough`` where none would help by much."""
-
-    payload_std_kg: float
-    front_share_std_pct: float
-    load_kg: float
-    load_position_m: float | None
-    then_payload_std_kg: float
-    then_front_share_std_pct: float
-    is_enough: bool
-
-
 class Result(_Table):
     """What came of a job. ``fault`` says in words why there is no calibration; its text is that of the file."""
 
     findings: tuple[Found, ...] = ()
     refusal: str | None = None
     learned: Learned | None = None
-    planned: Planned | None = None
     calibration: str | None = None
     calibration_id: str | None = None
     warnings: tuple[str, ...] = ()

@@ -1,24 +1,29 @@
 """Whether enough was driven: what is known of the vehicle against what is needed, not how long it took."""
 
+import math
 from typing import Final
 
 import numpy as np
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.commissioning.job import Learned
-from gateway.calibration.plan.design import Design, Spread
+from gateway.calibration.plan.design import BATCH_S, Design
 from gateway.calibration.plan.loads import empty, weighed_loads
 from gateway.calibration.plan.plan import WORTH_DRIVING
+from gateway.core.cargo import shape_prior
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
+from gateway.core.cross_spectrum.predicted import predicted
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
+from gateway.posterior import FRONT_SHARE, PAYLOAD, Source
 
 ANOTHER_DRIVE_S: Final = 3600.0  # after which nobody would go on in any case
+EVERY: Final = 6  # of the loads that it may carry: enough to average over what driving does not narrow
 
 
 def learned_by(outcome: Outcome, vehicle: Vehicle, goal_std_share: float) -> Learned:
-    """What the empty drives of ``outcome`` taught, and what is needed.
+    """What the empty drives of ``outcome`` taught, as the service will state it, and what is needed.
 
     Needed is the goal, a share of the largest payload; or what another hour of the same would leave, less a tenth:
     where that is more, only loads would help, and driving on is in vain.
@@ -29,20 +34,19 @@ def learned_by(outcome: Outcome, vehicle: Vehicle, goal_std_share: float) -> Lea
     n = len(PARAMETERS)
     counted = [batch for run in outcome.split for batch in run.identification.batches if not batch.rejected]
     speed_mps = float(np.median([batch.mean_speed_mps for batch in counted]))
-    design = Design(vehicle, known.parameters, Drive(ANOTHER_DRIVE_S, speed_mps), weighed_loads(vehicle))
+    loads = weighed_loads(vehicle)
+    prior, drive = shape_prior(vehicle, *known.known_shape), Drive(BATCH_S, speed_mps)
+    stated = [predicted(known, prior, load.load, drive).without(Source.CALIBRATION) for load in loads[::EVERY]]
+    beside = np.sqrt(np.mean([np.diag(one.shared) for one in stated], axis=0))
+    design = Design(vehicle, known.parameters, Drive(ANOTHER_DRIVE_S, speed_mps), loads)
     covariance = known.covariance[:n, :n]
     now = design.spread(covariance)
     later = design.spread(design.after(covariance, empty(vehicle)))
     return Learned(
-        payload_std_kg=_inflated(now, known.payload_inflation),
-        front_share_std_pct=known.front_share_inflation * now.front_share_std_pct,
+        payload_std_kg=math.hypot(now.payload_std_kg, beside[PAYLOAD]),
+        front_share_std_pct=math.hypot(now.front_share_std_pct, beside[FRONT_SHARE]),
         needed_std_kg=max(
             goal_std_share * vehicle.payload_range_kg[1],
-            _inflated(later, known.payload_inflation) / (1.0 - WORTH_DRIVING),
+            math.hypot(later.payload_std_kg, beside[PAYLOAD]) / (1.0 - WORTH_DRIVING),
         ),
     )
-
-
-def _inflated(spread: Spread, inflation: float) -> float:
-    """As the service would state it."""
-    return inflation * spread.payload_std_kg

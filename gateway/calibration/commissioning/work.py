@@ -16,13 +16,12 @@ from typing import Final
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, CampaignTable, RunTable
-from gateway.calibration.commissioning.job import JOB, RESULT, Job, Planned, Result, findings_of, to_file
+from gateway.calibration.commissioning.job import JOB, RESULT, Job, Result, findings_of, to_file
 from gateway.calibration.commissioning.learned import learned_by
 from gateway.calibration.file import load_like
 from gateway.calibration.inspection import Finding, Inspection, Kind
 from gateway.calibration.kept import KnownDrive, inspect_kept, unpacked
 from gateway.calibration.kept.drive import ESTIMATORS
-from gateway.calibration.plan import LoadPlan, plan_next
 from gateway.core.settings import BatchSettings
 from gateway.errors import SpringscaleError
 
@@ -62,26 +61,10 @@ def done(path: Path, job: Job) -> Result:
 def _made(outcome: Outcome, campaign: Campaign, job: Job) -> dict[str, object]:
     return {
         "learned": learned_by(outcome, campaign.vehicle, job.goal_std_share),
-        "planned": _planned(plan_next(outcome, campaign.vehicle, 1)) if job.is_planned else None,
         "calibration": outcome.file.to_json(),
         "calibration_id": outcome.file.id,
         "warnings": outcome.file.warnings,
     }
-
-
-def _planned(plan: LoadPlan) -> Planned | None:
-    if plan.now is None or not plan.advice:
-        return None
-    best = plan.advice[0]
-    return Planned(
-        payload_std_kg=plan.now.payload_std_kg,
-        front_share_std_pct=plan.now.front_share_std_pct,
-        load_kg=best.load.payload_kg,
-        load_position_m=best.load.position_m,
-        then_payload_std_kg=best.expected.payload_std_kg,
-        then_front_share_std_pct=best.expected.front_share_std_pct,
-        is_enough=plan.is_enough_driven,
-    )
 
 
 def _campaign(path: Path, job: Job) -> Campaign:

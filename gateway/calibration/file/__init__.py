@@ -1,7 +1,8 @@
 """The vehicle calibration file: JSON whose id is the hash of its content, checked whole when it is read.
 
-What the estimators learned comes in; what the core needs to weigh goes out (``CalibrationFile.for_core``). Here too: the file's figures for people, the difference of two files, and the check
-of a file against the logs that it was made from.
+What the estimators learned comes in; what the core needs to weigh goes out (``CalibrationFile.for_core``). Here too:
+the file's figures for people, the difference of two files, and the check of a file against the logs that it was made
+from.
 """
 
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration

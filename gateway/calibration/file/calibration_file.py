@@ -17,6 +17,7 @@ from gateway.calibration.file.parts import (
     SeenPart,
     VehiclePart,
 )
+from gateway.calibration.file.sane import absurd
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, LineError, UntrustedFileError
@@ -122,6 +123,8 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
         held.for_core()  # a term or a model of another springscale is told here, with the file's name
         if held.line is not None:
             held.line.require_known()
+        if (fault := absurd(held)) is not None:
+            raise CalibrationFileError(fault)
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
     except ValidationError as fault:

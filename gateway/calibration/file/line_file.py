@@ -9,7 +9,6 @@ from pydantic import Field, ValidationError
 
 from gateway.calibration.file.calibration_file import (
     CalibrationFile,
-    Content,
     content_id,
     load_calibration,
     matches_its_id,

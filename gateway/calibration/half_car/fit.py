@@ -29,7 +29,7 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import moves_of, weigh
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
-from gateway.core.cross_spectrum.located import answer_at
+from gateway.core.cross_spectrum.located import raw_moves
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, names_of, upright
 from gateway.core.cross_spectrum.search import Found
 from gateway.core.vehicle import Load, Vehicle, front_share_pct
@@ -141,9 +141,9 @@ def _directions(calibration: CrossSpectrumCalibration, vehicle: Vehicle, runs: S
         payload_kg = part * most_kg
         share_pct = front_share_pct(vehicle, payload_kg, place * vehicle.wheelbase_m)
         point = Point.of(theta, Load(payload_kg, share_pct))
-        at = answer_at(Whittle(expected_of(spectra, point, ground), ground), point)
+        _, by_parameter = raw_moves(Whittle(expected_of(spectra, point, ground), ground), point)
         moved = np.zeros((2, len(calibration.parameters)))
-        moved[:, : len(PARAMETERS)] = np.diag([1.0, 100.0]) @ at.moves
+        moved[:, : len(PARAMETERS)] = np.diag([1.0, 100.0]) @ by_parameter
         moves.append(moved)
     return directions_of(moves, calibration.covariance)
 

@@ -69,7 +69,9 @@ def left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) ->
 
 def limits_shown_by(errors: Sequence[LeftOut], misfit_limit: float, empty_mass_kg: float) -> Limits:
     """What these ask for; ``misfit_limit`` is what the fit of all asks for."""
-    of_model = model_error([_of_run(list(batches)) for _, batches in groupby(errors, lambda one: one.run)], empty_mass_kg)
+    of_model = model_error(
+        [_of_run(list(batches)) for _, batches in groupby(errors, lambda one: one.run)], empty_mass_kg
+    )
     return Limits(
         model_std=of_model.std,
         model_per_reach=of_model.per_reach,

@@ -60,5 +60,3 @@ def model_error(runs: Sequence[RunError], empty_mass_kg: float) -> ModelError:
         weight = PRIOR_RUNS * USUAL_REACH**2
         grown.append(float(np.sqrt((weight * USUAL_PER_REACH**2 + sum(excess)) / (weight + sum(reach2)))))
     return ModelError((stds[0], stds[1], stds[2]), (grown[0], grown[1]))
-
-

@@ -38,7 +38,8 @@ class Coverage:
 
 
 def interval_scores(true: F64, low: F64, high: F64) -> F64:
-    """(n,) scores of 95 % intervals, in the unit of what they hold: their width, and 40 times what the truth lies outside.
+    """(n,) scores of 95 % intervals, in the unit of what they hold: their width, and 40 times what the truth lies
+    outside.
 
     It is least, in the mean, for the interval that is right (R. L. Winkler, J. Am. Stat. Assoc. 67 (1972) 187-191;
     T. Gneiting and A. E. Raftery, J. Am. Stat. Assoc. 102 (2007) 359-378, section 6.2): coverage alone is the better

@@ -21,7 +21,7 @@ from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.calibration.plan.loads import PlacedLoad
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
-from gateway.core.cross_spectrum.located import answer_at
+from gateway.core.cross_spectrum.located import raw_moves
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, Ground, upright
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import Vehicle
@@ -88,8 +88,8 @@ class Design:
     def _weighed(self, load: PlacedLoad) -> tuple[F64, F64]:
         """A batch's own variances (2,), and by how much (payload, share) move with each parameter (2, p)."""
         whittle, point = self._seen(load, Drive(BATCH_S, self._drive.speed_mps), 1.0)
-        at = answer_at(whittle, point)
-        return np.diag(at.covariance)[-2:], at.moves
+        own, moves = raw_moves(whittle, point)
+        return np.diag(own), moves
 
     def _seen(self, load: PlacedLoad, drive: Drive, weight: float) -> tuple[Whittle, Point]:
         point = Point.of(self._theta, load.load)

@@ -100,7 +100,9 @@ class LoadPlan:
 def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST, inherited: Inherited | None = None) -> LoadPlan:
     """A first campaign: empty, then what the priors of any vehicle, or of its line, let expect the most of."""
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=False)
-    planner = _Planner(vehicle, prior.mean, FIRST_DRIVE, _beside_calibration(_of_prior(prior, vehicle), vehicle, FIRST_DRIVE))
+    planner = _Planner(
+        vehicle, prior.mean, FIRST_DRIVE, _beside_calibration(_of_prior(prior, vehicle), vehicle, FIRST_DRIVE)
+    )
     unloaded = empty(vehicle)
     known = planner.after(prior.covariance, unloaded)
     first = Advice(unloaded, planner.expected(known, (unloaded,)))
@@ -163,7 +165,8 @@ def _beside_calibration(known: CrossSpectrumCalibration, vehicle: Vehicle, drive
         payload_kg = part * most_kg
         loads.append(Load(payload_kg, front_share_pct(vehicle, payload_kg, place * vehicle.wheelbase_m)))
     stated = [predicted(known, prior, load, Drive(BATCH_S, drive.speed_mps)) for load in loads]
-    return np.mean([np.diag(one.without(Source.CALIBRATION).shared)[:2] for one in stated], axis=0)
+    beside: F64 = np.mean([np.diag(one.without(Source.CALIBRATION).shared)[:2] for one in stated], axis=0)
+    return beside
 
 
 def _of_prior(prior: Prior, vehicle: Vehicle) -> CrossSpectrumCalibration:

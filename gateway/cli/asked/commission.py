@@ -11,6 +11,7 @@ from gateway.cli.asked.service import Service, asks_service
 from gateway.cli.options import FILE, NUMBER, as_json
 from gateway.cli.text.commission import lines_text, progress_text, state_text, underway_text
 from gateway.cli.text.progress import StatusLine
+from gateway.core.cargo import Carries
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.files.signed import signature_path
 from gateway.records import json_line
@@ -28,6 +29,11 @@ SAID: Final = {  # option: key of the vehicle, question, whether it must be answ
     "sensor_left_m": ("sensor_offset_left_m", "", False),
     "track_m": ("track_width_m", "", False),
     "payload_kg": (MOST_PAYLOAD, "", False),
+    "carries": ("carries", "", False),
+    "payload_length_m": ("payload_length_m", "", False),
+    "payload_height_m": ("payload_height_m", "", False),
+    "roof_rack": ("roof_rack", "", False),
+    "tow_bar": ("tow_bar", "", False),
     "name": ("name", "", False),
 }
 
@@ -49,6 +55,13 @@ def commission() -> None:
 )
 @click.option("--track-m", type=NUMBER, default=None, help="between the middles of left and right tyres")
 @click.option("--payload-kg", type=NUMBER, default=None, help="most that it may carry [default: as its line, else 450]")
+@click.option(
+    "--carries", type=click.Choice([str(one) for one in Carries]), default=None, help="what it usually carries"
+)
+@click.option("--payload-length-m", type=NUMBER, default=None, help="how far along the floor that usually reaches")
+@click.option("--payload-height-m", type=NUMBER, default=None, help="how high above the floor")
+@click.option("--roof-rack", is_flag=True, default=None, help="part of the load may lie on the roof")
+@click.option("--tow-bar", is_flag=True, default=None, help="part of the load may hang on a tow bar")
 @click.option("--empty", is_flag=True, help="you know that the vehicle is empty, and will be until this is over")
 @click.option("--note", default=None, help="kept in the history")
 @click.option("--follow/--no-follow", default=None, help="show progress until it is made [default: at a terminal]")

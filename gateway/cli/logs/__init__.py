@@ -1,1 +1,1 @@
-"""Commands that tell from recorded logs what a service would have told."""
+"""Commands that make, pack or read recordings without a service, and the one that feeds sensors onto a bus."""

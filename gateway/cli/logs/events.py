@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from gateway.cli.estimate import prepared, tared_by
+from gateway.cli.estimate import prepared, with_known_weights
 from gateway.cli.options import FILE, as_json, one_estimator, window
 from gateway.cli.text.events import entry_sentence
 from gateway.offline.events import entries_of_logs
@@ -30,9 +30,9 @@ def events(
 ) -> None:
     """What was loaded and unloaded, and every trip, from the LOGs of one vehicle in order of time.
 
-    One line each; with --json the objects that the service stores, in their last revision. Loads are less the tare
-    that the service of --config has in use.
+    One line each; with --json the objects that the service stores, in their last revision. Loads take the known
+    weights of the service of --config into account.
     """
     setup, settings, state = prepared(config_path, signals, calibration, estimator, window_s)
-    for entry in entries_of_logs(logs, tared_by(setup, None, state), settings):
+    for entry in entries_of_logs(logs, with_known_weights(setup, None, state), settings):
         click.echo(json_line(entry.record) if as_json else entry_sentence(entry))

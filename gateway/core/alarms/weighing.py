@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 
 from gateway.core.alarms.alarm import AXLES, OVERLOADS, SIDES, Figure
 from gateway.core.alarms.rules import AlarmRules, Says, Verdict

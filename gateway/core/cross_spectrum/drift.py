@@ -69,7 +69,7 @@ def _covariance(by_itself: Mapping[str, float], together: Mapping[str, float], n
 
 _BELIEVED: Final = _covariance(DRIFT_STD, {"damper": DAMPERS_TOGETHER_STD}, list(DRIFT_STD))
 _NATURE_OF_DRIFTING: Final = _covariance({**DRIFT_STD, **NATURE_STD}, NATURE_TOGETHER_STD, list(DRIFT_STD))
-_NATURE_OF_STEADY: Final = _covariance(NATURE_STD, NATURE_TOGETHER_STD, [PARAMETERS[i] for i in STEADY])
+NATURE_OF_STEADY: Final = _covariance(NATURE_STD, NATURE_TOGETHER_STD, [PARAMETERS[i] for i in STEADY])
 DRIFT_PRECISION: Final = np.linalg.inv(_BELIEVED)
 """(k, k) of the DRIFTING parameters: the inverse of what the search believes of them."""
 
@@ -102,7 +102,7 @@ def _factor(covariance: F64) -> F64:
 
 _IS_PACKING: Final = np.array([name.startswith("payload_") for name in DRIFT_STD])
 _BEYOND_BELIEVED: Final = _NATURE_OF_DRIFTING - _BELIEVED
-_DAY_OF_STEADY: Final = _factor(_NATURE_OF_STEADY)
+_DAY_OF_STEADY: Final = _factor(NATURE_OF_STEADY)
 _DAY_OF_DRIFTING: Final = _factor(np.where(np.outer(~_IS_PACKING, ~_IS_PACKING), _BEYOND_BELIEVED, 0.0))
 _PACKING_OF_DRIFTING: Final = _factor(np.where(np.outer(_IS_PACKING, _IS_PACKING), _BEYOND_BELIEVED, 0.0))
 

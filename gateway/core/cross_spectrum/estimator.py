@@ -24,7 +24,6 @@ from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of,
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_of
-from gateway.core.cross_spectrum.shape import EVIDENCE
 from gateway.estimate import Estimate
 from gateway.posterior import PAYLOAD, Posterior, Source
 from gateway.records import F64, Batch, Why
@@ -79,12 +78,11 @@ def weigh(batch: Batch, calibration: CrossSpectrumCalibration, prior: ShapePrior
     if spectra is None or why is not None:
         return why or Why.TOO_SHORT
     unseen = _unseen(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
-    evidence = EVIDENCE / unseen**2
-    located = locate(spectra, calibration, prior, evidence)
+    located = locate(spectra, calibration, prior)
     lag_s = float(located.point.theta[INDEX["gyro_lag_s"]])
     if located.sideways is not None and abs(lag_s - calibration.parameters[INDEX["gyro_lag_s"]]) > MOST_LAG_CHANGE_S:
         spectra = cross_spectra_of([batch], calibration.reading.with_gyro_late_by(lag_s)) or spectra
-        located = locate(spectra, calibration, prior, evidence)
+        located = locate(spectra, calibration, prior)
     reach = beyond(located.point.load, calibration.known_loads, calibration.empty_mass_kg)
     gain = gain_of(batch.gravity_mps2, calibration.gravity_mps2)
     return Weighed(spectra, located, reach, unseen, posterior_of(located, calibration, unseen, reach, gain))

@@ -11,6 +11,7 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import (
     DRIFT_PRECISION,
     DRIFTING,
+    NATURE_OF_STEADY,
     STEADY,
     day_columns,
     packing_columns,
@@ -25,7 +26,7 @@ from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.cross_spectrum.packing import Packing, packings
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
-from gateway.core.cross_spectrum.shape import EVIDENCE, Shaped, shaped
+from gateway.core.cross_spectrum.shape import EVIDENCE, Node, Shaped, shaped
 from gateway.posterior import NORMAL_TAILS, Source
 from gateway.records import F64
 
@@ -34,6 +35,11 @@ LEAST_START_SHARE: Final = 0.33
 STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rate bends
 COARSE: Final = 0.5  # of evidence, which tells peaks apart
 FINE: Final = 1e-3
+MOST_LOAD_SHARE: Final = 4.0  # of the empty mass: no search goes beyond, wherever noise may lead it
+FIRM_HZ: Final = 25.0
+"""A load that rings on its mount below this turns there too, which no model here knows: the evidence of its shape
+counts less, as the square of the ratio. Chosen.
+"""
 OF_SHAPES: Final = 0.02  # of evidence, likewise of shapes
 MOST_RIVALRY: Final = 1.0
 """Of all other variance: where peaks that compete are most of what is uncertain, that is why."""
@@ -94,7 +100,7 @@ def locate(
     if spectra.roll is None or not has_roll(calibration.parameters):
         whittle, peak = _best(spectra.without_roll, calibration)
         shape = _shaped(whittle, peak, calibration, 0.0, prior, evidence)
-        located = _located(whittle, peak, shape, calibration, 0.0)
+        located = _located(whittle, peak, shape, calibration, 0.0, evidence)
 
         def weigh(other: CrossSpectra) -> F64:
             sought = _sought(Whittle(other, calibration.ground), peak.found.x, peak.packing, calibration, 0.0, COARSE)
@@ -114,32 +120,95 @@ def locate(
     placed = _as_shaped(placed, shape)
     x = peak.found.x if shape is None else shape.x
     place = sought_sideways(rolling, _point(x, placed, place.cg_left_m))
-    located = _located(whittle, peak, shape, placed, place.cg_left_m)
+    located = _located(whittle, peak, shape, placed, place.cg_left_m, evidence)
     return replace(located, sideways=told_sideways(rolling, place, located.point))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """What holds at the answer of a search: the curvature of all parameters and the load, the posterior covariance of
-    what was sought (FITTED: drifting parameters and load), by how much it moves with each of the STEADY parameters
-    (steady), and by how much the load alone moves with all of them (moves, (2, p)).
+    """What holds at the peak of a search, with the STEADY parameters t that it held fixed taken into account.
+
+    whole is the curvature of all parameters and the load, covariance that of what was sought (FITTED: drifting
+    parameters and load). cost is minus the logarithm of the evidence by Laplace's approximation, t integrated out over
+    what calibration and nature leave open of it. One Gauss-Newton step moves t as far as the batch and one day's nature
+    let it: shift (k,) is how far what was sought moves along, steady (k, s) by how much it moves with an error of each
+    t after that step, own (k, k) what the batch's noise adds by it.
     """
 
     whole: Curvature
     covariance: F64
+    cost: float
+    shift: F64
     steady: F64
-    moves: F64
+    own: F64
+
+    @property
+    def moves(self) -> F64:
+        """(2, p) by how much the load moves with each of the half-car's parameters."""
+        moves = np.zeros((2, len(PARAMETERS)))
+        moves[:, STEADY] = self.steady[-2:]
+        return moves
 
 
-def answer_at(whittle: Whittle, point: Point) -> Answer:
-    """The fitted x moves by -C I_xt for each of the other parameters t, C being its covariance."""
+def answer_at(
+    whittle: Whittle,
+    point: Point,
+    calibration: CrossSpectrumCalibration,
+    expected: F64,
+    evidence: float,
+    *,
+    is_shape_known: bool = True,
+) -> Answer:
+    """``expected`` (k,) are the drifting parameters that the prior expects; a shape that is sought is no error of t.
+
+    With g and I the gradient and information of t at the peak and N its covariance by nature, the step is
+    -w (w I + N^-1)^-1 g, w being how much the batch's evidence counts. What calibration left open is not moved: its
+    drives were many, and a batch is one.
+    """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
-    covariance = np.linalg.inv(whole.information[np.ix_(FITTED, FITTED)] + np.pad(DRIFT_PRECISION, (0, 2)))
-    steady = -covariance @ whole.information[np.ix_(FITTED, STEADY)]
+    covariance = np.asarray(np.linalg.inv(_of_sought(whole)), float)
+    pull = whole.gradient[FITTED].copy()
+    off = (point.theta[DRIFTING]) - expected
+    pull[: len(DRIFTING)] += DRIFT_PRECISION @ off
+    free = [i for i in range(len(STEADY)) if is_shape_known or STEADY[i] != _GYRATION]
+    t = [STEADY[i] for i in free]
+    along = -covariance @ whole.information[np.ix_(FITTED, t)]  # what was sought moves by -C I_xt with each t
+    gradient = whole.gradient[t] + along.T @ pull
+    information = whole.information[np.ix_(t, t)] + along.T @ whole.information[np.ix_(FITTED, t)]
+    nature = NATURE_OF_STEADY[np.ix_(free, free)]
+    left_open = np.eye(len(t)) + evidence * (calibration.covariance[np.ix_(t, t)] + nature) @ information
+    pulled = (calibration.covariance[np.ix_(t, t)] + nature) @ gradient
+    gained = -0.5 * evidence * float(gradient @ np.linalg.solve(left_open, pulled))
+    narrowed = 0.5 * float(np.linalg.slogdet(left_open)[1]) / evidence
+    narrowing = np.eye(len(t)) + evidence * nature @ information
+    posterior = np.linalg.solve(narrowing, nature)
+    step = -evidence * posterior @ gradient
+    steady = np.zeros((len(along), len(STEADY)))
+    steady[:, free] = along @ np.linalg.inv(narrowing)  # S_posterior S^-1
+    by_noise = along @ posterior * evidence
+    at_peak = whittle.cost(point) + 0.5 * float(off @ DRIFT_PRECISION @ off)
+    return Answer(
+        whole, covariance, at_peak + gained + narrowed, along @ step, steady, by_noise @ information @ by_noise.T
+    )
+
+
+def _of_sought(whole: Curvature) -> F64:
+    """Information on what is sought, its prior included."""
+    information: F64 = whole.information[np.ix_(FITTED, FITTED)] + np.pad(DRIFT_PRECISION, (0, 2))
+    return information
+
+
+def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
+    """(2, 2) covariance of a load that is sought with all STEADY parameters held, and (2, p) by how much it then moves
+    with each of the half-car's parameters.
+    """
+    n = len(point.theta)
+    whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
+    covariance = np.asarray(np.linalg.inv(_of_sought(whole)), float)
     moves = np.zeros((2, len(PARAMETERS)))
-    moves[:, STEADY] = steady[-2:]
-    return Answer(whole, covariance, steady, moves)
+    moves[:, STEADY] = -(covariance @ whole.information[np.ix_(FITTED, STEADY)])[-2:]
+    return covariance[-2:, -2:], moves
 
 
 def _shaped(
@@ -153,12 +222,18 @@ def _shaped(
     """The load under every shape that it may have; None where that is known."""
     if prior is None:
         return None
+    expected = peak.packing.drifting
 
-    def sought(log_s: float, start: F64) -> Found:
-        return _sought(whittle, start, peak.packing, _with_gyration(calibration, log_s), cg_left_m, OF_SHAPES)
+    def weighed_as(log_s: float, start: F64) -> Node:
+        of_shape = _with_gyration(calibration, log_s)
+        found = _sought(whittle, start, peak.packing, of_shape, cg_left_m, OF_SHAPES)
+        point = _point(found.x, of_shape, cg_left_m)
+        at = answer_at(whittle, point, of_shape, expected, evidence, is_shape_known=False)
+        return Node(found.x, at.cost, found.x + at.shift, float(np.sqrt(at.covariance[-2, -2])))
 
-    here = float(calibration.parameters[_GYRATION]), peak.found
-    return shaped(prior, calibration.wheelbase_m, here, sought, evidence)
+    mode_hz = float(np.exp(peak.found.x[DRIFTING.index(INDEX["payload_mode_hz"])]))
+    start = float(calibration.parameters[_GYRATION]), peak.found.x
+    return shaped(prior, calibration.wheelbase_m, start, weighed_as, evidence * min(1.0, (mode_hz / FIRM_HZ) ** 2))
 
 
 def _with_gyration(calibration: CrossSpectrumCalibration, log_s: float) -> CrossSpectrumCalibration:
@@ -172,26 +247,34 @@ def _as_shaped(calibration: CrossSpectrumCalibration, shape: Shaped | None) -> C
 
 
 def _located(
-    whittle: Whittle, peak: _Peak, shape: Shaped | None, calibration: CrossSpectrumCalibration, cg_left_m: float
+    whittle: Whittle,
+    peak: _Peak,
+    shape: Shaped | None,
+    calibration: CrossSpectrumCalibration,
+    cg_left_m: float,
+    evidence: float,
 ) -> Located:
     calibration = _as_shaped(calibration, shape)
+    drifting = peak.packing.drifting
     x = peak.found.x if shape is None else np.r_[shape.x[:-2], shape.load]
     point = _point(x, calibration, cg_left_m)
-    at = answer_at(whittle, point)
-    whole, found, moves = at.whole, at.covariance, at.moves
+    at = answer_at(whittle, point, calibration, drifting, evidence, is_shape_known=shape is None)
+    if shape is None:
+        x = x + np.r_[np.zeros(len(DRIFTING)), at.shift[-2:]]
+        point = _point(x, calibration, cg_left_m)
+    whole, found = at.whole, at.covariance
     columns = {Source.DAY: day_columns(found, at.steady)[:, -2:], Source.LOAD_LENGTH: packing_columns(found)[:, -2:]}
     if shape is not None:
-        moves[:, _GYRATION] = 0.0  # of this load, not of the known ones
         columns |= _of_shape(shape, columns[Source.LOAD_LENGTH])
     misfit = whittle.misfit(point)
     parameters = calibration.parameters.copy()
-    parameters[DRIFTING] = peak.packing.drifting
-    own = found[-2:, -2:]
+    parameters[DRIFTING] = drifting
+    own = found[-2:, -2:] + at.own[-2:, -2:]
     rivalled = own + sum((each.T @ each for each in columns.values()), np.zeros((2, 2)))
     return Located(
         point=point,
         own=own,
-        moves=moves,
+        moves=at.moves,
         columns=columns,
         tails=NORMAL_TAILS if shape is None else shape.tails,
         gain_moves=gain_moves(whole, whittle, point, found)[-2:],
@@ -282,8 +365,10 @@ def _sought(
     prior_mean = np.r_[packing.drifting, 0.0, 0.0]
     prior_precision = np.pad(DRIFT_PRECISION, (0, 2))  # flat in payload and share
 
+    most_kg = MOST_LOAD_SHARE * calibration.empty_mass_kg
+
     def cost(x: F64) -> float:
-        return whittle.cost(_point(x, calibration, cg_left_m))
+        return whittle.cost(_point(x, calibration, cg_left_m)) if abs(x[-2]) <= most_kg else np.inf
 
     def curvature(x: F64) -> Curvature:
         point = _point(x, calibration, cg_left_m)

@@ -12,9 +12,7 @@ from gateway.core.vehicle import Load
 from gateway.posterior import Posterior, Source
 
 
-def predicted(
-    calibration: CrossSpectrumCalibration, prior: ShapePrior | None, load: Load, drive: Drive
-) -> Posterior:
+def predicted(calibration: CrossSpectrumCalibration, prior: ShapePrior | None, load: Load, drive: Drive) -> Posterior:
     """Payload and front share as one batch would state them, if the road showed just what the model expects.
 
     The load has the shape of the known ones; ``prior`` is what the service believes of shapes.

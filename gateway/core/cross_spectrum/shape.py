@@ -11,25 +11,45 @@ from typing import Final
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
+from scipy.special import log_ndtr
 
 from gateway.core.cargo import ShapePrior
-from gateway.core.cross_spectrum.search import Found
 from gateway.posterior import NORMAL_TAILS
 from gateway.records import F64
 
 NODES_PER_WHEELBASE2: Final = (0.004, 0.013, 0.032, 0.06, 0.095, 0.14, 0.2, 0.3)
-"""Squared radii of gyration at which a load is weighed, over the squared wheelbase: 0.03 to 2.4 m2 in a van of 2.8 m."""
-EVIDENCE: Final = 0.4
-"""How much a batch's evidence of the shape counts, 1 being what its own statistics say. Chosen on simulated vans that
-serve no other purpose (`benchmarks.accuracy budget`).
+"""Squared radii of gyration at which a load is weighed, over the squared wheelbase: 0.03 to 2.4 m2 in a van of 2.8
+m.
+"""
+EVIDENCE: Final = 0.5
+"""How much a batch's evidence counts against shapes, calibration and nature, 1 being what its own statistics say.
+Chosen on simulated vans that serve no other purpose (`benchmarks.accuracy budget`).
 """
 LEAST_PROBABILITY: Final = 1e-3  # of a shape that is worth weighing, before and after
-POINTS_95: Final = (0.025, 0.975)
+POINTS: Final = (0.025, 0.5, 0.975)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Node:
+    """A load weighed under one shape: where its search ended (start (k,), for the next one), minus the logarithm of its
+    evidence (cost), the answer x (k,), payload in kg and front share (0..1) being its last, and the payload's own
+    error.
+    """
+
+    start: F64
+    cost: float
+    x: F64
+    own_std_kg: float
+
+    @property
+    def improbable(self) -> float:
+        """Minus the logarithm of how probable a load of this mass is: one that is less than nothing has no shape."""
+        return -float(log_ndtr(self.x[-2] / self.own_std_kg + 2.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shaped:
-    """The posterior over shapes: x (k,) at its mean log_s, the load's mean (2,), payload in kg and front share 0..1.
+    """The posterior over shapes: x (k,) at its mean log_s; the median load (2,), payload in kg and front share 0..1.
 
     column (2,) is one standard deviation of what the shape leaves open, tails its 2.5 and 97.5 % points in these;
     goods_part (0 to 1) is the part of its variance that is the same for all loads of the vehicle.
@@ -46,31 +66,30 @@ class Shaped:
 def shaped(
     prior: ShapePrior,
     wheelbase_m: float,
-    start: tuple[float, Found],
-    sought: Callable[[float, F64], Found],
+    start: tuple[float, F64],
+    weighed_as: Callable[[float, F64], Node],
     evidence: float,
 ) -> Shaped:
-    """``start`` is a log s and what was found there; ``sought`` finds the peak at another log s from a near one."""
-    nodes, founds = _profile(prior, wheelbase_m, start, sought, evidence)
+    """``start`` is a log s and where to begin there; ``weighed_as`` weighs under another log s, from a near one on."""
+    nodes, founds = _profile(prior, wheelbase_m, start, weighed_as, evidence)
     if len(nodes) == 1:
         x = founds[0].x
         return Shaped(float(nodes[0]), x, x[-2:], np.zeros(2), NORMAL_TAILS, 0.0)
     within = (prior.log_s >= nodes[0]) & (prior.log_s <= nodes[-1])
     log_s = prior.log_s[within]
-    cost = PchipInterpolator(nodes, [found.cost for found in founds])(log_s)
+    cost = PchipInterpolator(nodes, [found.cost + found.improbable / evidence for found in founds])(log_s)
     path = PchipInterpolator(nodes, np.stack([found.x for found in founds]))
     weight = prior.probability[within] * np.exp(-evidence * (cost - cost.min()))
     weight /= weight.sum()
     mean_log_s = float(weight @ log_s)
     loads = path(log_s)[:, -2:]
-    load = weight @ loads
-    away = loads - load
+    away = loads - weight @ loads
     payload_std = float(np.sqrt(weight @ away[:, 0] ** 2))
-    column, tails = np.zeros(2), NORMAL_TAILS
+    load, column, tails = weight @ loads, np.zeros(2), NORMAL_TAILS
     if payload_std > 0.0:
         column = np.array([payload_std, float(weight @ (away[:, 0] * away[:, 1])) / payload_std])
-        low, high = _points(away[:, 0] / payload_std, weight)
-        tails = (-low, high)
+        low, middle, high = _points(away[:, 0] / payload_std, weight)
+        load, tails = load + middle * column, (middle - low, high - middle)
     narrowed = float(weight @ (log_s - mean_log_s) ** 2) / prior.variance
     return Shaped(mean_log_s, path(mean_log_s), load, column, tails, prior.habit * min(narrowed, 1.0))
 
@@ -78,25 +97,25 @@ def shaped(
 def _profile(
     prior: ShapePrior,
     wheelbase_m: float,
-    start: tuple[float, Found],
-    sought: Callable[[float, F64], Found],
+    start: tuple[float, F64],
+    weighed_as: Callable[[float, F64], Node],
     evidence: float,
-) -> tuple[F64, list[Found]]:
+) -> tuple[F64, list[Node]]:
     """Nodes in order and what was found at each, from the start outwards until a shape is out of the question."""
     cumulated = np.cumsum(prior.probability)
     lowest, highest = np.interp([LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY], cumulated, prior.log_s)
     nodes = np.log(np.array(NODES_PER_WHEELBASE2) * wheelbase_m**2)
     wanted = [float(node) for node in nodes if lowest < node < highest]
     wanted = sorted({float(lowest), *wanted, float(highest)})
-    found: dict[float, Found] = {}
-    least = start[1].cost
+    found: dict[float, Node] = {}
+    least = np.inf
     above = [node for node in wanted if node >= start[0]]
     below = [node for node in reversed(wanted) if node < start[0]]
     for outwards in (above, below):
-        x = start[1].x
+        x = start[1]
         for node in outwards:
-            found[node] = sought(node, x)
-            x = found[node].x
+            found[node] = weighed_as(node, x)
+            x = found[node].start
             least = min(least, found[node].cost)
             if evidence * (found[node].cost - least) > -np.log(LEAST_PROBABILITY):
                 break
@@ -104,9 +123,9 @@ def _profile(
     return np.array(inside), [found[node] for node in inside]
 
 
-def _points(x: F64, weight: F64) -> tuple[float, float]:
-    """The 2.5 and 97.5 % points of a weighted sample."""
+def _points(x: F64, weight: F64) -> tuple[float, float, float]:
+    """The 2.5, 50 and 97.5 % points of a weighted sample."""
     order = np.argsort(x)
     cumulated = np.cumsum(weight[order]) - 0.5 * weight[order]
-    low, high = np.interp(POINTS_95, cumulated, x[order])
-    return float(low), float(high)
+    low, middle, high = np.interp(POINTS, cumulated, x[order])
+    return float(low), float(middle), float(high)

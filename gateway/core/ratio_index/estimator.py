@@ -49,7 +49,8 @@ def _predicted(model: RegressionModel | None, ra: float, rg: float) -> Quantity:
 
 
 def _posterior(payload: Quantity, front_share: Quantity) -> Posterior | None:
-    """Half of each variance is taken to be the batch's own, half the regression's; None without a payload.
+    """Half of each variance is taken to be the batch's own, half the regression's, whose coefficients err alike in
+    every batch; None without a payload.
 
     Standard deviations are those of the normal error whose 95 % interval is as wide as Student's.
     """
@@ -58,4 +59,4 @@ def _posterior(payload: Quantity, front_share: Quantity) -> Posterior | None:
         return None
     mean = np.array([one.number for one in known])
     std = np.array([0.5 * (one.interval95[1] - one.interval95[0]) / Z95 for one in known])
-    return Posterior(mean, np.diag(0.5 * std**2), {Source.MODEL: np.diag(np.sqrt(0.5) * std)})
+    return Posterior(mean, np.diag(0.5 * std**2), {Source.CALIBRATION: np.diag(np.sqrt(0.5) * std)})

@@ -192,7 +192,9 @@ def place_of(vehicle: Vehicle, posterior: Posterior) -> Place | None:
     load_kg, share = payload.number, float(posterior.mean[FRONT_SHARE]) / 100.0
     total_kg, empty_share = vehicle.empty_mass_kg + load_kg, vehicle.empty_front_share
     front_share_of_load = (share * total_kg - empty_share * vehicle.empty_mass_kg) / load_kg
-    along = [vehicle.wheelbase_m * slope for slope in ((front_share_of_load - share) / load_kg, -total_kg / load_kg / 100.0)]
+    along = [
+        vehicle.wheelbase_m * slope for slope in ((front_share_of_load - share) / load_kg, -total_kg / load_kg / 100.0)
+    ]
     position_m = vehicle.wheelbase_m * (1.0 - front_share_of_load)
     std_m = posterior.linear(position_m, along).std
     if posterior.size <= CG_LEFT:

@@ -19,7 +19,18 @@ from gateway.records import iso_utc
 from gateway.reports.calibration.text import NONE, decimal, percent
 from gateway.reports.charts import Table
 
-_COLUMNS: Final = ("mean |e|", "bias", "std", "max", "mean |e| %", "with misses %", "of gross %", "95 % covers", "± (95 %)", "score")
+_COLUMNS: Final = (
+    "mean |e|",
+    "bias",
+    "std",
+    "max",
+    "mean |e| %",
+    "with misses %",
+    "of gross %",
+    "95 % covers",
+    "± (95 %)",
+    "score",
+)
 
 
 def summary_table(judgement: Judgement) -> Table:

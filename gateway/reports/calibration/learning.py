@@ -75,8 +75,8 @@ def _table(curve: LearningCurve) -> Table:
     columns = ("Runs", "estimator", "choices", "judged on", "payload", *errors, "share", *errors)
     caption = (
         "Mean |error| in percent of the ranges (12) over choices of runs ± its standard deviation between them, and "
-        "that of the worst choice; ± is half the 95 % intervals, the score their width and 40 times what the truth lies "
-        "outside"
+        "that of the worst choice; ± is half the 95 % intervals, the score their width and 40 times what the truth "
+        "lies outside"
     )
     return Table(caption, columns, rows, n_heads=2)
 

@@ -78,9 +78,9 @@ def accuracy_page(results: Mapping[str, Any]) -> str:
         "tests are calibrated on the simulated grid of the paper, the experiment and the speeds on the experiment's "
         "identification part. All of it is simulated by `gateway/sim`, whose friction, progressive springs, sensor "
         "errors and rough two-track roads the estimators do not know; the paper's tests run on its one-track road (1). "
-        "A rejected batch gave no answer and stands in no mean. +- is the mean of half the 95 % intervals; the interval "
-        f"score is their width and 40 times what the truth lies outside, {IDEAL_SCORE:g} times the mean error where "
-        "they are as wide as they should be.\n\n" + "\n".join([*head, *lines]) + "\n"
+        "A rejected batch gave no answer and stands in no mean. +- is the mean of half the 95 % intervals; the "
+        f"interval score is their width and 40 times what the truth lies outside, {IDEAL_SCORE:g} times the mean "
+        "error where they are as wide as they should be.\n\n" + "\n".join([*head, *lines]) + "\n"
     )
 
 

@@ -26,10 +26,9 @@ from gateway.estimate_json import estimate_from_json
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.service.alarm_desk.conditions import Silence, drift_says
-from gateway.service.tare_desk import Subject
+from gateway.service.subject import Subject
 from gateway.status import AlarmsStatus, Status
 from gateway.store import Store, StoreReader
-from gateway.web import Board
 
 REMEMBERED: Final = 1000  # alarms looked back over for those that stand
 DRIVEN: Final = 300  # batches, a day of driving, looked back over for when one counted last
@@ -55,7 +54,6 @@ class AlarmDesk:
         rules: AlarmRules,
         subject: Subject,
         store: Store,
-        board: Board,
         clock_ns: Callable[[], int] = time.time_ns,
         clock_s: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -63,7 +61,6 @@ class AlarmDesk:
         self._rules = rules
         self._subject = subject
         self._store = store
-        self._board = board
         self._clock_ns = clock_ns
         self._silence = Silence(rules, clock_s)
         self._trends: Sequence[Trend] | None = None
@@ -137,10 +134,9 @@ class AlarmDesk:
             self._kept(alarm)
 
     def _kept(self, alarm: Alarm) -> str:
-        """Stored and shown -> its JSON."""
+        """Into the journal -> its JSON."""
         text = _text(alarm)
-        cursor = self._store.write_entry(ENTRY_KIND, alarm.id, alarm.t_last_ns, text)
-        self._board.publish_entry(ENTRY_KIND, text, cursor)
+        self._store.write_entry(ENTRY_KIND, alarm.id, alarm.t_last_ns, text, alarm.revision)
         return text
 
 

@@ -5,23 +5,20 @@ whether another calibration is due. It owns ``commissioning.json`` (``Record``),
 folder ``lines``; the fit runs in a process of its own (``Worker``).
 """
 
-from gateway.service.commissioning.book import Book, OnEvent
+from gateway.service.commissioning.book import OnEvent
 from gateway.service.commissioning.desk import Commissioning, Drives
 from gateway.service.commissioning.drive import Vehicle
 from gateway.service.commissioning.jobs import Jobs
 from gateway.service.commissioning.lines import Lines
 from gateway.service.commissioning.start import commissioned, setup_in_use, why_not_allowed, with_commissioned
-from gateway.service.commissioning.worker import Worker
 
 __all__ = [
-    "Book",
     "Commissioning",
     "Drives",
     "Jobs",
     "Lines",
     "OnEvent",
     "Vehicle",
-    "Worker",
     "commissioned",
     "setup_in_use",
     "why_not_allowed",

@@ -85,8 +85,12 @@ class Commissioning:
         with self._book.lock:
             self._drive.fit()
 
-    def stop(self) -> None:
-        """Hear and do nothing more; what is on disk is gone on with at the next start."""
+    def hear_no_more(self) -> None:
+        """Batches from now on count for nothing. Never waits."""
+        self._drive.is_over = True
+
+    def stop(self, _within_s: float = 0.0) -> None:
+        """Do nothing more; what is on disk is gone on with at the next start. May wait for a disk that hangs."""
         self._drive.stop()
 
     def hear(self, kept: KeptBatch) -> None:

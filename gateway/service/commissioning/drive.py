@@ -45,7 +45,7 @@ class EmptyDrive:
         self._book, self._jobs, self._shelf, self._vehicle = book, jobs, shelf, vehicle
         self._worker = make_worker(self._on_result)
         self._job: Job | None = None
-        self._is_over = False
+        self.is_over = False
         self._take_up()
 
     @property
@@ -64,8 +64,7 @@ class EmptyDrive:
 
     def stop(self) -> None:
         """Hear and do nothing more."""
-        with self._book.lock:
-            self._is_over = True
+        self.is_over = True
         self._worker.end()
 
     def forget(self) -> None:
@@ -79,7 +78,7 @@ class EmptyDrive:
         """Of every batch, provisional and rejected ones too; those that count lie on the shelf already."""
         with self._book.lock:
             underway = self._book.record.underway
-            if self._is_over or underway is None or underway.vehicle is None:
+            if self.is_over or underway is None or underway.vehicle is None:
                 return
             batch = kept.batch
             is_of_drive = underway.empty is not None and underway.empty.covers(batch.drive_start_ns, batch.t_start_ns)
@@ -158,7 +157,7 @@ class EmptyDrive:
         self._start(job, {LOOKED_AT: packed(kept)})
 
     def _start(self, job: Job, files: Mapping[str, bytes] | None = None) -> None:
-        if self._is_over:
+        if self.is_over:
             return
         self._job = job
         try:
@@ -170,7 +169,7 @@ class EmptyDrive:
         """What came of a job, in the worker's thread."""
         with self._book.lock:
             underway = self._book.record.underway
-            if self._is_over or underway is None or underway.vehicle is None or job is not self._job:
+            if self.is_over or underway is None or underway.vehicle is None or job is not self._job:
                 return
             if result.fault is None:
                 self.looked = Looked(result.findings, _seconds(job))

@@ -14,7 +14,6 @@ from gateway.service.commissioning.record import LineChoice
 from gateway.units import NS_PER_S
 
 COMMAND: Final = "commissioned on the vehicle"
-REFITTED: Final = "refitted with tickets on the vehicle"
 EMPTY: Final = "empty drive"
 
 
@@ -39,30 +38,6 @@ class Jobs:
     directory: Path
     settings: CommissioningSection
     batch: BatchSettings
-
-    def refit(
-        self, vehicle: VehicleTable, line: LineChoice, drives: Sequence[tuple[str, float, float, Sequence[BatchFile]]]
-    ) -> Job:
-        """Of the empty drive and of drives with known loads: name, payload, front share and batches of each."""
-        longest_s = max(one.duration_s for *_, batches in drives for one in batches)
-        return Job(
-            vehicle=vehicle,
-            drives=tuple(
-                Drive(
-                    name=name,
-                    payload_kg=payload_kg,
-                    front_share_pct=share_pct,
-                    batches=tuple(one.path for one in batches),
-                )
-                for name, payload_kg, share_pct, batches in drives
-            ),
-            settings=asdict(self.batch) | {"window_s": min(self.batch.window_s, longest_s)},
-            like=() if line.copy_name is None else (self.directory / line.copy_name,),
-            is_planned=True,
-            goal_std_share=self.settings.goal_pct / 100.0,
-            most_memory_mb=self.settings.memory_mb,
-            command=REFITTED,
-        )
 
     def job(self, vehicle: VehicleTable, line: LineChoice, batches: Sequence[BatchFile], *, is_fit: bool) -> Job:
         """Of an empty drive. A window that a power cut ended early is no shorter than it could be."""

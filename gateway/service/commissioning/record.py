@@ -107,10 +107,6 @@ class Record(Part):
         """The commissioning is over and this came of it."""
         return self.model_copy(update={"underway": None, "made": (*self.made, one)[-MOST_MADE:]})
 
-    def with_refit(self, one: Made) -> "Record":
-        """A commissioned calibration was made anew with tickets."""
-        return self.model_copy(update={"made": (*self.made, one)[-MOST_MADE:]})
-
     def ended(self, chosen: tuple[Made, ...], end: Ended) -> "Record":
         """With these out of use."""
         made = tuple(one.model_copy(update={"ended": end}) if one in chosen else one for one in self.made)

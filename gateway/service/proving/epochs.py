@@ -10,6 +10,7 @@ from gateway.errors import StoreError, WeightRefusedError
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_from_json
 from gateway.history import Page
+from gateway.posterior import Posterior, fused
 from gateway.records import iso_utc
 from gateway.stated_weight import Drive
 from gateway.units import NS_PER_S
@@ -23,7 +24,7 @@ Ask = Callable[..., Page]
 
 @dataclass(frozen=True, slots=True)
 class WeighedEpoch:
-    """One load as its counted batches told it together, tare and all: what was shown last."""
+    """One load as its counted batches show it together: as it was shown last, and as measured, batch by batch."""
 
     t_start_ns: int
     t_end_ns: int
@@ -33,7 +34,22 @@ class WeighedEpoch:
     batch_ids: tuple[str, ...]
     calibration_id: str | None
     estimator: str
-    tare_id: str | None
+    known_weights_id: str | None
+    measured: tuple[Posterior, ...]
+
+    @property
+    def posterior(self) -> Posterior:
+        """Of all batches, as measured: by the calibration alone."""
+        return fused(self.measured)
+
+    def require(self, calibration_id: str | None, estimator: str) -> None:
+        """Raises WeightRefusedError where it was weighed by another calibration or estimator."""
+        if (self.calibration_id, self.estimator) != (calibration_id, estimator):
+            raise WeightRefusedError(
+                WeightRefusal.OTHER_CALIBRATION,
+                f"the load of {self.told()} was weighed by another calibration or estimator than the one in use: "
+                "weigh it again",
+            )
 
     def told(self) -> str:
         """When it was, for people."""
@@ -53,7 +69,8 @@ def epochs_of(estimates: Iterable[Estimate]) -> list[WeighedEpoch]:
         before = epochs[-1] if epochs else None
         if before is not None and found.n_batches == before.n_batches + 1 and _is_same_scale(found, before):
             ids = (*before.batch_ids, *found.batch_ids)[-BATCH_IDS:]
-            epochs[-1] = replace(found, t_start_ns=before.t_start_ns, batch_ids=ids)
+            measured = (*before.measured, *found.measured)
+            epochs[-1] = replace(found, t_start_ns=before.t_start_ns, batch_ids=ids, measured=measured)
         else:
             epochs.append(found)
     return epochs
@@ -105,8 +122,9 @@ def _estimates(ask: Ask, since_ns: int, until_ns: int) -> Iterator[Estimate]:
 
 
 def _epoch_so_far(found: Estimate) -> WeighedEpoch | None:
-    """What a counted batch tells of its load; None for rejected ones, and those of versions that told no epochs."""
-    if not found.counted or found.epoch is None:
+    """What a counted batch tells of its load; None for rejected ones."""
+    measured = found.as_measured
+    if not found.counted or found.epoch is None or measured is None:
         return None
     return WeighedEpoch(
         t_start_ns=found.t_start_ns,
@@ -117,7 +135,8 @@ def _epoch_so_far(found: Estimate) -> WeighedEpoch | None:
         batch_ids=(found.id,),
         calibration_id=found.calibration_id,
         estimator=found.estimator,
-        tare_id=None if found.tare is None else found.tare.tare_id,
+        known_weights_id=found.known_weights_id,
+        measured=(measured,),
     )
 
 

@@ -4,49 +4,51 @@ from pathlib import Path
 
 from gateway.calibration.verification_file import VerificationRule
 from gateway.config.sections import VerificationSection
-from gateway.service.proving.ticket_desk import TicketDesk
-from gateway.service.proving.trend_keeper import TrendKeeper, Zeros
+from gateway.service.proving.known_weights import KnownWeightService, Weighing
+from gateway.service.proving.trend_keeper import TrendKeeper
 from gateway.service.proving.verification_desk import VerificationDesk
-from gateway.service.tare_desk import Subject
+from gateway.service.subject import Subject
 from gateway.store import Store
 
 
 class Proving:
-    """Verifications and tickets, asked for by people; the trend of the vehicle's parameters, in the background."""
+    """Known weights and verifications, stated by people; the trend of the vehicle's parameters, in the background."""
 
     def __init__(
         self,
         directory: Path,
         wanted: VerificationSection,
         subject: Subject,
+        pipeline: Weighing,
         store: Store,
-        zeros: Zeros,
-        tickets: TicketDesk,
+        *,
+        stale_after_s: float,
     ) -> None:
-        """``zeros`` tells the tares of the calibration in use."""
-        self.tickets = tickets
+        """Puts what known weights teach into use in ``pipeline``."""
         ask = store.reader().estimates
+        self.known_weights = KnownWeightService(
+            directory, subject, pipeline, ask, stale_after_s=stale_after_s, on_event=store.write_event
+        )
         self.verification = VerificationDesk(
             directory,
             subject,
             ask,
             VerificationRule(**wanted.model_dump(exclude={"every_days"})),
+            payload_without=self.known_weights.payload_without,
             every_days=wanted.every_days,
             on_event=store.write_event,
         )
-        self.trend = TrendKeeper(directory, subject, ask, zeros)
+        self.trend = TrendKeeper(directory, subject, ask, self.known_weights.zeros)
 
     def start(self) -> None:
-        """Begin to follow the trend, and to fit what tickets wait for it."""
+        """Begin to follow the trend."""
         self.trend.start()
-        self.tickets.start()
 
     def stop(self) -> None:
-        """End both."""
-        self.tickets.stop()
+        """End that."""
         self.trend.stop()
 
     @property
     def faults(self) -> tuple[str, ...]:
         """What is due, drifts or is broken, for people."""
-        return tuple(fault for fault in (self.verification.fault, self.trend.fault, self.tickets.fault) if fault)
+        return tuple(fault for fault in (self.known_weights.fault, self.verification.fault, self.trend.fault) if fault)

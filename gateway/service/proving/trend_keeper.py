@@ -14,7 +14,7 @@ from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.service.proving.epochs import Ask
 from gateway.service.proving.history_file import HistoryFile
-from gateway.service.tare_desk import Subject
+from gateway.service.subject import Subject
 
 FIRST_S: Final = 30.0  # after the start: it is in no hurry
 EVERY_S: Final = 3600.0
@@ -29,7 +29,7 @@ class TrendKeeper:
     """Adds new batches to trend.json. A store or a disk that refuses is tried again in an hour."""
 
     def __init__(self, directory: Path, subject: Subject, ask: Ask, zeros: Zeros) -> None:
-        """``zeros`` are the tares of the calibration in use, oldest first: when, and kg taken off."""
+        """``zeros``: when the vehicle was empty and what the calibration alone read (kg), oldest first."""
         self._subject = subject
         self._ask = ask
         self._zeros = zeros

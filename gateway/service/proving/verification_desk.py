@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.calibration.known_weight import WeightRefusal, known_weight_of
+from gateway.calibration.known_weight import WeightRefusal, load_of
 from gateway.calibration.verification_file import (
     FILE_NAME,
     Verification,
@@ -21,10 +21,11 @@ from gateway.calibration.verification_file import (
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.errors import WeightRefusedError
 from gateway.log import Event, tell_event
+from gateway.quantity import Quantity
 from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.proving.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
 from gateway.service.proving.history_file import HistoryFile
-from gateway.service.tare_desk import OnEvent, Subject
+from gateway.service.subject import OnEvent, Subject
 from gateway.stated_weight import StatedWeight
 from gateway.status import VerificationStatus
 from gateway.units import NS_PER_S
@@ -42,14 +43,19 @@ class VerificationDesk:
         ask: Ask,
         rule: VerificationRule,
         *,
+        payload_without: Callable[[WeighedEpoch], Quantity] = lambda epoch: epoch.payload,
         every_days: float,
         on_event: OnEvent,
         clock_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        """``ask`` is the store's question after estimates; ``every_days`` 0: a verification is never due."""
+        """``ask`` is the store's question after estimates; ``every_days`` 0: a verification is never due.
+
+        ``payload_without`` is what a load is weighed as where it is not itself among the known weights.
+        """
         self._subject = subject
         self._ask = ask
         self._rule = rule
+        self._payload_without = payload_without
         self._every_days = every_days
         self._on_event = on_event
         self._clock_ns = clock_ns
@@ -113,7 +119,7 @@ class VerificationDesk:
             vehicle_id=self._subject.vehicle_id,
             calibration_id=calibrated.id,
             estimator=self._subject.estimator,
-            tare_id=epochs[-1].tare_id,
+            known_weights_id=epochs[-1].known_weights_id,
             rule=self._rule,
             loads=loads,
             verdict=verdict_of(self._rule, loads),
@@ -129,18 +135,14 @@ class VerificationDesk:
         return json_line(entry.model_dump(mode="json"))
 
     def _judged(self, stated: StatedWeight, epoch: WeighedEpoch, calibrated: CalibratedVehicle) -> VerifiedLoad:
-        if (epoch.calibration_id, epoch.estimator) != (calibrated.id, self._subject.estimator):
-            raise WeightRefusedError(
-                WeightRefusal.OTHER_CALIBRATION,
-                f"the load of {epoch.told()} was weighed by another calibration or estimator than the one in use: "
-                "weigh it again",
-            )
+        epoch.require(calibrated.id, self._subject.estimator)
         vehicle = calibrated.vehicle
-        known = known_weight_of(stated, vehicle, calibrated.unsprung)
+        known = load_of(stated, vehicle, calibrated.unsprung)
+        payload = self._payload_without(epoch)
         reference_kg = vehicle.empty_mass_kg + known.payload_kg if known.gross_kg is None else known.gross_kg
-        error_kg = epoch.payload.number - known.payload_kg
+        error_kg = payload.number - known.payload_kg
         error_pct = 100.0 * error_kg / reference_kg
-        front, rear = axle_errors(known, epoch.payload.number, epoch.front_share.number, vehicle)
+        front, rear = axle_errors(known, payload.number, epoch.front_share.number, vehicle)
         return VerifiedLoad(
             stated=stated,
             t_start=iso_utc(epoch.t_start_ns),
@@ -149,8 +151,8 @@ class VerificationDesk:
             batch_ids=epoch.batch_ids,
             known_payload_kg=known.payload_kg,
             known_reference_kg=reference_kg,
-            payload_kg=epoch.payload.number,
-            payload_std_kg=epoch.payload.std,
+            payload_kg=payload.number,
+            payload_std_kg=payload.std,
             error_kg=error_kg,
             error_pct=error_pct,
             front_axle=front,

@@ -20,7 +20,7 @@ from gateway.uplink.webhook.signature import signed
 
 MOST_PAUSE_S: Final = 3600.0  # whatever Retry-After says
 _READ: Final = 2048  # bytes of an answer: nobody needs its body
-_OF_THE_LETTER: Final = frozenset({400, 406, 409, 411, 413, 414, 415, 422, 431})
+_OF_THE_LETTER: Final = frozenset({410, 413})  # gone for good, too large: everything else may pass
 _BUSY: Final = frozenset({408, 425, 429, 502, 503, 504})
 
 
@@ -28,7 +28,7 @@ class Verdict(StrEnum):
     """What an answer means for the letter."""
 
     TAKEN = "taken"
-    UNWANTED = "unwanted"  # the receiver says that something is wrong with this very letter
+    UNWANTED = "unwanted"  # the receiver will never take this very letter
     REFUSED = "refused"  # it answers, and not that it took it: its address, our secret, a fault of its own
     AWAY = "away"  # it does not answer, or says that it is busy
 

@@ -10,12 +10,11 @@ from typing import Any, Final
 
 from gateway.estimate import UNKNOWN, Estimate, Quantity, Weights
 from gateway.estimate_json import estimate_from_json, estimate_to_json
+from gateway.history import ESTIMATE, REJECTION
 from gateway.records import Why, json_line
 from gateway.web.live.fanout import Fanout, StreamEvent
 
 RECENT: Final = 100
-ESTIMATE: Final = "estimate"
-REJECTION: Final = "rejection"
 PROVISIONAL: Final = "provisional"
 _NOT_CALIBRATED: Final = Weights()
 
@@ -86,7 +85,7 @@ class _Answer:
 
 
 class Board:
-    """The latest estimate, rejection and provisional estimate; tells subscribers of each new one.
+    """The latest estimate, rejection and provisional estimate.
 
     ``publish``, ``restore`` and ``close`` may be called from any thread. A provisional estimate stands
     in for ``latest`` while its drive has no good estimate: what was weighed before the last stop may
@@ -114,22 +113,16 @@ class Board:
         self._drive_has_estimate = False
         self.fanout = Fanout()
 
-    def publish(self, estimate: Estimate, cursor: str | None = None) -> None:
-        """Show an estimate and send it to every subscriber.
-
-        ``cursor`` is its place in the store; streams can be resumed behind it.
-        """
+    def publish(self, estimate: Estimate) -> None:
+        """Show an estimate. A provisional one goes to every stream; the others go there by the journal."""
         record = estimate_to_json(estimate)
         with self._lock:
             self._show(estimate_from_json(record), self._clock())
-            self.fanout.publish(StreamEvent.of(kind_of(estimate), json_line(record), cursor))
-
-    def publish_entry(self, kind: str, text: str, cursor: str) -> None:
-        """Send a load event or a trip, in a new revision, to every subscriber."""
-        self.fanout.publish(StreamEvent.of(kind, text, cursor))
+        if estimate.is_provisional:
+            self.fanout.publish(StreamEvent.of(PROVISIONAL, json_line(record), None))
 
     def restore(self, estimate: str | None, rejection: str | None, age_s: float | None) -> None:
-        """Show what an earlier run of the service stored, as old as it is.
+        """Show what an earlier run of the service stored, as old as it is; ``age_s`` None: unknown, so it is stale.
 
         Raises ValueError or KeyError, and shows nothing of it, where that is not what this program writes.
         """
@@ -153,13 +146,13 @@ class Board:
         return self._age_s(self._answer)
 
     def is_stale(self) -> bool:
-        return self._is_stale(self.age_s())
+        return self._is_stale(self._answer)
 
     def latest(self) -> tuple[str, bytes]:
         """(tag, JSON) of the estimate shown now. The tag changes with all but the age."""
         answer = self._answer
         age_s = self._age_s(answer)
-        is_stale = self._is_stale(age_s)
+        is_stale = self._is_stale(answer)
         age = b"null" if age_s is None else b"%.1f" % age_s
         head = b'{"age_s":' + age + (b',"is_stale":true' if is_stale else b',"is_stale":false')
         return (f"{answer.tag}.stale" if is_stale else answer.tag), head + answer.rest
@@ -168,7 +161,7 @@ class Board:
         """The same as a record."""
         answer = self._answer
         age_s = self._age_s(answer)
-        return Shown(answer.estimate, None if age_s is None else round(age_s, 1), self._is_stale(age_s))
+        return Shown(answer.estimate, None if age_s is None else round(age_s, 1), self._is_stale(answer))
 
     def recent_estimates(self) -> tuple[Estimate, ...]:
         """The last good estimates, oldest first."""
@@ -182,9 +175,10 @@ class Board:
     def _age_s(self, answer: _Answer) -> float | None:
         return None if answer.received_s is None else max(0.0, self._clock() - answer.received_s)
 
-    def _is_stale(self, age_s: float | None) -> bool:
-        """Unknown is not stale: there is nothing that could mislead."""
-        return age_s is not None and age_s > self._stale_after_s
+    def _is_stale(self, answer: _Answer) -> bool:
+        """An age that nobody knows may be any. Before the first estimate there is nothing that could mislead."""
+        age_s = self._age_s(answer)
+        return answer.estimate is not None and (age_s is None or age_s > self._stale_after_s)
 
     def _show(self, estimate: Estimate, now_s: float) -> None:
         kind = kind_of(estimate)

@@ -1,14 +1,13 @@
-"""One event to many streams: bounded, each slow client dropped alone, every drop counted."""
+"""Who listens: each stream with its own place in the journal, a slow client ended alone, and counted."""
 
 import asyncio
 import threading
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-QUEUE: Final = 64  # events a client may lag behind: hours of batches
+MOST_UNREAD: Final = 64  # events that may come while a client takes none: hours of batches
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,43 +25,56 @@ class StreamEvent:
 
 
 class Subscription:
-    """The queue of one client. All methods but ``offer`` and ``end`` belong to the loop it was made in."""
+    """What one client still has to hear of. All but ``hear`` and ``end`` belongs to the loop it was made in.
 
-    def __init__(self) -> None:
+    Records lie in the journal, where the client has a place; an event that is not stored waits here, the newest of
+    them only, with the number of the newest record at its time.
+    """
+
+    def __init__(self, head: Callable[[], str]) -> None:
         self._loop = asyncio.get_running_loop()
-        self._queue: deque[StreamEvent] = deque()
+        self._head = head
         self._news = asyncio.Event()
+        self._passing: tuple[str, StreamEvent] | None = None
+        self._n_unread = 0
         self.ended = asyncio.Event()
         self.is_lagging = False
         self.n_dropped = 0
 
-    def offer(self, event: StreamEvent) -> None:
-        """Queue an event, from any thread. A client too far behind loses its queue and is ended."""
-        self._in_loop(self._append, event)
+    def hear(self, passing: StreamEvent | None = None) -> None:
+        """There is a new record, or an event that is not stored; from any thread."""
+        self._in_loop(self._count, None if passing is None else (self._head(), passing))
 
     def end(self) -> None:
         """End the stream, from any thread."""
         self._in_loop(self.ended.set)
         self._in_loop(self._news.set)
 
-    async def next(self, timeout_s: float) -> StreamEvent | None:
-        """The next event; None where there was none in time, or the stream has ended and all was taken."""
-        if not self._queue and not self.ended.is_set():
-            self._news.clear()
-            try:
-                await asyncio.wait_for(self._news.wait(), timeout_s)
-            except TimeoutError:
-                return None
-        return self._queue.popleft() if self._queue else None
+    async def wait(self, timeout_s: float) -> bool:
+        """Until there is news or the stream has ended; False where the time was out before."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._news.wait(), timeout_s)
+        is_news = self._news.is_set()
+        self._news.clear()
+        return is_news
 
-    def _append(self, event: StreamEvent) -> None:
-        if len(self._queue) >= QUEUE:
-            self.n_dropped += len(self._queue) + 1
-            self._queue.clear()
+    def take(self) -> tuple[str, StreamEvent] | None:
+        """The event that is not stored, if there is one, and behind which record it comes."""
+        passing, self._passing = self._passing, None
+        return passing
+
+    def has_read(self) -> None:
+        """The client took what it was sent."""
+        self._n_unread = 0
+
+    def _count(self, passing: tuple[str, StreamEvent] | None) -> None:
+        self._n_unread += 1
+        if passing is not None:
+            self._passing = passing
+        if self._n_unread > MOST_UNREAD and not self.ended.is_set():
+            self.n_dropped = self._n_unread
             self.is_lagging = True
             self.ended.set()
-        elif not self.ended.is_set():
-            self._queue.append(event)
         self._news.set()
 
     def _in_loop(self, call: Callable[..., None], *args: object) -> None:
@@ -85,14 +97,17 @@ class Fanout:
         return len(self._subscriptions)
 
     def publish(self, event: StreamEvent) -> None:
-        """Hand an event to every client; never waits for one."""
+        """Tell every client of an event that is not stored; never waits for one."""
         with self._lock:
             for subscription in self._subscriptions:
-                subscription.offer(event)
+                subscription.hear(event)
 
-    def join(self) -> Subscription:
-        """A subscription to all that is published from now on; call it in the loop that will read it."""
-        subscription = Subscription()
+    def join(self, head: Callable[[], str]) -> Subscription:
+        """A subscription to what comes from now on; call it in the loop that will read it.
+
+        ``head`` tells the newest record's cursor.
+        """
+        subscription = Subscription(head)
         with self._lock:
             if self._is_closed:
                 subscription.ended.set()

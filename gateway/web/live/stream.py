@@ -1,23 +1,19 @@
-"""Server-sent events: what was missed from the store, then what happens, until one side has enough."""
+"""Server-sent events: the journal from a place on, as it grows, until one side has enough."""
 
 import asyncio
-import json
-from collections import deque
 from collections.abc import AsyncIterator
 from typing import Any, Final
 
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from gateway.web.live.board import ESTIMATE, REJECTION
+from gateway.errors import StoreError
+from gateway.history import KINDS, Follower, Reader, Record
 from gateway.web.live.fanout import Fanout, StreamEvent, Subscription
-from gateway.web.reader import Reader
 
 GRACE_S: Final = 0.2  # for the last words of a stream that ends
 RETRY_MS: Final = 3000
-_REPLAY_PAGE: Final = 5  # events in memory for each client that reads what it missed
-_MOST_BESIDE: Final = 500  # events and trips between so many estimates
-_REMEMBERED: Final = 1024  # replayed rows that may still arrive live: a row is published right after it is stored
+_PAGE: Final = 5  # records in memory for each client
 
 EVENT_SCHEMA: Final[dict[str, Any]] = {
     "type": "object",
@@ -50,15 +46,20 @@ class EventStream(Response):
         self._keep_alive_s = keep_alive_s
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        subscription = self._fanout.join()  # before the first look into the store: nothing falls between
+        behind = self._behind or self._reader.head()
+        subscription = self._fanout.join(self._reader.head)
+        follower = self._reader.follow(tuple(KINDS), behind, subscription.hear)
         try:
             await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
-            await self._until_one_side_ends(subscription, receive, send)
+            await self._until_one_side_ends(subscription, follower, receive, send)
         finally:
+            follower.close()
             self._fanout.leave(subscription)
 
-    async def _until_one_side_ends(self, subscription: Subscription, receive: Receive, send: Send) -> None:
-        writing = asyncio.create_task(self._write(subscription, send))
+    async def _until_one_side_ends(
+        self, subscription: Subscription, follower: Follower, receive: Receive, send: Send
+    ) -> None:
+        writing = asyncio.create_task(self._write(subscription, follower, send))
         watching = [asyncio.create_task(_hung_up(receive)), asyncio.create_task(subscription.ended.wait())]
         try:
             await asyncio.wait([writing, *watching], return_when=asyncio.FIRST_COMPLETED)
@@ -70,56 +71,42 @@ class EventStream(Response):
         if isinstance(written, Exception):
             raise written
 
-    async def _write(self, subscription: Subscription, send: Send) -> None:
-        async for chunk in self._chunks(subscription):
+    async def _write(self, subscription: Subscription, follower: Follower, send: Send) -> None:
+        async for chunk in self._chunks(subscription, follower):
             await send({"type": "http.response.body", "body": chunk, "more_body": True})
+            subscription.has_read()
         await send({"type": "http.response.body", "body": LAGGED if subscription.is_lagging else CLOSING})
 
-    async def _chunks(self, subscription: Subscription) -> AsyncIterator[bytes]:
+    async def _chunks(self, subscription: Subscription, follower: Follower) -> AsyncIterator[bytes]:
+        """Records by their numbers, and between them, in its place, what is not stored."""
         yield b"retry: %d\n\n" % RETRY_MS
-        replayed: deque[str | None] = deque(maxlen=_REMEMBERED)
-        if self._behind is not None:
-            async for event in self._missed(self._behind):
-                replayed.append(event.cursor)
-                yield event.wire
         while True:
-            live = await subscription.next(self._keep_alive_s)
-            if live is None:
-                if subscription.ended.is_set():
-                    return
+            is_last = subscription.ended.is_set()  # before the last look: what came before the end still goes out
+            passing = subscription.take()
+            while records := await asyncio.to_thread(_read, follower):
+                for record in records:
+                    if passing is not None and record.number > _number(passing[0]):
+                        yield passing[1].wire
+                        passing = None
+                    yield StreamEvent.of(record.kind, record.text, record.cursor).wire
+            if passing is not None:
+                yield passing[1].wire
+            if is_last:
+                return
+            if not await subscription.wait(self._keep_alive_s):
                 yield b": keep-alive\n\n"
-            elif live.cursor is None or live.cursor not in replayed:
-                yield live.wire
-
-    async def _missed(self, behind: str) -> AsyncIterator[StreamEvent]:
-        cursor: str | None = behind
-        while cursor is not None:
-            events, cursor = await asyncio.to_thread(self._missed_page, cursor)
-            for event in events:
-                yield event
-
-    def _missed_page(self, behind: str) -> tuple[list[StreamEvent], str | None]:
-        """Some events behind a cursor, and where to go on. Blocks, in a thread of its own."""
-        page = self._reader.estimates(cursor=behind, limit=_REPLAY_PAGE)
-        rows = zip(page.items, page.cursors, strict=True)
-        kinds = {True: REJECTION, False: ESTIMATE}  # the store keeps no provisional ones
-        events = [StreamEvent.of(kinds[bool(json.loads(text)["rejected"])], text, place) for text, place in rows]
-        beside = self._reader.entries(cursor=behind, upto=page.next_cursor, limit=_MOST_BESIDE)
-        events += [
-            StreamEvent.of(entry_kind(text), text, place)
-            for text, place in zip(beside.items, beside.cursors, strict=True)
-        ]
-        return sorted(events, key=_number), page.next_cursor
 
 
-def entry_kind(text: str) -> str:
-    """event, trip or alarm, as its id begins."""
-    kind: str = json.loads(text)["id"].partition("-")[0]
-    return kind
+def _read(follower: Follower) -> list[Record]:
+    """Some records; none while the disk cannot be read: the next record or the keep-alive asks again."""
+    try:
+        return follower.read(_PAGE)
+    except (StoreError, TimeoutError):
+        return []
 
 
-def _number(event: StreamEvent) -> int:
-    return int((event.cursor or "-0").partition("-")[2])
+def _number(cursor: str) -> int:
+    return int(cursor.partition("-")[2])
 
 
 async def _hung_up(receive: Receive) -> None:

@@ -2,7 +2,7 @@
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Header, Query, Request
@@ -12,14 +12,13 @@ from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
 from starlette.responses import Response, StreamingResponse
 
-from gateway.history import Page
+from gateway.history import BATCHES, Page, Reader
 from gateway.records import json_line
 from gateway.status import Status
 from gateway.web.instant import Instant
 from gateway.web.live.board import Board
 from gateway.web.live.latest import LatestResponse
 from gateway.web.live.stream import EVENT_SCHEMA, EventStream
-from gateway.web.reader import Reader
 from gateway.web.schemas import EstimatesPage, Latest, problem_responses
 from gateway.web.settings import PAGE_LIMIT, WebSettings
 
@@ -42,18 +41,28 @@ Cursor = Annotated[
 ]
 
 
-class EstimatesQuery(BaseModel):
+class Span(BaseModel):
     """Which part of the history."""
 
     model_config = ConfigDict(extra="forbid")
 
-    since: Instant | SkipJsonSchema[None] = Field(None, description="batches that end at or after this")
-    until: Instant | SkipJsonSchema[None] = Field(None, description="batches that end before this")
+    since: Instant | SkipJsonSchema[None] = Field(None, description="those that end at or after this")
+    until: Instant | SkipJsonSchema[None] = Field(None, description="those that end before this")
+
+
+class HistoryQuery(Span):
+    """Which part of the history, how much of it, and in which order."""
+
     limit: int = Field(100, ge=1, le=PAGE_LIMIT)
     cursor: Cursor | SkipJsonSchema[None] = Field(None, description="next_cursor or last_cursor of an earlier answer")
     order: Literal["oldest_first", "newest_first"] = Field(
         "oldest_first", description="oldest_first to follow what comes, newest_first for the last ones"
     )
+
+
+class EstimatesQuery(HistoryQuery):
+    """Which part of the history, and whether with spectra."""
+
     spectra: bool = Field(True, description="false leaves the spectra out")
 
 
@@ -71,7 +80,7 @@ def api_router(board: Board, reader: Reader, status: Callable[[], Status], setti
     @router.get("/estimates", response_model=EstimatesPage, responses=problem_responses(422, 503))
     async def estimates(query: Annotated[EstimatesQuery, Query()]) -> Response:
         """Estimates and rejections in the order they were made. Follow next_cursor: nothing is missed or repeated."""
-        first = await _asked("query.cursor", reader, **_question(query, query.limit, query.cursor))
+        first = await asked(reader, BATCHES, **_question(query, query.limit, query.cursor))
         if len(first.items) == query.limit or first.next_cursor is None:
             return Response(_page_json(first), media_type=JSON)
         return StreamingResponse(_page_by_page(reader, query, first), media_type=JSON)
@@ -96,19 +105,17 @@ def api_router(board: Board, reader: Reader, status: Callable[[], Status], setti
         """
         if board.fanout.n_subscribers >= settings.n_streams_max:
             raise HTTPException(503, f"{settings.n_streams_max} streams are open already: close one")
-        if last_event_id is not None:
-            await _asked("header.last-event-id", reader, cursor=last_event_id, limit=1)
         return EventStream(board.fanout, reader, last_event_id, settings.keep_alive_s)
 
     return router
 
 
-async def _asked(where: str, reader: Reader, **question: object) -> Page:
-    """An answer from the store; a cursor that is none is the client's fault, and ``where`` says which."""
+async def asked(reader: Reader, kinds: Sequence[str], **question: Any) -> Page:
+    """A page of the history; a cursor that is none is the client's fault."""
     try:
-        return await asyncio.to_thread(reader.estimates, **question)  # type: ignore[arg-type]  # checked by its callers
+        return await asyncio.to_thread(reader.page, kinds, **question)
     except ValueError as error:
-        raise RequestValidationError([{"loc": tuple(where.split(".")), "msg": str(error)}]) from None
+        raise RequestValidationError([{"loc": ("query", "cursor"), "msg": str(error)}]) from None
 
 
 def _question(query: EstimatesQuery, n_left: int, cursor: str | None) -> dict[str, Any]:
@@ -129,7 +136,7 @@ async def _page_by_page(reader: Reader, query: EstimatesQuery, first: Page) -> A
     newest = first.last_cursor
     yield b'{"items":[' + ",".join(first.items).encode()
     while n_left > 0 and page.next_cursor is not None:
-        page = await asyncio.to_thread(reader.estimates, **_question(query, n_left, page.next_cursor))
+        page = await asked(reader, BATCHES, **_question(query, n_left, page.next_cursor))
         n_left -= len(page.items)
         if page.items:
             yield ("," + ",".join(page.items)).encode()

@@ -1,49 +1,24 @@
 """/api/v1/events and /api/v1/trips: what was loaded where, and what was carried how far; as pages and as files."""
 
-import asyncio
 from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Query
-from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, Field
-from pydantic.json_schema import SkipJsonSchema
 from starlette.responses import Response
 
 from gateway.core.events import EntryKind
 from gateway.core.events.table import COLUMNS, cells_of
-from gateway.history import Page
+from gateway.history import Page, Reader
 from gateway.records import json_line
 from gateway.web.as_file import CSV, JSON_LINES, csv_lines, file_responses, json_lines, sent_as_file
 from gateway.web.as_parquet import PARQUET, ParquetFile
-from gateway.web.instant import Instant
-from gateway.web.reader import Reader
-from gateway.web.routes.estimates import Cursor
+from gateway.web.routes.estimates import HistoryQuery, Span, asked
 from gateway.web.schemas import problem_responses
-from gateway.web.settings import PAGE_LIMIT
 
 _PAGE: Final = 100  # entries in memory at a time, for each file that is being sent
 _PATHS: Final = {EntryKind.EVENT: "events", EntryKind.TRIP: "trips"}
-
-
-class Span(BaseModel):
-    """Which part of them."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    since: Instant | SkipJsonSchema[None] = Field(None, description="those that end at or after this")
-    until: Instant | SkipJsonSchema[None] = Field(None, description="those that end before this")
-
-
-class EntriesQuery(Span):
-    """Which part of them, how many, and in which order."""
-
-    limit: int = Field(100, ge=1, le=PAGE_LIMIT)
-    cursor: Cursor | SkipJsonSchema[None] = Field(None, description="next_cursor or last_cursor of an earlier answer")
-    order: Literal["oldest_first", "newest_first"] = Field(
-        "oldest_first", description="oldest_first to follow what comes, newest_first for the last ones"
-    )
 
 
 class Place(BaseModel):
@@ -147,12 +122,12 @@ def events_router(reader: Reader) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["events"])
 
     @router.get("/events", response_model=EventsPage, responses=problem_responses(422, 503))
-    async def events(query: Annotated[EntriesQuery, Query()]) -> Response:
+    async def events(query: Annotated[HistoryQuery, Query()]) -> Response:
         """What was loaded and unloaded. A revised one comes again, behind all that was there: follow next_cursor."""
         return await _page(reader, EntryKind.EVENT, query)
 
     @router.get("/trips", response_model=TripsPage, responses=problem_responses(422, 503))
-    async def trips(query: Annotated[EntriesQuery, Query()]) -> Response:
+    async def trips(query: Annotated[HistoryQuery, Query()]) -> Response:
         """Every drive with its load and tonne-kilometres. A revised one comes again: follow next_cursor."""
         return await _page(reader, EntryKind.TRIP, query)
 
@@ -165,24 +140,21 @@ def events_router(reader: Reader) -> APIRouter:
     return router
 
 
-async def _page(reader: Reader, kind: EntryKind, query: EntriesQuery) -> Response:
+async def _page(reader: Reader, kind: EntryKind, query: HistoryQuery) -> Response:
     return Response("{" + await entries_of(reader, kind, query), media_type="application/json")
 
 
-async def entries_of(reader: Reader, kind: str, query: EntriesQuery) -> str:
+async def entries_of(reader: Reader, kind: str, query: HistoryQuery) -> str:
     """One page of entries as the rest of a JSON object. Raises RequestValidationError for a cursor that is none."""
-    try:
-        page = await asyncio.to_thread(
-            reader.entries,
-            kind=kind,
-            since_ns=query.since,
-            until_ns=query.until,
-            limit=query.limit,
-            cursor=query.cursor,
-            newest_first=query.order == "newest_first",
-        )
-    except ValueError as error:
-        raise RequestValidationError([{"loc": ("query", "cursor"), "msg": str(error)}]) from None
+    page = await asked(
+        reader,
+        (kind,),
+        since_ns=query.since,
+        until_ns=query.until,
+        limit=query.limit,
+        cursor=query.cursor,
+        newest_first=query.order == "newest_first",
+    )
     tail = json_line({"next_cursor": page.next_cursor, "last_cursor": page.last_cursor})[1:]
     return f'"items":[{",".join(page.items)}],{tail}'
 
@@ -190,9 +162,7 @@ async def entries_of(reader: Reader, kind: str, query: EntriesQuery) -> str:
 def _file_of(reader: Reader, kind: EntryKind, ending: str) -> Callable[..., Any]:
     async def whole(span: Annotated[Span, Query()]) -> Response:
         async def page_behind(cursor: str | None) -> Page:
-            return await asyncio.to_thread(
-                reader.entries, kind=kind, since_ns=span.since, until_ns=span.until, limit=_PAGE, cursor=cursor
-            )
+            return await asked(reader, (kind,), since_ns=span.since, until_ns=span.until, limit=_PAGE, cursor=cursor)
 
         name = f"springscale-{_PATHS[kind]}.{ending}"
         if ending == "parquet":

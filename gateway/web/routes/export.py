@@ -1,29 +1,17 @@
 """/api/v1/export.*: the whole history as a file, sent while it is read, in constant memory."""
 
-import asyncio
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Query
-from pydantic import BaseModel, ConfigDict, Field
-from pydantic.json_schema import SkipJsonSchema
+from pydantic import Field
 from starlette.responses import Response
 
 from gateway.estimate_json import COLUMNS, csv_cells
-from gateway.history import Page
+from gateway.history import BATCHES, Page, Reader
 from gateway.web.as_file import CSV, JSON_LINES, Encoder, csv_lines, file_responses, json_lines, sent_as_file
-from gateway.web.instant import Instant
-from gateway.web.reader import Reader
+from gateway.web.routes.estimates import Span, asked
 
 _PAGE: Final = 10  # records in memory at a time, for each file that is being sent
-
-
-class Span(BaseModel):
-    """Which part of the history."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    since: Instant | SkipJsonSchema[None] = Field(None, description="batches that end at or after this")
-    until: Instant | SkipJsonSchema[None] = Field(None, description="batches that end before this")
 
 
 class SpanWithSpectra(Span):
@@ -53,8 +41,9 @@ async def _sent(
     reader: Reader, span: Span, media_type: str, ending: str, encode: Encoder, *, with_spectra: bool
 ) -> Response:
     async def page_behind(cursor: str | None) -> Page:
-        return await asyncio.to_thread(
-            reader.estimates,
+        return await asked(
+            reader,
+            BATCHES,
             since_ns=span.since,
             until_ns=span.until,
             limit=_PAGE,

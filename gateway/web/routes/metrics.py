@@ -1,18 +1,245 @@
-"""The status as Prometheus metrics: base units, counters end in _total, unknown is absent."""
+"""The status as Prometheus metrics: one table. Base units, counters end in _total, unknown is absent."""
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Final
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
 
 from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from gateway.estimate import PLACES
-from gateway.status import RecordStatus, State, Status, UplinkStatus, VerificationStatus
-from gateway.web.live.board import Board
-from gateway.web.routes.alarms.figures import alarm_metrics, webhook_metrics
+from gateway.status import State, Status
+from gateway.web.live.board import Board, Shown
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """All that metrics are made of, at one moment."""
+
+    now: Status
+    shown: Shown
+    weights: LatestWeights
+    board: Board
+    responses: Mapping[int, int]
+
+
+Labelled = Iterable[tuple[Sequence[str], float | None]]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A metric: its name, its help, its samples at a moment (None: there is no such part), the names of its labels."""
+
+    name: str
+    text: str
+    samples: Callable[[Moment], Labelled | None]
+    labels: tuple[str, ...] = ()
+
+
+def one(name: str, text: str, path: str, of_unit: float = 1.0) -> Row:
+    """A metric without labels: what stands at a path of the moment, left out where that is unknown."""
+
+    def samples(moment: Moment) -> Labelled | None:
+        reading = _at(moment, path)
+        return None if reading is None or math.isnan(reading) else [((), reading * of_unit)]
+
+    return Row(name, text, samples)
+
+
+def by(name: str, text: str, label: str, read: Callable[[Moment], Mapping[str, float | None]]) -> Row:
+    """A metric with one label, a sample for each of its values."""
+    return Row(name, text, lambda moment: [((key,), reading) for key, reading in read(moment).items()], (label,))
+
+
+def counts(name: str, text: str, label: str, path: str, **fields: str) -> Row:
+    """Some numbers of one part of the status, by the values of a label."""
+
+    def samples(moment: Moment) -> Labelled | None:
+        part = _at(moment, path)
+        return None if part is None else [((key,), getattr(part, field)) for key, field in fields.items()]
+
+    return Row(name, text, samples, (label,))
+
+
+def _at(moment: Moment, path: str) -> Any:
+    found: Any = moment
+    for name in path.split("."):
+        found = None if found is None else getattr(found, name)
+    return found
+
+
+def _of_signals(field: str) -> Callable[[Moment], Mapping[str, float | None]]:
+    return lambda m: {signal.signal: getattr(signal, field) for signal in m.now.signals}
+
+
+def _of_places(field: str) -> Callable[[Moment], Mapping[str, float | None]]:
+    return lambda m: {where: getattr(getattr(m.weights, where), field) for where in PLACES}
+
+
+def _levels(moment: Moment) -> dict[str, float | None]:
+    alarms = moment.now.alarms
+    return {name: {"early": 1.0, "final": 2.0}.get(alarms.standing.get(name, ""), 0.0) for name in alarms.watched}
+
+
+def _info(moment: Moment) -> Labelled:
+    now = moment.now
+    return [((now.version, now.vehicle_id or "", now.estimator or "", now.calibration_id or ""), 1.0)]
+
+
+def _passed(moment: Moment) -> Labelled | None:
+    known = moment.now.verification
+    return None if known.last_at is None else [((), float(known.last_verdict == "passed"))]
+
+
+_ROWS: Final = "Rows by what became of them."
+_STD: Final = "Its standard deviation."
+TABLE: Final = (
+    Row(
+        "springscale_info",
+        "Always 1; the labels tell which service this is.",
+        _info,
+        ("version", "vehicle_id", "estimator", "calibration_id"),
+    ),
+    by(
+        "springscale_state",
+        "1 for what the service is doing, 0 for the others.",
+        "state",
+        lambda m: {state: float(state is m.now.state) for state in State},
+    ),
+    one("springscale_ready", "1 while estimates can come.", "now.is_ready"),
+    one("springscale_uptime_seconds", "Since the start of the service.", "now.uptime_s"),
+    one("springscale_bus_frames_total", "CAN data frames received.", "now.bus.n_frames"),
+    one("springscale_bus_error_frames_total", "CAN error frames received.", "now.bus.n_error_frames"),
+    one("springscale_bus_reconnects_total", "Times the interface was opened again.", "now.bus.n_reconnects"),
+    counts(
+        "springscale_bus_dropped_frames_total",
+        "Frames lost on the way in.",
+        "where",
+        "now.bus",
+        inbox="n_inbox_dropped",
+        kernel="n_kernel_dropped",
+    ),
+    one("springscale_bus_last_frame_age_seconds", "Since the last frame.", "now.bus.last_frame_age_s"),
+    Row(
+        "springscale_decoded_frames_total",
+        "Frames of mapped signals by what became of them.",
+        lambda m: [((count.signal, count.reason), count.n) for count in m.now.decode],
+        ("signal", "reason"),
+    ),
+    by("springscale_signal_rate_hertz", "Samples per second.", "signal", _of_signals("rate_hz")),
+    by("springscale_signal_last_age_seconds", "Since the last sample.", "signal", _of_signals("last_age_s")),
+    by(
+        "springscale_signal_rejected_ratio",
+        "Frames without a sample.",
+        "signal",
+        _of_signals("rejected_share"),
+    ),
+    counts(
+        "springscale_batches_total",
+        "Batches by outcome.",
+        "outcome",
+        "now.batches",
+        estimate="n_estimates",
+        rejected="n_rejected",
+        provisional="n_provisional",
+    ),
+    by(
+        "springscale_rejections_total",
+        "Batches by reason of rejection.",
+        "reason",
+        lambda m: dict(m.now.batches.rejected_by_reason),
+    ),
+    Row(
+        "springscale_store_degraded",
+        "1 while estimates are kept in memory only.",
+        lambda m: [((), float(m.now.store.state != "ok"))],
+    ),
+    one("springscale_store_held_rows", "Rows that wait for the disk.", "now.store.n_held"),
+    one("springscale_store_size_bytes", "Size of the database.", "now.store.size_bytes"),
+    one("springscale_store_bad_records_total", "Records that failed their checksum.", "now.store.n_bad_records"),
+    counts(
+        "springscale_store_rows_total",
+        _ROWS,
+        "outcome",
+        "now.store",
+        written="n_written",
+        dropped="n_dropped",
+        duplicate="n_duplicates",
+        pruned="n_pruned",
+    ),
+    one("springscale_verification_due", "1 while one with known loads is due.", "now.verification.is_due"),
+    Row("springscale_verification_passed", "1 where the last of this calibration passed.", _passed),
+    by("springscale_alarm", "0 while nothing is the matter, 1 told early, 2 confirmed.", "alarm", _levels),
+    one("springscale_alarms_unacknowledged", "Alarms that nobody has seen.", "now.alarms.n_unacknowledged"),
+    one("springscale_alarms_told_total", "Early and final words since the start.", "now.alarms.n_told"),
+    Row(
+        "springscale_record_refused",
+        "1 while frames cannot be recorded.",
+        lambda m: None if m.now.record is None else [((), float(bool(m.now.record.last_fault)))],
+    ),
+    one("springscale_record_size_bytes", "Size of the ring log.", "now.record.size_bytes"),
+    one("springscale_record_written_bytes_total", "Bytes written to it.", "now.record.n_bytes_written"),
+    counts(
+        "springscale_record_frames_total",
+        "Frames by what became of them.",
+        "outcome",
+        "now.record",
+        written="n_frames_written",
+        dropped="n_frames_dropped",
+    ),
+    one("springscale_uplink_connected", "1 while connected to the broker.", "now.uplink.is_connected"),
+    one("springscale_uplink_waiting_rows", "Rows still to be delivered.", "now.uplink.n_waiting"),
+    one("springscale_uplink_oldest_waiting_age_seconds", "Of the oldest of these.", "now.uplink.waiting_age_s"),
+    one("springscale_uplink_connections_total", "Times the broker was reached.", "now.uplink.n_connections"),
+    one("springscale_uplink_cuts_total", "Times an established link broke.", "now.uplink.n_cuts"),
+    counts(
+        "springscale_uplink_rows_total",
+        _ROWS,
+        "outcome",
+        "now.uplink",
+        delivered="n_delivered",
+        refused="n_refused",
+        pruned="n_pruned",
+    ),
+    one("springscale_webhook_waiting_rows", "Rows still to be delivered.", "now.webhook.n_waiting"),
+    one("springscale_webhook_oldest_waiting_age_seconds", "Of the oldest of these.", "now.webhook.waiting_age_s"),
+    one("springscale_webhook_failed_attempts_total", "Attempts not taken.", "now.webhook.n_failed"),
+    counts(
+        "springscale_webhook_rows_total",
+        _ROWS,
+        "outcome",
+        "now.webhook",
+        delivered="n_delivered",
+        dead="n_dead",
+        pruned="n_pruned",
+    ),
+    by(
+        "springscale_http_responses_total",
+        "HTTP answers by status.",
+        "code",
+        lambda m: {str(code): n for code, n in m.responses.items()},
+    ),
+    one("springscale_stream_clients", "Open streams.", "board.fanout.n_subscribers"),
+    one("springscale_stream_slow_clients_total", "Streams whose client did not read.", "board.fanout.n_slow_clients"),
+    one("springscale_stream_dropped_events_total", "Events those clients lost.", "board.fanout.n_events_dropped"),
+    one("springscale_payload_kilograms", "Payload of the latest estimate.", "shown.payload.number"),
+    one("springscale_payload_std_kilograms", _STD, "shown.payload.std"),
+    one("springscale_front_share_ratio", "Of the sprung mass, on the front axle.", "shown.front_share.number", 0.01),
+    one("springscale_front_share_std_ratio", _STD, "shown.front_share.std", 0.01),
+    one("springscale_cg_left_meters", "Centre of gravity, left of the centre line.", "shown.cg_left.number"),
+    one("springscale_cg_left_std_meters", _STD, "shown.cg_left.std"),
+    one("springscale_left_share_ratio", "Of the sprung mass, on the left wheels.", "shown.left_share.number", 0.01),
+    one("springscale_left_share_std_ratio", _STD, "shown.left_share.std", 0.01),
+    one("springscale_estimate_age_seconds", "Since the latest estimate was received.", "shown.age_s"),
+    one("springscale_estimate_stale", "1 while the latest estimate is old.", "shown.is_stale"),
+    by("springscale_weight_kilograms", "Weight on the road.", "where", _of_places("kg")),
+    by("springscale_weight_std_kilograms", _STD, "where", _of_places("std_kg")),
+    by("springscale_weight_limit_kilograms", "What it may be.", "where", _of_places("limit_kg")),
+    by("springscale_overload", "1 while it is too much.", "where", _of_places("is_over_limit")),
+)
 
 
 class StatusCollector:
@@ -29,23 +256,18 @@ class StatusCollector:
         return ()
 
     def collect(self) -> Iterator[Metric]:
-        now = self._status()
-        yield from _service(now)
-        yield from _bus(now)
-        yield from _signals(now)
-        yield from _batches(now)
-        yield from _store(now)
-        yield from _verification(now.verification)
-        yield from alarm_metrics(now.alarms)
-        if now.record is not None:
-            yield from _record(now.record)
-        if now.uplink is not None:
-            yield from _uplink(now.uplink)
-        if now.webhook is not None:
-            yield from webhook_metrics(now.webhook)
-        yield from _web(self._board, self._responses)
-        yield from _estimate(self._board)
-        yield from _weights(weigh_latest(self._board, self._scales))
+        weights = weigh_latest(self._board, self._scales)
+        moment = Moment(self._status(), self._board.shown(), weights, self._board, self._responses)
+        for row in TABLE:
+            samples = row.samples(moment)
+            if samples is None:
+                continue
+            kind = CounterMetricFamily if row.name.endswith("_total") else GaugeMetricFamily
+            family = kind(row.name, row.text, labels=row.labels)
+            for labels, reading in samples:
+                if reading is not None:
+                    family.add_metric(labels, float(reading))
+            yield family
 
 
 def metrics_registry(
@@ -56,189 +278,3 @@ def metrics_registry(
     registry.register(StatusCollector(board, scales, status, responses))
     ProcessCollector(namespace="springscale", registry=registry)
     return registry
-
-
-def _service(now: Status) -> Iterator[Metric]:
-    info = GaugeMetricFamily(
-        "springscale_info",
-        "Always 1; the labels tell which service this is.",
-        labels=["version", "vehicle_id", "estimator", "calibration_id"],
-    )
-    info.add_metric([now.version, now.vehicle_id or "", now.estimator or "", now.calibration_id or ""], 1)
-    yield info
-    state = GaugeMetricFamily(
-        "springscale_state", "1 for what the service is doing, 0 for the others.", labels=["state"]
-    )
-    for each in State:
-        state.add_metric([each], float(each is now.state))
-    yield state
-    yield _gauge("springscale_ready", "1 while estimates can come.", float(now.is_ready))
-    yield _gauge("springscale_uptime_seconds", "Since the start of the service.", now.uptime_s)
-
-
-def _bus(now: Status) -> Iterator[Metric]:
-    yield _counter("springscale_bus_frames_total", "CAN data frames received.", now.bus.n_frames)
-    yield _counter("springscale_bus_error_frames_total", "CAN error frames received.", now.bus.n_error_frames)
-    yield _counter("springscale_bus_reconnects_total", "Times the interface was opened again.", now.bus.n_reconnects)
-    dropped = CounterMetricFamily(
-        "springscale_bus_dropped_frames_total", "Frames lost on the way in.", labels=["where"]
-    )
-    dropped.add_metric(["inbox"], now.bus.n_inbox_dropped)
-    if now.bus.n_kernel_dropped is not None:
-        dropped.add_metric(["kernel"], now.bus.n_kernel_dropped)
-    yield dropped
-    if now.bus.last_frame_age_s is not None:
-        yield _gauge("springscale_bus_last_frame_age_seconds", "Since the last frame.", now.bus.last_frame_age_s)
-
-
-_SIGNAL_GAUGES: Final = (
-    ("rate_hz", "springscale_signal_rate_hertz", "Samples per second."),
-    ("last_age_s", "springscale_signal_last_age_seconds", "Since the last sample."),
-    ("rejected_share", "springscale_signal_rejected_ratio", "Share of frames that gave no sample."),
-)
-
-
-def _signals(now: Status) -> Iterator[Metric]:
-    decoded = CounterMetricFamily(
-        "springscale_decoded_frames_total",
-        "Frames of mapped signals by what became of them.",
-        labels=["signal", "reason"],
-    )
-    for count in now.decode:
-        decoded.add_metric([count.signal, count.reason], count.n)
-    yield decoded
-    for name, metric, text in _SIGNAL_GAUGES:
-        gauge = GaugeMetricFamily(metric, text, labels=["signal"])
-        for signal in now.signals:
-            if (reading := getattr(signal, name)) is not None:
-                gauge.add_metric([signal.signal], reading)
-        yield gauge
-
-
-def _batches(now: Status) -> Iterator[Metric]:
-    batches = CounterMetricFamily("springscale_batches_total", "Batches by outcome.", labels=["outcome"])
-    batches.add_metric(["estimate"], now.batches.n_estimates)
-    batches.add_metric(["rejected"], now.batches.n_rejected)
-    batches.add_metric(["provisional"], now.batches.n_provisional)
-    yield batches
-    yield _labelled(
-        "springscale_rejections_total", "Batches by reason of rejection.", "reason", now.batches.rejected_by_reason
-    )
-
-
-def _store(now: Status) -> Iterator[Metric]:
-    store = now.store
-    yield _gauge("springscale_store_degraded", "1 while estimates are kept in memory only.", float(store.state != "ok"))
-    yield _gauge("springscale_store_held_rows", "Rows that wait for the disk.", store.n_held)
-    yield _gauge("springscale_store_size_bytes", "Size of the database.", store.size_bytes)
-    yield _labelled(
-        "springscale_store_rows_total",
-        "Rows by what became of them.",
-        "outcome",
-        {
-            "written": store.n_written,
-            "dropped": store.n_dropped,
-            "duplicate": store.n_duplicates,
-            "pruned": store.n_pruned,
-        },
-    )
-
-
-def _verification(verification: VerificationStatus) -> Iterator[Metric]:
-    yield _gauge("springscale_verification_due", "1 while one with known loads is due.", float(verification.is_due))
-    if verification.last_at is not None:
-        passed = float(verification.last_verdict == "passed")
-        yield _gauge("springscale_verification_passed", "1 where the last of this calibration passed.", passed)
-
-
-def _record(record: RecordStatus) -> Iterator[Metric]:
-    yield _gauge("springscale_record_refused", "1 while frames cannot be recorded.", float(bool(record.last_fault)))
-    yield _gauge("springscale_record_size_bytes", "Size of the ring log.", record.size_bytes)
-    yield _counter("springscale_record_written_bytes_total", "Bytes written to it.", record.n_bytes_written)
-    yield _labelled(
-        "springscale_record_frames_total",
-        "Frames by what became of them.",
-        "outcome",
-        {"written": record.n_frames_written, "dropped": record.n_frames_dropped},
-    )
-
-
-def _uplink(uplink: UplinkStatus) -> Iterator[Metric]:
-    yield _gauge("springscale_uplink_connected", "1 while connected to the broker.", float(uplink.is_connected))
-    yield _gauge("springscale_uplink_waiting_rows", "Rows still to be delivered.", uplink.n_waiting)
-    if uplink.waiting_age_s is not None:
-        yield _gauge(
-            "springscale_uplink_oldest_waiting_age_seconds", "Of the oldest of these rows.", uplink.waiting_age_s
-        )
-    yield _counter("springscale_uplink_connections_total", "Times the broker was reached.", uplink.n_connections)
-    yield _counter("springscale_uplink_cuts_total", "Times an established link broke.", uplink.n_cuts)
-    yield _labelled(
-        "springscale_uplink_rows_total",
-        "Rows by what became of them.",
-        "outcome",
-        {"delivered": uplink.n_delivered, "refused": uplink.n_refused, "pruned": uplink.n_pruned},
-    )
-
-
-def _web(board: Board, responses: Counter[int]) -> Iterator[Metric]:
-    fanout = board.fanout
-    yield _labelled(
-        "springscale_http_responses_total", "HTTP answers by status.", "code", {str(c): n for c, n in responses.items()}
-    )
-    yield _gauge("springscale_stream_clients", "Open streams.", fanout.n_subscribers)
-    yield _counter(
-        "springscale_stream_slow_clients_total",
-        "Streams ended because the client read too slowly.",
-        fanout.n_slow_clients,
-    )
-    yield _counter("springscale_stream_dropped_events_total", "Events those clients lost.", fanout.n_events_dropped)
-
-
-def _estimate(board: Board) -> Iterator[Metric]:
-    shown = board.shown()
-    payload, share, age_s = shown.payload, shown.front_share, math.nan if shown.age_s is None else shown.age_s
-    cg_left, left_share = shown.cg_left, shown.left_share
-    gauges = (
-        ("springscale_payload_kilograms", "Payload of the latest estimate.", payload.number),
-        ("springscale_payload_std_kilograms", "Its standard deviation.", payload.std),
-        ("springscale_front_share_ratio", "Share of the sprung mass on the front axle.", share.number * 0.01),
-        ("springscale_front_share_std_ratio", "Its standard deviation.", share.std * 0.01),
-        ("springscale_cg_left_meters", "Sprung mass's centre of gravity, left of the centre line.", cg_left.number),
-        ("springscale_cg_left_std_meters", "Its standard deviation.", cg_left.std),
-        ("springscale_left_share_ratio", "Share of the sprung mass on the left wheels.", left_share.number * 0.01),
-        ("springscale_left_share_std_ratio", "Its standard deviation.", left_share.std * 0.01),
-        ("springscale_estimate_age_seconds", "Since the latest estimate was received.", age_s),
-    )
-    yield from (_gauge(metric, text, reading) for metric, text, reading in gauges if math.isfinite(reading))
-    yield _gauge("springscale_estimate_stale", "1 while the latest estimate is old.", float(shown.is_stale))
-
-
-def _weights(weights: LatestWeights) -> Iterator[Metric]:
-    """One label value for each place a vehicle is weighed at."""
-    families = (
-        ("kg", GaugeMetricFamily("springscale_weight_kilograms", "Weight on the road.", labels=["where"])),
-        ("std_kg", GaugeMetricFamily("springscale_weight_std_kilograms", "Its standard deviation.", labels=["where"])),
-        ("limit_kg", GaugeMetricFamily("springscale_weight_limit_kilograms", "What it may be.", labels=["where"])),
-        ("is_over_limit", GaugeMetricFamily("springscale_overload", "1 while it is too much.", labels=["where"])),
-    )
-    for name, family in families:
-        for where in PLACES:
-            reading = getattr(getattr(weights, where), name)
-            if reading is not None:
-                family.add_metric([where], float(reading))
-        yield family
-
-
-def _gauge(name: str, text: str, reading: float) -> Metric:
-    return GaugeMetricFamily(name, text, value=reading)
-
-
-def _counter(name: str, text: str, n: int) -> Metric:
-    return CounterMetricFamily(name, text, value=n)
-
-
-def _labelled(name: str, text: str, label: str, counts: Mapping[str, int]) -> Metric:
-    counter = CounterMetricFamily(name, text, labels=[label])
-    for key, n in counts.items():
-        counter.add_metric([key], n)
-    return counter

@@ -47,18 +47,6 @@ class FrameLog(Protocol):
         ...
 
 
-class NoFrameLog:
-    """Where nothing is recorded there is nothing to fetch."""
-
-    def segments(self) -> Sequence[KeptSegment]:
-        """None."""
-        return ()
-
-    def open(self, name: str) -> tuple[BinaryIO, int] | None:
-        """Never one."""
-        return None
-
-
 class SegmentTold(BaseModel):
     """One file: gzip-compressed candump lines, the frames of at most an hour."""
 

@@ -4,7 +4,6 @@ Shaped, not conformant: hrTotalVehicleDistance and the driver's identity are man
 gateway does not know them.
 """
 
-import asyncio
 import json
 import math
 import re
@@ -21,12 +20,12 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
 from gateway.estimate import Estimate, Quantity, Weight
+from gateway.history import BATCHES, Reader
 from gateway.records import iso_utc
 from gateway.status import Status
 from gateway.web.instant import Instant
 from gateway.web.live.board import Board
-from gateway.web.reader import Reader
-from gateway.web.routes.estimates import Cursor
+from gateway.web.routes.estimates import Cursor, asked
 from gateway.web.routes.weights import Scales
 from gateway.web.schemas import problem_responses
 
@@ -143,8 +142,9 @@ async def _batches(
         if shown is None:
             return [], None
         return [_Weighed(iso_utc(shown.t_end_ns), shown)], None
-    page = await asyncio.to_thread(
-        reader.estimates,
+    page = await asked(
+        reader,
+        BATCHES,
         since_ns=query.starttime,
         until_ns=query.stoptime,
         limit=_PAGE,

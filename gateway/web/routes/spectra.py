@@ -41,7 +41,7 @@ class LatestSpectra(BaseModel):
     estimator: str | None = Field(examples=["cross_spectrum"])
     rejected: list[str] = Field(examples=[[]])
     payload_kg: float | None = Field(
-        description="as weighed; the model carries it, and a tare that was taken off", examples=[271.3]
+        description="as weighed; the model is of what was measured, before known weights", examples=[271.3]
     )
     front_share_pct: float | None = Field(examples=[50.4])
     spectra: Spectra | None = Field(description="as measured")
@@ -99,8 +99,10 @@ def modelled_of(heard: Estimate, calibrated: CalibratedVehicle | None) -> Spectr
 def _fitted(heard: Estimate, wheelbase_m: float) -> Fitted | None:
     """What the estimator told of its fit; the delay of the mean speed where it told none."""
     told = {name: x for name, x in heard.diagnostics.items() if math.isfinite(x)}
-    payload_kg = heard.payload.number if heard.tare is None else heard.tare.raw_payload.number  # without a tare
-    front_share_pct = heard.front_share.number if heard.tare is None else heard.tare.raw_front_share.number
+    payload_kg, front_share_pct = (
+        (raw or shown).number
+        for raw, shown in ((heard.raw_payload, heard.payload), (heard.raw_front_share, heard.front_share))
+    )  # the fit knows no known weights
     if not (math.isfinite(payload_kg) and math.isfinite(front_share_pct) and heard.mean_speed_mps > 0.0):
         return None
     return Fitted(

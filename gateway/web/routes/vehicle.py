@@ -25,7 +25,11 @@ class VehicleFigures(BaseModel):
     empty_cg_left_m: float
     payload_range_kg: tuple[float, float] = Field(description="only normalises errors; gates nothing")
     front_share_range_pct: tuple[float, float]
+    carries: str | None = Field(description="what it usually carries; null: not said", examples=["parcels"])
     payload_length_m: float | None = Field(description="how far along the floor loads usually reach; null: not said")
+    payload_height_m: float | None = Field(description="how high above the floor they reach; null: not said")
+    roof_rack: bool
+    tow_bar: bool
     unsprung_front_kg: float | None
     unsprung_rear_kg: float | None
     kerb_front_axle_kg: float | None

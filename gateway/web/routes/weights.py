@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import NOT_CALIBRATED, Place, Sideways, is_over_limit, place_of, weighed
+from gateway.core.weights import NOT_CALIBRATED, Place, is_over_limit, place_of, weighed
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.records import iso_utc
 from gateway.web.live.board import Board
@@ -53,18 +53,26 @@ class Scales:
     def __init__(self, calibrated: CalibratedVehicle | None) -> None:
         self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
         self._unsprung = NOT_CALIBRATED if calibrated is None else calibrated.unsprung
+        self._known: dict[int, tuple[Estimate, Weights]] = {}  # by identity: the estimates are kept with them
 
     def weigh(self, estimate: Estimate | None) -> Weights:
         """By this vehicle's figures now, whatever an estimate brought along; None: before the first."""
         return weighed(estimate or _NONE, self.vehicle, self._unsprung).weights
 
+    def weigh_each(self, estimates: Sequence[Estimate]) -> list[Weights]:
+        """Likewise of many, each computed once however often these are asked for. From any thread."""
+        known, found = self._known, dict[int, tuple[Estimate, Weights]]()
+        for one in estimates:
+            if id(one) not in found:
+                found[id(one)] = known.get(id(one)) or (one, self.weigh(one))
+        self._known = found
+        return [found[id(one)][1] for one in estimates]
+
     def place(self, estimate: Estimate | None) -> Place | None:
         """Where its payload lies; None where that cannot be told."""
-        e = estimate or _NONE
-        numbers = (e.payload.number, e.payload.std, e.front_share.number, e.front_share.std)
-        if self.vehicle is None or any(map(math.isnan, numbers)):
+        if self.vehicle is None or estimate is None or estimate.posterior is None:
             return None
-        return place_of(self.vehicle, e.payload, e.front_share, e.correlation, Sideways.of(e))
+        return place_of(self.vehicle, estimate.posterior)
 
 
 def weights_router(board: Board, scales: Scales) -> APIRouter:
@@ -82,10 +90,9 @@ def weights_router(board: Board, scales: Scales) -> APIRouter:
 def weigh_latest(board: Board, scales: Scales) -> LatestWeights:
     """Weights of the estimate shown now; the warnings look back over the last estimates."""
     shown = board.shown()
-    history = [scales.weigh(past) for past in board.recent_estimates()]
+    *history, now = scales.weigh_each([*board.recent_estimates(), shown.estimate or _NONE])
     figures = {
-        place: _figure(weight, [getattr(weights, place).kg for weights in history])
-        for place, weight in scales.weigh(shown.estimate).items()
+        place: _figure(weight, [getattr(weights, place).kg for weights in history]) for place, weight in now.items()
     }
     return LatestWeights(
         id=None if shown.estimate is None else shown.estimate.id,

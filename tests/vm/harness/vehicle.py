@@ -196,7 +196,8 @@ class Vehicle:
         script = (
             f"import json, sqlite3; c = sqlite3.connect('file:{STATE}/springscale.db?mode=ro', uri=True);"
             "print(c.execute('PRAGMA integrity_check').fetchone()[0]);"
-            "print(json.dumps([json.loads(t) for t, in c.execute('SELECT text FROM estimates ORDER BY seq')]))"
+            "rows = c.execute('SELECT text FROM journal WHERE kind IN (?, ?) ORDER BY seq', ('estimate', 'rejection'));"
+            "print(json.dumps([json.loads(t) for t, in rows]))"
         )
         verdict, records = self.run(f'python3 -c "{script}"').strip().split("\n")
         assert verdict == "ok"

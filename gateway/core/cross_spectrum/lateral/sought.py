@@ -41,7 +41,8 @@ FREE: Final = [INDEX[name] for name in FREE_STD]
 
 @dataclass(frozen=True, slots=True)
 class Sideways:
-    """The place (m) of the centre of gravity of all that is sprung, left of the centre line, under a load that is known.
+    """The place (m) of the centre of gravity of all that is sprung, left of the centre line, under a load that is
+    known.
 
     own_variance (m2) is what the batch's length and road leave. moves (n,) is by how much the place moves with each
     parameter of the vehicle, moves_with_load (2,) with payload (m/kg) and front share (m per 0..1). is_mount_changed:

@@ -43,7 +43,7 @@ function alarm(silentS) {
   if (isRefused) return ["The gateway wants a token.", ""];
   if (silentS > GONE_AFTER_S) return [`The gateway does not answer.${cab ? " What is shown is the last it said." : ""}`, `For ${duration(silentS)} now.`];
   if (cab === null) return ["", ""];
-  if (cab.is_stale) return ["These numbers are old.", `Weighed ${duration(cab.age_s + silentS)} ago.`];
+  if (cab.is_stale) return ["These numbers are old.", cab.age_s === null ? "Weighed before the gateway was started." : `Weighed ${duration(cab.age_s + silentS)} ago.`];
   if (cab.state === "sensor_fault" || cab.state === "reader_fault") return ["A sensor or the bus is not heard: nothing new is weighed.", ""];
   return ["", ""];
 }

@@ -93,7 +93,7 @@ export function aboard(cab, ageS) {
   const interval = cab.payload_interval95_kg === null ? "" : ` (95 %: ${between(cab.payload_interval95_kg, 0, "kg")})`;
   const early = cab.is_early ? " A first look; a whole batch is surer." : "";
   const refused = cab.rejected.length ? ` Not weighed since: ${cab.rejected.map(words).join(", ")}.` : "";
-  return `Aboard: ${figure(cab.payload_kg, 0, "kg")}${interval}, weighed ${ago(ageS)}.${early}${refused}`;
+  return `Aboard: ${figure(cab.payload_kg, 0, "kg")}${interval}, weighed ${ageS === null ? "before the gateway was started" : ago(ageS)}.${early}${refused}`;
 }
 
 export function eventText(event) {

@@ -10,7 +10,7 @@ const STEPS = ["line", "vehicle", "empty", "drive", "fit"];
 const TONES = { fault: "alarm", warning: "warning", note: "soft" };
 const WHY_ENDED = { undone: "undone", back_to_factory: "back to the settings' own" };
 const NO_LINE = "";
-const OPTIONAL = new Set(["sensor_offset_left_m", "track_width_m", "payload_range_kg", "name"]);
+const OPTIONAL = new Set(["sensor_offset_left_m", "track_width_m", "payload_range_kg", "name", "carries", "payload_length_m", "payload_height_m"]);
 
 const card = element("commissioning");
 let lines = [];
@@ -148,8 +148,9 @@ async function chooseLine(form) {
 
 function stateVehicle(form) {
   const said = {};
-  for (const field of form.querySelectorAll("input")) {
-    if (field.value !== "" || !OPTIONAL.has(field.name)) said[field.name] = field.type === "number" ? Number(field.value) : field.value;
+  for (const field of form.querySelectorAll("input, select")) {
+    if (field.type === "checkbox") said[field.name] = field.checked;
+    else if (field.value !== "" || !OPTIONAL.has(field.name)) said[field.name] = field.type === "number" ? Number(field.value) : field.value;
   }
   if (said.payload_range_kg) said.payload_range_kg = [0, said.payload_range_kg];
   return step(form, "/vehicle", said);

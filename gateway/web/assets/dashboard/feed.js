@@ -2,7 +2,7 @@
 
 import { follow } from "/assets/dashboard/event-stream.js";
 import { alarmsOf } from "/assets/dashboard/alarm-view.js";
-import { ALARMS, COMMISSIONING, Refused, TARE, TICKETS, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
+import { ALARMS, COMMISSIONING, KNOWN_WEIGHTS, Refused, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
 import { known, learn } from "/assets/dashboard/known.js";
 
 const ASK_EVERY_MS = 5000;
@@ -16,10 +16,8 @@ async function askNow() {
     learn({ status, latest, latestAtMs: performance.now(), isReachable: true, isRefused: false });
     if (known.weights?.id !== latest.id || latest.id === null) learn({ weights: await load("/api/v1/weights/latest") });
     if (known.verifications && known.verifications.due.n_records !== status.verification.n_records) await askVerifications();
-    if (known.tickets?.is_busy || (known.calibrationId ?? status.calibration_id) !== status.calibration_id) await askTickets();
-    known.calibrationId = status.calibration_id;
     if (known.commissioning?.underway || known.commissioning?.is_pending) await askCommissioning();
-    if (known.tare && (known.tare.active?.id ?? null) !== status.tare_id) await askTare(); // somebody else changed it
+    if (known.knownWeights && known.knownWeights.known_weights_id !== status.known_weights_id) await askKnownWeights(); // somebody else changed them
   } catch (error) {
     learn({ isReachable: error instanceof Refused, isRefused: error instanceof Refused });
   }
@@ -49,7 +47,7 @@ function revised(entries, entry) {
 
 const askSpectra = async () => learn({ spectra: await load("/api/v1/spectra/latest") });
 
-const askTare = async () => learn({ tare: await load(TARE) });
+const askKnownWeights = async () => learn({ knownWeights: await load(KNOWN_WEIGHTS) });
 
 export const askCommissioning = async () => learn({ commissioning: await load(COMMISSIONING) });
 
@@ -58,11 +56,14 @@ async function askVerifications() {
   learn({ verifications, trend });
 }
 
-const askTickets = async () => learn({ tickets: await load(TICKETS) });
-
 async function askOnce() {
   const [vehicle, reasons] = await Promise.all([load("/api/v1/vehicle"), load("/api/v1/reasons")]);
-  learn({ vehicle, reasons: new Map(reasons.items.map((told) => [told.reason, told])) });
+  learn({
+    vehicle,
+    reasons: new Map(reasons.items.map((told) => [told.reason, told])),
+    sources: new Map(reasons.sources.map((told) => [told.source, told.words])),
+    remedies: new Map(reasons.remedies.map((told) => [told.remedy, told.advice])),
+  });
 }
 
 async function askTruth() {
@@ -78,7 +79,7 @@ let asking = null;
 function askSoon() {
   asking ??= setTimeout(() => {
     asking = null;
-    Promise.all([askNow(), askSpectra(), askTruth(), askTare()]).catch(giveUpUntilNext);
+    Promise.all([askNow(), askSpectra(), askTruth(), askKnownWeights()]).catch(giveUpUntilNext);
   }, GATHER_MS);
 }
 
@@ -103,7 +104,7 @@ const giveUpUntilNext = (error) => console.info(error.message);
 /** What needs an answer before the page is whole; asked again whenever the stream comes back. */
 async function catchUp() {
   await askNow();
-  await Promise.all([askOnce(), askSpectra(), askTruth(), askTare(), askVerifications(), askTickets(), askCommissioning()]);
+  await Promise.all([askOnce(), askSpectra(), askTruth(), askKnownWeights(), askVerifications(), askCommissioning()]);
   await Promise.all([askAlarms(), askDay()]);
 }
 

@@ -1,12 +1,11 @@
 // How the pages ask the gateway: with the token of this session, if one was entered.
 
 const TOKEN = "springscale-token";
-export const TARE = "/api/v1/calibration/tare";
+export const KNOWN_WEIGHTS = "/api/v1/known-weights";
 export const COMMISSIONING = "/api/v1/calibration/commissioning";
 export const VERIFICATIONS = "/api/v1/calibration/verifications";
 export const TREND = "/api/v1/calibration/trend";
 export const ALARMS = "/api/v1/alarms?order=newest_first&limit=50";
-export const TICKETS = "/api/v1/calibration/tickets";
 
 export class Refused extends Error {}
 
@@ -29,7 +28,7 @@ export async function ask(path, more = {}, signal = null) {
 export const load = async (path) => (await ask(path)).json();
 
 /** Asks for a change, with another token where one is given; returns what `state` tells after it. Throws the gateway's own words. */
-export async function change(method, path, token, claim, state = TARE) {
+export async function change(method, path, token, claim, state) {
   const said = { ...headers(token || undefined), "Content-Type": "application/json" };
   const response = await fetch(path, { method, body: claim && JSON.stringify(claim), headers: said }).catch(() => {
     throw new Error("The gateway did not answer. Look whether anything changed before you try again.");

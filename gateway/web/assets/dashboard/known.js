@@ -9,14 +9,15 @@ export const known = {
   weights: null,
   spectra: null,
   commissioning: null, // GET /calibration/commissioning
-  tare: null, // GET /calibration/tare
+  knownWeights: null, // GET /known-weights
   verifications: null, // GET /calibration/verifications
   trend: null, // GET /calibration/trend
-  tickets: null, // GET /calibration/tickets
   alarms: null, // newest first, those that stand among them
   events: null, // load events, newest first
   trips: null, // likewise
   reasons: new Map(), // reason -> {happened, advice}
+  sources: new Map(), // source of error -> words
+  remedies: new Map(), // remedy -> what to do
   batches: null, // newest first, rejections included
   early: null, // the provisional estimate of the batch under way
   truth: [], // known loads, where somebody knows them

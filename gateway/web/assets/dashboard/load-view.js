@@ -2,7 +2,7 @@
 
 import { ageNow, known, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { ago, between, clock, figure, kmh, signed, withStd, words } from "/assets/dashboard/words.js";
+import { Z95, ago, between, capital, clock, figure, kmh, withStd, words } from "/assets/dashboard/words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : `95 %: ${between(bounds, digits, unit)}`);
 
@@ -66,6 +66,20 @@ function announce(latest) {
   announcedId = latest.id;
 }
 
+/** Each source with what it adds and what would narrow it; the widths are half those of 95 % intervals. */
+show(({ latest, sources, remedies }) => {
+  const lines = latest?.error_budget ?? [];
+  element("budget").hidden = lines.length === 0;
+  if (lines.length === 0) return;
+  const half = (std) => figure(Z95 * std, 0, "kg");
+  write("budget-why", `Why ± ${half(latest.payload_std_kg)}?`);
+  element("budget-lines").replaceChildren(...lines.filter((line) => line.payload_kg > 0).map((line) => {
+    const advice = line.remedy && remedies.get(line.remedy);
+    const remedy = advice ? `. ${capital(advice)}: ± ${half(latest.payload_std_kg)} becomes ± ${half(line.payload_with_remedy_kg)}.` : ".";
+    return made("li", `${capital(sources.get(line.source) ?? words(line.source))}: ± ${half(line.payload_kg)}${remedy}`);
+  }));
+}, "latest", "sources", "remedies");
+
 show(({ latest, vehicle, reasons, isReachable }) => {
   if (latest === null) return;
   const seen = vehicle?.calibration;
@@ -78,8 +92,8 @@ show(({ latest, vehicle, reasons, isReachable }) => {
   write("age-at", latest.t_end ? `(batch until ${clock(latest.t_end)})` : "");
   write("epoch", epoch(latest));
   write("speed", kmh(latest.mean_speed_mps));
-  element("tared").hidden = latest.tare_payload_kg == null;
-  if (latest.tare_payload_kg != null) write("tared-by", `${signed(latest.tare_payload_kg, 0, "kg")}, ${signed(latest.tare_front_share_pct, 1, "points")}`);
+  element("conditioned").hidden = latest.raw_payload_kg == null;
+  write("raw-payload", withStd(latest.raw_payload_kg, latest.raw_payload_std_kg, 0, "kg"));
   element("latest").classList.toggle("stale", latest.is_stale || isReachable === false);
   say("note", notes(latest, reasons));
   document.title = latest.payload_kg == null ? "Springscale" : `${figure(latest.payload_kg, 0, "kg")} – Springscale`;

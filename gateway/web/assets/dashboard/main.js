@@ -9,7 +9,7 @@ import "/assets/dashboard/health-view.js";
 import "/assets/dashboard/history-view.js";
 import "/assets/dashboard/day-view.js";
 import "/assets/dashboard/spectra-view.js";
-import "/assets/dashboard/tare-view.js";
+import "/assets/dashboard/known-weights-view.js";
 import "/assets/dashboard/commissioning-view.js";
 import "/assets/dashboard/verification-view.js";
 

@@ -1,9 +1,9 @@
-// Known loads: when they were last held against what was weighed, what drifts meanwhile, and what was learned from them.
+// Known loads: when they were last held against what was weighed, what drifts meanwhile; and the form that states one.
 
-import { TICKETS, VERIFICATIONS, ask, change, hasToken } from "/assets/dashboard/gateway.js";
+import { KNOWN_WEIGHTS, VERIFICATIONS, ask, change, hasToken } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { capital, clock, figure, number, signed, words } from "/assets/dashboard/words.js";
+import { capital, clock, number, signed, words } from "/assets/dashboard/words.js";
 
 const FIELDS = { gross: ["gross_kg"], axles: ["front_axle_kg", "rear_axle_kg"], payload: ["payload_kg", "position_m"] };
 const OPTIONAL = new Set(["position_m"]);
@@ -55,41 +55,6 @@ show(({ trend }) => {
   element("drift").replaceChildren(...trend.parameters.map((one) => made("li", trendText(one), one.is_drifting ? "warning" : "")));
 }, "trend");
 
-const accuracy = ({ planned, is_provisional, why_not, is_busy }) => {
-  if (why_not !== null) return `as calibrated: ${why_not}`;
-  const busy = is_busy ? "; the calibration is being made anew" : "";
-  if (planned === null) return `provisional${busy}`;
-  const now = `payloads to ± ${figure(1.96 * planned.payload_std_kg, 0, "kg")} (95 %)`;
-  if (!is_provisional) return `${now}; no other load would narrow that by much${busy}`;
-  const place = planned.load_position_m === null ? "" : `, ${figure(planned.load_position_m, 1, "m")} behind the front axle`;
-  return `provisional: ${now}; a ticket of ${figure(planned.load_kg, 0, "kg")}${place} would make it ± ${figure(1.96 * planned.then_payload_std_kg, 0, "kg")}${busy}`;
-};
-
-function ticketEntry(ticket) {
-  const share = ticket.front_share_pct === null ? "place unknown, teaches nothing" : `${number(ticket.front_share_pct, 1)} % in front`;
-  const end = ticket.withdrawn ? `; withdrawn ${clock(ticket.withdrawn.at)} by ${ticket.withdrawn.by}` : "";
-  const text = `${clock(ticket.t_start)}: ${figure(ticket.payload_kg, 0, "kg")}, ${share}, by ${ticket.by}${ticket.note ? ` (${ticket.note})` : ""}${end} `;
-  if (ticket.withdrawn) return made("li", text);
-  const button = made("button", "Withdraw");
-  button.type = "button";
-  button.setAttribute("aria-label", `Withdraw the ticket of ${clock(ticket.t_start)}`);
-  button.addEventListener("click", () => withdraw(ticket).catch((error) => write("known-said", error.message)));
-  return made("li", [made("span", text), button]);
-}
-
-async function withdraw(ticket) {
-  learn({ tickets: await change("DELETE", `${TICKETS}/${ticket.id}`, "", undefined, TICKETS) });
-  write("known-said", "Withdrawn. The calibration is made anew without it.");
-}
-
-show(({ tickets }) => {
-  if (tickets === null) return;
-  write("accuracy", `${capital(accuracy(tickets))}.${tickets.fault ? ` The last fit made no calibration: ${tickets.fault}` : ""}`);
-  element("known-teach").disabled = !tickets.is_possible;
-  element("ticket-history").hidden = tickets.history.length === 0;
-  element("ticket-entries").replaceChildren(...tickets.history.map(ticketEntry));
-}, "tickets");
-
 /** What a known load can be good for: how the dialog says it, and how the gateway is told. */
 const PURPOSES = {
   verify: {
@@ -101,12 +66,12 @@ const PURPOSES = {
     done: "The record is kept.",
   },
   teach: {
-    effect: "The calibration is made anew with it in the background, and takes effect between two drives.",
-    confirm: "Teach",
-    path: TICKETS,
-    part: "tickets",
-    claim: ([weight]) => ({ weight }),
-    done: "The ticket is kept. The calibration is being made anew.",
+    effect: "Every later estimate takes it into account, until it is taken back. One that contradicts its estimate waits for a confirmation.",
+    confirm: "State it",
+    path: KNOWN_WEIGHTS,
+    part: "knownWeights",
+    claim: ([weight]) => ({ kind: element("known-kind").value, weight }),
+    done: "Kept.",
   },
 };
 
@@ -129,6 +94,7 @@ function typed() {
     const text = element("known-form").elements[name].value;
     if (text !== "") load[name] = Number(text);
   }
+  if (element("known-form").elements.std_kg.value) load.std_kg = Number(element("known-form").elements.std_kg.value);
   if (element("known-at").value) load.at = new Date(element("known-at").value).toISOString();
   if (element("known-drive").value) load.drive = element("known-drive").value;
   return load;
@@ -144,6 +110,7 @@ function open(name) {
   write("known-effect", purpose.effect);
   write("known-confirm", purpose.confirm);
   element("known-more").hidden = name !== "verify";
+  element("known-kinds").hidden = name !== "teach";
   element("known-form").reset();
   element("known-token").hidden = !hasToken();
   say("known-refusal", "");
@@ -161,7 +128,7 @@ async function confirm(event) {
     const claim = { ...purpose.claim([...listed, typed()]), ...(note ? { note } : {}) };
     learn({ [purpose.part]: await change("POST", purpose.path, element("known-token-text").value.trim(), claim, purpose.path) });
     element("known-dialog").close();
-    write("known-said", purpose.done);
+    write(purpose === PURPOSES.teach ? "weights-said" : "known-said", purpose.done);
   } catch (error) {
     say("known-refusal", error.message);
   } finally {

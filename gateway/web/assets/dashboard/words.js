@@ -1,6 +1,7 @@
 // Numbers, times and names for people.
 
 export const UNKNOWN = "unknown";
+export const Z95 = 1.96; // standard deviations to either side of the middle 95 %
 const GLUE = "\u00a0"; // a number and its unit stay on one line
 
 export function number(x, digits) {
@@ -14,13 +15,11 @@ export const between = (bounds, digits, unit) =>
   bounds == null ? "" : `${number(bounds[0], digits)} to ${number(bounds[1], digits)}${GLUE}${unit}`;
 
 export const withStd = (x, std, digits, unit) =>
-  x == null ? UNKNOWN : `${number(x, digits)}${std == null ? "" : ` ± ${number(1.96 * std, digits)}`}${GLUE}${unit}`;
+  x == null ? UNKNOWN : `${number(x, digits)}${std == null ? "" : ` ± ${number(Z95 * std, digits)}`}${GLUE}${unit}`;
 
 const plus = (x, digits) => (Number(x.toFixed(digits)) > 0 ? "+" : "");
 
 export const signed = (x, digits, unit) => plus(x, digits) + figure(x, digits, unit);
-
-export const signedWithStd = (x, std, digits, unit) => plus(x, digits) + withStd(x, std, digits, unit);
 
 export const kmh = (mps) => figure(mps == null ? null : mps * 3.6, 0, "km/h");
 

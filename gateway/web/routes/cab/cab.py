@@ -12,10 +12,10 @@ from gateway.core.alarms.weighing import as_of_load
 from gateway.core.events import EntryKind
 from gateway.core.weights import Room, nearness, rooms_of
 from gateway.estimate import Estimate, Quantity, Weights
+from gateway.history import Reader
 from gateway.records import iso_utc
 from gateway.status import Status
 from gateway.web.live.board import Board
-from gateway.web.reader import Reader
 from gateway.web.routes.cab.shapes import Cab, CabEvent, LoadKnown, RoomLeft
 from gateway.web.routes.weights import Scales
 from gateway.web.schemas import problem_responses
@@ -89,7 +89,7 @@ def _rejected(heard: Estimate | None, shown: Estimate | None) -> list[str]:
 
 
 def _events(reader: Reader) -> tuple[str, ...]:
-    return tuple(reader.entries(kind=EntryKind.EVENT, limit=_EVENTS, newest_first=True).items)
+    return tuple(reader.page((EntryKind.EVENT,), limit=_EVENTS, newest_first=True).items)
 
 
 def _newest(texts: tuple[str, ...]) -> CabEvent | None:

@@ -1,25 +1,20 @@
-"""What can be asked about the calibration in use, and changed: its zero, and known loads held against it.
+"""What can be asked about the calibration in use, and changed: known weights, and known loads held against it.
 
 Requests with a good token come in; who keeps these things (a desk of the service) answers in JSON, blocking, from a
 thread of its own; its refusals go out as problems with a reason.
 """
 
-from gateway.web.routes.calibration.tare import NoTareDesk, TareDesk, tare_router
-from gateway.web.routes.calibration.tickets import NoTicketDesk, TicketDesk, tickets_router
-from gateway.web.routes.calibration.trend import NoTrend, TrendDesk, trend_router
+from gateway.web.routes.calibration.known_weights import KnownWeightService, NoKnownWeights, known_weights_router
+from gateway.web.routes.calibration.trend import TrendDesk, trend_router
 from gateway.web.routes.calibration.verification import NoVerificationDesk, VerificationDesk, verification_router
 
 __all__ = [
-    "NoTareDesk",
-    "NoTicketDesk",
-    "NoTrend",
+    "KnownWeightService",
+    "NoKnownWeights",
     "NoVerificationDesk",
-    "TareDesk",
-    "TicketDesk",
     "TrendDesk",
     "VerificationDesk",
-    "tare_router",
-    "tickets_router",
+    "known_weights_router",
     "trend_router",
     "verification_router",
 ]

@@ -7,7 +7,7 @@ from typing import Any, Final
 from fastapi import Request
 from starlette.responses import Response
 
-from gateway.errors import AlarmRefusedError, CommissioningRefusedError, TareRefusedError, WeightRefusedError
+from gateway.errors import AlarmRefusedError, CommissioningRefusedError, WeightRefusedError
 from gateway.web.door.problems import problem_response
 from gateway.web.schemas import problem_responses
 
@@ -18,6 +18,7 @@ _CODES: Final = {
     "not_allowed": 403,
     "no_such_line": 404,
     "no_such_alarm": 404,
+    "no_such_weight": 404,
 }  # of reasons; else 409
 
 
@@ -25,7 +26,7 @@ async def answered(request: Request, ask: Callable[[], str], status: int = 200) 
     """What ``ask`` answers, or the problem with which it refuses."""
     try:
         return json_response(await asyncio.to_thread(ask), status)
-    except (AlarmRefusedError, CommissioningRefusedError, TareRefusedError, WeightRefusedError) as refusal:
+    except (AlarmRefusedError, CommissioningRefusedError, WeightRefusedError) as refusal:
         code = _CODES.get(refusal.reason, 409)
         return problem_response(code, str(refusal), request.url.path, reason=refusal.reason)
 

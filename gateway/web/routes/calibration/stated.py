@@ -23,6 +23,14 @@ class _When(BaseModel):
         None, description="the drive before or after `at` carried it [default: whichever was weighed, if one alone was]"
     )
 
+    std_kg: float | None = Field(
+        None,
+        gt=0.0,
+        le=10_000.0,
+        allow_inf_nan=False,
+        description="standard deviation of each number that is stated [default: as usual for its kind]",
+    )
+
     def at_text(self) -> str:
         """RFC 3339; what lies beyond the years that stamps can hold is brought to their edge."""
         at_ns = time.time_ns() if self.at is None else self.at
@@ -37,7 +45,7 @@ class GrossWeight(_When):
 
     def stated(self) -> StatedWeight:
         """In the service's terms."""
-        return StatedWeight(self.at_text(), gross_kg=self.gross_kg, drive=self.drive)
+        return StatedWeight(self.at_text(), gross_kg=self.gross_kg, drive=self.drive, std_kg=self.std_kg)
 
 
 class AxleWeights(_When):
@@ -50,7 +58,11 @@ class AxleWeights(_When):
     def stated(self) -> StatedWeight:
         """In the service's terms."""
         return StatedWeight(
-            self.at_text(), front_axle_kg=self.front_axle_kg, rear_axle_kg=self.rear_axle_kg, drive=self.drive
+            self.at_text(),
+            front_axle_kg=self.front_axle_kg,
+            rear_axle_kg=self.rear_axle_kg,
+            drive=self.drive,
+            std_kg=self.std_kg,
         )
 
 
@@ -65,7 +77,26 @@ class KnownPayload(_When):
 
     def stated(self) -> StatedWeight:
         """In the service's terms."""
-        return StatedWeight(self.at_text(), payload_kg=self.payload_kg, position_m=self.position_m, drive=self.drive)
+        return StatedWeight(
+            self.at_text(),
+            payload_kg=self.payload_kg,
+            position_m=self.position_m,
+            drive=self.drive,
+            std_kg=self.std_kg,
+        )
+
+
+class StatedTold(BaseModel):
+    """What was stated of a load."""
+
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    gross_kg: float | None
+    front_axle_kg: float | None
+    rear_axle_kg: float | None
+    payload_kg: float | None
+    position_m: float | None
+    drive: Literal["before", "after"] | None
+    std_kg: float | None = Field(description="standard deviation of each number; null: as usual for its kind")
 
 
 Stated = Annotated[GrossWeight | AxleWeights | KnownPayload, Field(discriminator="by")]

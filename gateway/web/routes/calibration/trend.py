@@ -6,7 +6,6 @@ from fastapi import APIRouter, Request
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
-from gateway.records import json_line
 from gateway.web.routes.calibration.asking import answered
 
 TREND_PATH: Final = "/calibration/trend"
@@ -20,16 +19,8 @@ class TrendDesk(Protocol):
         ...
 
 
-class NoTrend:
-    """Where nobody follows them."""
-
-    def told(self) -> str:
-        """Nothing."""
-        return json_line({"calibration_id": None, "parameters": []})
-
-
 class PointTold(BaseModel):
-    """A week's mean, by the date of its Monday, or one tare."""
+    """A week's mean, by the date of its Monday, or one empty vehicle."""
 
     t: str
     number: float

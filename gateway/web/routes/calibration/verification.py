@@ -13,7 +13,7 @@ from gateway.stated_weight import StatedWeight
 from gateway.status import VerificationStatus
 from gateway.web.door.problems import problem_response
 from gateway.web.routes.calibration.asking import REFUSALS, answered, who
-from gateway.web.routes.calibration.stated import Stated
+from gateway.web.routes.calibration.stated import Stated, StatedTold
 from gateway.web.routes.calibration.verification_page import POLICY, verification_page
 from gateway.web.schemas import Body, problem_responses
 
@@ -72,18 +72,6 @@ class Rule(BaseModel):
     loads: int
 
 
-class StatedTold(BaseModel):
-    """What was stated of a load."""
-
-    at: str = Field(json_schema_extra={"format": "date-time"})
-    gross_kg: float | None
-    front_axle_kg: float | None
-    rear_axle_kg: float | None
-    payload_kg: float | None
-    position_m: float | None
-    drive: Literal["before", "after"] | None
-
-
 class AxleErrorTold(BaseModel):
     """Weighed less known."""
 
@@ -121,7 +109,7 @@ class VerificationRecord(BaseModel):
     vehicle_id: str | None
     calibration_id: str
     estimator: str
-    tare_id: str | None
+    known_weights_id: str | None = Field(description="known weights that the weighing took into account; null: none")
     rule: Rule
     loads: list[LoadTold]
     verdict: Literal["passed", "failed"]

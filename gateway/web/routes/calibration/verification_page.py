@@ -41,7 +41,7 @@ def verification_page(record: Mapping[str, Any]) -> str:
         "Permitted error": asked,
         "Estimator": record["estimator"],
         "Calibration": record["calibration_id"],
-        "Tare": record["tare_id"] or "that of the calibration",
+        "Known weights": record["known_weights_id"] or "none: by the calibration alone",
         "Record": record["id"],
     }
     parts = [
@@ -62,8 +62,8 @@ def verification_page(record: Mapping[str, Any]) -> str:
             [_load(load) for load in record["loads"]],
         ),
         *_axles(record["loads"]),
-        "<p>Known loads were held against what the vehicle weighed while it drove; nothing was learned from them. "
-        "An error is weighed less known.</p>",
+        "<p>Known loads were held against what the vehicle weighed while it drove, each without what "
+        "it knew of that very load; nothing was learned from them. An error is weighed less known.</p>",
         '<div class="sign"><p>Place, date</p><p>Name, signature</p></div>',
     ]
     head = f'<meta charset="utf-8"><title>Verification {escape(record["at"][:10])}</title><style>{_STYLE}</style>'

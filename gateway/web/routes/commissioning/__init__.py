@@ -7,7 +7,6 @@ from gateway.web.routes.commissioning.shapes import CommissioningState, LinesFou
 from gateway.web.routes.commissioning.steps import (
     COMMISSIONING_PATH,
     CommissioningDesk,
-    NoCommissioningDesk,
     commissioning_router,
 )
 
@@ -16,6 +15,5 @@ __all__ = [
     "CommissioningDesk",
     "CommissioningState",
     "LinesFound",
-    "NoCommissioningDesk",
     "commissioning_router",
 ]

@@ -6,11 +6,9 @@ from typing import Annotated, Final, Protocol
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from gateway.errors import CommissioningRefusedError
-from gateway.records import json_line
 from gateway.stated import VehicleAnswers
 from gateway.web.routes.calibration.asking import answered, json_response, who
-from gateway.web.routes.calibration.tare import UndoQuery
+from gateway.web.routes.calibration.known_weights import UndoQuery
 from gateway.web.routes.commissioning.shapes import (
     Begin,
     ChooseLine,
@@ -42,48 +40,6 @@ class CommissioningDesk(Protocol):
     def fit_now(self, by: str) -> str: ...
     def cancel(self, by: str) -> str: ...
     def undo(self, by: str, *, to_factory: bool) -> str: ...
-
-
-class NoCommissioningDesk:
-    """Where nothing is weighed nothing is calibrated."""
-
-    def told(self) -> str:
-        """Nothing, for good."""
-        nothing = dict.fromkeys(("underway", "active"))
-        flags = {"is_allowed": False, "why_not": NOT_HERE, "is_offered": False, "is_pending": False}
-        return json_line({**flags, **nothing, "history": []})
-
-    def lines(self) -> str:
-        """None."""
-        return json_line({"items": []})
-
-    def begin(self, by: str, note: str | None) -> str:
-        return self._refuse()
-
-    def upload(self, name: str, content: str, signature: str | None) -> str:
-        return self._refuse()
-
-    def choose_line(self, name: str | None, source: Source | None) -> str:
-        return self._refuse()
-
-    def state_vehicle(self, answers: VehicleAnswers) -> str:
-        return self._refuse()
-
-    def is_empty(self, by: str) -> str:
-        return self._refuse()
-
-    def fit_now(self, by: str) -> str:
-        return self._refuse()
-
-    def cancel(self, by: str) -> str:
-        return self._refuse()
-
-    def undo(self, by: str, *, to_factory: bool) -> str:
-        return self._refuse()
-
-    @staticmethod
-    def _refuse() -> str:
-        raise CommissioningRefusedError("not_allowed", NOT_HERE)
 
 
 def commissioning_router(desk: CommissioningDesk) -> APIRouter:

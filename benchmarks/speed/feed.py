@@ -1,0 +1,128 @@
+"""What `springscale feed` takes of one core, and what `springscale import` takes; on a fake device with a FIFO.
+
+python -m benchmarks.speed.feed --output docs/feed_cost.json
+"""
+
+import json
+import os
+import platform
+import struct
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import click
+import numpy as np
+
+from gateway.cli.options import FILE
+from gateway.sim.drive import rural, urban
+from gateway.sim.obstacles import UnevenRoad
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import simulate_drive
+from gateway.sim.vans import PAPER_VAN
+from gateway.workbench.phones import PHONE, write_export
+
+RATE_HZ: Final = 100.0
+SHORT_S: Final = 5.0  # the difference of the two runs is what feeding takes, without the start
+LONG_S: Final = 35.0
+MEASURED: Final = """
+import resource, sys
+from gateway.cli import main
+try:
+    main(sys.argv[1:])
+finally:
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM:"))
+    print("used", used.ru_utime + used.ru_stime, int(peak.split()[1]) / 1024, file=sys.stderr)
+"""
+
+
+def _run(*arguments: str) -> tuple[dict[str, Any], float, float]:
+    """What the command printed as JSON, its CPU seconds and its greatest memory in MB."""
+    done = subprocess.run([sys.executable, "-c", MEASURED, *arguments], capture_output=True, text=True, check=True)
+    _, cpu_s, rss_mb = done.stderr.strip().splitlines()[-1].split()
+    told: dict[str, Any] = json.loads(done.stdout)
+    return told, float(cpu_s), float(rss_mb)
+
+
+def _device(folder: Path) -> Path:
+    """A sysfs tree of a unit with six channels and a stamp, big-endian; its FIFO."""
+    device = folder / "sys/iio:device0"
+    (device / "scan_elements").mkdir(parents=True)
+    (device / "buffer").mkdir()
+    (folder / "dev").mkdir()
+    texts = {"name": "mpu6050", "buffer/enable": "0", "buffer/length": "2", "in_accel_scale": "0.000598"}
+    texts |= {"in_anglvel_scale": "0.00013316", "sampling_frequency": f"{RATE_HZ:g}"}
+    channels = [f"in_{kind}_{axis}" for kind in ("accel", "anglvel") for axis in "xyz"]
+    for index, channel in enumerate([*channels, "in_timestamp"]):
+        kind = "le:s64/64>>0" if channel == "in_timestamp" else "be:s16/16>>0"
+        for what, text in (("en", "0"), ("index", str(index)), ("type", kind)):
+            texts[f"scan_elements/{channel}_{what}"] = text
+    for path, text in texts.items():
+        (device / path).write_text(text)
+    os.mkfifo(folder / "dev/iio:device0")
+    return folder / "dev/iio:device0"
+
+
+def _write_samples(fifo: Path) -> None:
+    """A sample every hundredth of a second until nobody reads."""
+    with fifo.open("wb", buffering=0) as file:
+        begun_s, begun_ns = time.monotonic(), time.time_ns()
+        i = 0
+        while True:
+            stamp = begun_ns + round(i * 1e9 / RATE_HZ)
+            words = struct.pack(">6h", i % 50, 0, 16_400 + i % 97, i % 31, i % 17, 0)
+            try:
+                file.write(words + b"\0" * 4 + struct.pack("<q", stamp))
+            except BrokenPipeError:
+                return
+            i += 1
+            time.sleep(max(0.0, begun_s + i / RATE_HZ - time.monotonic()))
+
+
+def _feed(for_s: float) -> tuple[dict[str, Any], float, float]:
+    with TemporaryDirectory() as folder:
+        writer = threading.Thread(target=_write_samples, args=(_device(Path(folder)),), daemon=True)
+        writer.start()
+        options = ["--interface", "virtual", "--channel", "bench", "--gpsd", "", "--for-s", str(for_s), "--json"]
+        return _run("feed", *options, "--sysfs", f"{folder}/sys", "--nodes", f"{folder}/dev")
+
+
+def _import() -> dict[str, float]:
+    rng = np.random.default_rng(1)
+    drive = urban(300.0, rng).then(rural(600.0, rng))
+    road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
+    with TemporaryDirectory() as folder:
+        export = Path(folder) / "phone.zip"
+        write_export(simulate_drive(PAPER_VAN, (), road, drive, PHONE, 1).recording, export, "sensor_logger_android")
+        begun_s = time.perf_counter()
+        told, _, rss_mb = _run("import", str(export), f"{folder}/drive.log", "--json")
+        return {"drive_s": told["duration_s"], "seconds": time.perf_counter() - begun_s, "rss_mb": rss_mb}
+
+
+@click.command()
+@click.option("--output", type=FILE, default=None, help="file to write the numbers to")
+def measure(output: Path | None) -> None:
+    """Measure, print, and write where asked."""
+    _, short_cpu_s, _ = _feed(SHORT_S)
+    told, long_cpu_s, rss_mb = _feed(LONG_S)
+    found = {
+        "rate_hz": RATE_HZ,
+        "frames_per_s": told["sent"] / LONG_S,
+        "cpu_pct": 100.0 * (long_cpu_s - short_cpu_s) / (LONG_S - SHORT_S),
+        "rss_mb": rss_mb,
+        "machine": f"{platform.machine()}, Python {platform.python_version()}",
+        "import": _import(),
+    }
+    text = json.dumps(found, indent=1) + "\n"
+    if output is not None:
+        output.write_text(text, encoding="utf-8")
+    click.echo(text, nl=False)
+
+
+if __name__ == "__main__":
+    measure()

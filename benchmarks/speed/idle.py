@@ -1,0 +1,120 @@
+"""What the service costs while the vehicle is parked: processor time and disk writes of an hour, bus asleep.
+
+A thousand batches lie in the store; all of them are delivered to a broker and, as events, to nobody's webhook.
+``python -m benchmarks.speed.idle`` prints one JSON object; it wants Debian's mosquitto.
+"""
+
+import argparse
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import numpy as np
+
+from gateway.estimate import Estimate, Quantity
+from gateway.estimate_json import estimate_to_json
+from gateway.records import Spectra
+from gateway.store import Store
+
+N_BATCHES: Final = 1000
+WINDOW_NS: Final = 300 * 10**9
+SETTLE_S: Final = 40.0  # everything is delivered, and counted as delivered
+SETTINGS: Final = """
+signals = "springscale:reference"
+[vehicle]
+id = "van-17"
+[bus]
+interface = "virtual"
+channel = "idle-{port}"
+[web]
+port = {port}
+[store]
+directory = "state"
+[uplink]
+host = "127.0.0.1"
+port = {broker}
+tls = false
+[webhook]
+url = "http://127.0.0.1:9/hook"
+secret_file = "secret"
+"""
+
+
+def fill(directory: Path) -> None:
+    """Batches with spectra, as long ago as a history is."""
+    numbers = np.linspace(1.0, 15.0, 75)
+    spectra = Spectra(*[numbers] * 5)
+    store = Store.open(directory)
+    for n in range(N_BATCHES):
+        end_ns = 1_790_000_000 * 10**9 + n * WINDOW_NS
+        made = Estimate(
+            end_ns - WINDOW_NS, end_ns, "cross_spectrum", payload=Quantity.normal(300.0, 6.0), spectra=spectra
+        )
+        store.write_estimate(estimate_to_json(made))
+        if n % 100 == 99:
+            store.flush(60.0)
+    store.close()
+
+
+def cost_of(process: int) -> tuple[float, int]:
+    """Seconds of processor time and bytes that went to the disk so far."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    seconds = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    io = dict(line.split(": ") for line in Path(f"/proc/{process}/io").read_text().splitlines())
+    return seconds, int(io["write_bytes"])
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port: int = listener.getsockname()[1]
+        return port
+
+
+def measured(seconds: float) -> dict[str, float]:
+    """Start broker and service, let them settle, and look at the service's cost over so many seconds."""
+    with TemporaryDirectory(dir=Path.cwd()) as folder:
+        here, port, broker = Path(folder), free_port(), free_port()
+        (here / "mosquitto.conf").write_text(f"listener {broker} 127.0.0.1\nallow_anonymous true\n")
+        (here / "springscale.toml").write_text(SETTINGS.format(port=port, broker=broker))
+        (here / "secret").write_text("whsec_" + "A" * 40 + "\n")
+        fill(here / "state")
+        service = [sys.executable, "-m", "gateway", "run", "--config", str(here / "springscale.toml")]
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        with (
+            subprocess.Popen(["mosquitto", "-c", str(here / "mosquitto.conf")], **quiet) as mosquitto,  # type: ignore[call-overload]
+            subprocess.Popen(service, **quiet) as running,  # type: ignore[call-overload]
+        ):
+            try:
+                time.sleep(SETTLE_S)
+                with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/status") as answer:
+                    delivered = json.load(answer)["uplink"]["n_delivered"]
+                before_s, before_bytes = cost_of(running.pid)
+                time.sleep(seconds)
+                after_s, after_bytes = cost_of(running.pid)
+            finally:
+                running.terminate()
+                mosquitto.terminate()
+    per_hour = 3600.0 / seconds
+    return {
+        "n_delivered": delivered,
+        "processor_s_per_hour": round((after_s - before_s) * per_hour, 1),
+        "disk_kb_per_hour": round((after_bytes - before_bytes) * per_hour / 1e3, 1),
+    }
+
+
+def main() -> None:
+    """Print what it costs."""
+    arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    arguments.add_argument("--seconds", type=float, default=120.0, help="how long to look")
+    print(json.dumps(measured(arguments.parse_args().seconds)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""springscale calibration tare and ticket: known weights of a running service, which alone keeps them."""
+
+from typing import Any, Final
+
+import click
+
+from gateway.cli.asked.service import Service, asks_service
+from gateway.cli.asked.stated import KnownLoad
+from gateway.cli.options import as_json
+from gateway.cli.text.commission import end_text
+from gateway.errors import SpringscaleError
+from gateway.estimate import Z95
+from gateway.records import json_line
+from gateway.words import one_or_more
+
+PATH: Final = "/api/v1/known-weights"
+TARE: Final = "/api/v1/calibration/tare"
+TICKETS: Final = "/api/v1/calibration/tickets"
+KINDS: Final = ("ticket", "axle_pads", "delivery_note")
+
+
+@click.group("tare")
+def tare_commands() -> None:
+    """Tell a running service that its vehicle is empty, take that back, and see what was done."""
+
+
+@tare_commands.command("show")
+@asks_service
+@as_json
+def show_tares(service: Service, as_json: bool) -> None:
+    """What is in use, which load "it is empty now" would be of, and the history."""
+    _tell(service.ask(TARE), as_json=as_json)
+
+
+@tare_commands.command("set")
+@click.option("--empty", is_flag=True, help="you know that the vehicle is empty, and was when it was last weighed")
+@click.option("--note", default=None, help="kept in the history")
+@asks_service
+@as_json
+def set_tare(service: Service, empty: bool, note: str | None, as_json: bool) -> None:
+    """The vehicle is empty: every estimate from the next batch on takes that into account."""
+    if not empty:
+        raise click.UsageError("say --empty: a tare is for a vehicle that you know to be empty")
+    made = service.ask(TARE, "POST", {"is_empty": True} | _noted(note))
+    click.echo(json_line(made) if as_json else _entry_text(made))
+
+
+@tare_commands.command("undo")
+@click.option("--factory", is_flag=True, help="all tares")
+@asks_service
+@as_json
+def undo(service: Service, factory: bool, as_json: bool) -> None:
+    """Take the last tare back."""
+    _tell(service.ask(TARE + ("?to=factory" if factory else ""), "DELETE"), as_json=as_json)
+
+
+@click.group("ticket")
+def ticket_commands() -> None:
+    """Hand a running service known weights of loads; confirm them; take them back."""
+
+
+@ticket_commands.command("show")
+@asks_service
+@as_json
+def show_tickets(service: Service, as_json: bool) -> None:
+    """Every known weight of a load, what was estimated without it, and how far these were off."""
+    _tell(service.ask(TICKETS), as_json=as_json)
+
+
+@ticket_commands.command("add")
+@click.argument("weight", type=KnownLoad())
+@click.option("--kind", type=click.Choice(KINDS), default="ticket", show_default=True, help="where it comes from")
+@click.option("--note", default=None, help="kept with it: number of the ticket, place")
+@asks_service
+@as_json
+def add(service: Service, weight: dict[str, Any], kind: str, note: str | None, as_json: bool) -> None:
+    """Hand in WEIGHT, such as front_axle_kg=850,rear_axle_kg=1040,at=2026-11-21T04:10:00Z,drive=before."""
+    made = service.ask(PATH, "POST", {"kind": kind, "weight": weight} | _noted(note))
+    click.echo(json_line(made) if as_json else _entry_text(made))
+
+
+@ticket_commands.command("confirm")
+@click.argument("ticket_id")
+@asks_service
+@as_json
+def confirm(service: Service, ticket_id: str, as_json: bool) -> None:
+    """TICKET_ID is right although its estimate contradicts it: take it into use."""
+    _tell(service.ask(f"{PATH}/{_standing(service, ticket_id)}/confirm", "POST", {}), as_json=as_json)
+
+
+@ticket_commands.command("withdraw")
+@click.argument("ticket_id")
+@asks_service
+@as_json
+def withdraw(service: Service, ticket_id: str, as_json: bool) -> None:
+    """Take TICKET_ID back, as `show` has it, or the first letters of it: the numbers are as if it had never been."""
+    _tell(service.ask(f"{TICKETS}/{_standing(service, ticket_id)}", "DELETE"), as_json=as_json)
+
+
+def _standing(service: Service, begin: str) -> str:
+    """The one whose id begins so."""
+    ids = [one["id"] for one in service.ask(PATH)["history"] if one["ended"] is None]
+    found = [one for one in ids if one.startswith(begin) or one.removeprefix("sha256:").startswith(begin)]
+    if len(found) != 1:
+        raise SpringscaleError(f"{begin}: {len(found)} known weights begin so: `springscale calibration ticket show`")
+    return str(found[0])
+
+
+def _noted(note: str | None) -> dict[str, str]:
+    return {} if note is None else {"note": note}
+
+
+def _tell(state: dict[str, Any], *, as_json: bool) -> None:
+    click.echo(json_line(state) if as_json else _state_text(state))
+
+
+def _state_text(state: dict[str, Any]) -> str:
+    lines = [_count_text(state)]
+    offer = state["offer"]
+    if offer["is_possible"]:
+        load = offer["load"]
+        span = f"{load['t_start'][:19]}Z to {load['t_end'][:19]}Z"
+        batches = one_or_more(load["n_batches"], "batch", "batches")
+        lines.append(f"a tare now would be of {_payload(load)}, weighed {span} in {batches}")
+    else:
+        lines.append(f"no tare now ({offer['reason']}): {offer['detail']}")
+    if state["fault"]:
+        lines.append(state["fault"])
+    return "\n".join([*lines, *(f"  {_entry_text(one)}" for one in state["history"])])
+
+
+def _count_text(state: dict[str, Any]) -> str:
+    if not state["n_teaching"]:
+        return "no known weight is in use: weighed by the calibration alone"
+    scatter = "" if state["error_std_kg"] is None else f" (scatter {state['error_std_kg']:.1f} kg)"
+    known = one_or_more(state["n_teaching"], "known weight", "known weights")
+    return f"{known} in use; without them estimates were {state['mean_error_kg']:+.1f} kg off{scatter}"
+
+
+def _payload(load: dict[str, Any], name: str = "payload") -> str:
+    return f"{load[f'{name}_kg']:.1f} ± {Z95 * load[f'{name}_std_kg']:.1f} kg"
+
+
+def _entry_text(one: dict[str, Any]) -> str:
+    note = f" ({one['note']})" if one["note"] else ""
+    kind = one["kind"].replace("_", " ")
+    held = "; HELD: it contradicts the estimate, confirm it or take it back" if one["state"] == "held" else ""
+    text = f"{one['id'][:19]} {kind}: {_payload(one)} known, {_payload(one, 'estimated_payload')} estimated without it"
+    return f"{text}, driven {one['t_start'][:16]}Z, by {one['by']}{note}{held}{end_text(one['ended'])}"

@@ -1,0 +1,62 @@
+"""springscale import: a phone's recording becomes a log."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from gateway.cli.options import FILE, as_json
+from gateway.offline.phone import PHONE_AXES, Imported
+from gateway.offline.phone import import_recording as import_from
+from gateway.records import json_line
+
+
+@click.command("import")
+@click.argument("recording", type=FILE)
+@click.argument("output", type=FILE)
+@click.option(
+    "--forward",
+    type=click.Choice(list(PHONE_AXES)),
+    default=None,
+    help="the phone's axis that points ahead; y is its top edge [default: found from braking and bends]",
+)
+@click.option("--no-position", "is_without_position", is_flag=True, help="leave latitude and longitude out")
+@as_json
+def import_recording(
+    recording: Path, output: Path, forward: str | None, is_without_position: bool, as_json: bool
+) -> None:
+    """Make a log OUTPUT (.log or .log.gz) of RECORDING, a zip or folder that Sensor Logger or phyphox exported.
+
+    Turns the phone's axes to the vehicle's, and writes the signal map and database of the log beside it. Prints what
+    kept the phone from recording well, and how to mend it.
+    """
+    found, written = import_from(recording, output, forward, with_position=not is_without_position)
+    if as_json:
+        click.echo(json_line({**found.to_json(), "written": [str(path) for path in written]}))
+        return
+    click.echo("\n".join(_text(found)))
+    for path in written:
+        click.echo(f"Written: {path}")
+
+
+def _text(found: Imported) -> Iterator[str]:
+    told = found.to_json()
+    yield f"{told['app']}, {told['device']}: {found.duration_s:.0f} s taken from {told['t_start']}"
+    yield (
+        f"Accelerometer {told['accelerometer_hz']:.1f} Hz, gyroscope {told['gyroscope_hz']:.1f} Hz, "
+        f"{told['fixes']} fixes, speed {told['speed_delay_s']:.1f} s late"
+    )
+    yield f"Axes: {_axes(found)}; the sign by the {found.sign_from}"
+    for remark in found.remarks:
+        yield f"Note: {remark.text}"
+
+
+def _axes(found: Imported) -> str:
+    """Which of the phone's axes lie nearest to forward and up, and how sure that is."""
+    names = []
+    for what, row in (("ahead", found.axes.to_vehicle[0]), ("up", found.axes.to_vehicle[2])):
+        nearest = max(PHONE_AXES, key=lambda name: float(PHONE_AXES[name] @ row))
+        names.append(f"the phone's {nearest} points {what}")
+    is_named = math.isnan(found.axes.fit)
+    return " and ".join(names) + (", as named" if is_named else f" (braking and bends agree by {found.axes.fit:.2f})")

@@ -1,0 +1,72 @@
+"""Weights as SAE J1939-71 counts them: one table of parameters for the frames that are sent and the HTTP answer."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.estimate import Estimate, Weights
+
+# SAE J1939-71, table 1, numbers of two bytes
+NOT_AVAILABLE: Final = 0xFFFF
+ERROR: Final = 0xFE00  # here: more than two bytes can say, or less than nothing
+LARGEST: Final = 0xFAFF
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A two-byte parameter: kilograms a bit, offset 0. ``signal`` is its name in dbc/j1939_weights.dbc."""
+
+    pgn: int
+    spn: int
+    name: str
+    kg_per_bit: float
+    signal: str
+
+
+AXLE_WEIGHT: Final = Parameter(65258, 582, "Axle Weight", 0.5, "AxleWeight")
+CARGO_WEIGHT: Final = Parameter(65258, 181, "Cargo Weight", 2.0, "CargoWeight")
+POWERED_WEIGHT: Final = Parameter(65136, 1585, "Powered Vehicle Weight", 10.0, "PoweredVehicleWeight")
+GROSS_WEIGHT: Final = Parameter(65136, 1760, "Gross Combination Vehicle Weight", 10.0, "GrossCombinationVehicleWeight")
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """One parameter as it stands on the wire. ``axle`` counts from 1 at the front, None for the vehicle."""
+
+    parameter: Parameter
+    axle: int | None
+    raw: int
+
+    @property
+    def kg(self) -> float | None:
+        """None where the count is no weight."""
+        return None if self.raw > LARGEST else self.raw * self.parameter.kg_per_bit
+
+
+def counts_of(shown: Estimate | None, weights: Weights, *, draws_trailers: bool) -> list[Count]:
+    """Every parameter of an estimate and its ``weights``; what is not known is "not available".
+
+    An early look at a batch is not told: J1939 has no word for "provisional". A payload that an estimate finds a little
+    below nothing is 0. What a vehicle draws its springs do not tell: with ``draws_trailers`` the combination's weight
+    stays unknown.
+    """
+    is_told = shown is not None and not shown.is_provisional
+    payload_kg = shown.payload.number if shown is not None else math.nan
+    gross_kg = weights.gross.kg
+    found = (
+        (AXLE_WEIGHT, 1, weights.front_axle.kg),
+        (AXLE_WEIGHT, 2, weights.rear_axle.kg),
+        (CARGO_WEIGHT, None, 0.0 if payload_kg < 0.0 else payload_kg),
+        (POWERED_WEIGHT, None, gross_kg),
+        (GROSS_WEIGHT, None, math.nan if draws_trailers else gross_kg),
+    )
+    return [
+        Count(parameter, axle, _raw(kg if is_told else math.nan, parameter.kg_per_bit)) for parameter, axle, kg in found
+    ]
+
+
+def _raw(kg: float, kg_per_bit: float) -> int:
+    if math.isnan(kg):
+        return NOT_AVAILABLE
+    raw = kg / kg_per_bit
+    return round(raw) if math.isfinite(raw) and 0 <= round(raw) <= LARGEST else ERROR

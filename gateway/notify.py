@@ -1,0 +1,42 @@
+"""systemd's readiness protocol (sd_notify(3)): datagrams to NOTIFY_SOCKET, never blocking."""
+
+import os
+import socket
+import time
+
+
+class Notifier:
+    """Tells systemd how the service is. Silent where NOTIFY_SOCKET is not set."""
+
+    def __init__(self, environment: os._Environ[str] | dict[str, str] = os.environ) -> None:
+        address = environment.get("NOTIFY_SOCKET", "")
+        self._address = "\0" + address[1:] if address.startswith("@") else address
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) if address else None
+        self.n_unsent = 0
+        self._status = ""
+
+    def send_status(self, sentence: str) -> None:
+        """What `systemctl status` shows, where it is another than before."""
+        if sentence != self._status:
+            self._status = sentence
+            self.send(STATUS=sentence)
+
+    def send(self, **fields: str) -> None:
+        """One datagram, e.g. READY="1". A full or vanished socket is counted, never waited for."""
+        if self._socket is None:
+            return
+        text = "\n".join(f"{key}={said}" for key, said in fields.items())
+        try:
+            self._socket.sendto(text.encode(), self._address)
+        except OSError:
+            self.n_unsent += 1
+
+    def send_reloading(self) -> None:
+        """A reload begins; READY="1" ends it."""
+        self.send(RELOADING="1", MONOTONIC_USEC=str(time.monotonic_ns() // 1000))
+
+    def close(self) -> None:
+        """Give the socket back."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None

@@ -1,0 +1,212 @@
+"""The bounded memory between those who write and the disk; it gives the numbers, and wakes whoever follows."""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from gateway.history import KINDS
+from gateway.store.rows import DeliveryRow, DocumentRow, JournalRow, Row
+
+SEQ_STRIDE: Final = 1 << 20  # each opening of a database begins a new stride
+RECENT: Final = 16  # records on disk that stay in memory: whoever follows closely needs no disk
+
+
+@dataclass(frozen=True, slots=True)
+class InMemory:
+    """All records behind number ``floor`` as they are in memory at one moment, oldest first."""
+
+    epoch: str
+    floor: int
+    head: int  # the newest number given
+    rows: tuple[JournalRow, ...]
+
+
+class WriteBuffer:
+    """Rows accepted but not yet on disk, oldest first, and the numbers of all records. Thread-safe.
+
+    While the disk works a row stays here for milliseconds; while it refuses, this is the memory the store degrades to.
+    Over ``capacity`` the oldest row that is not just being written gives way and is counted.
+
+    One lock gives numbers and publishes: a record is visible to every follower with the number it has, in order.
+    ``epoch`` and number make the cursor of a record. Numbers go up and are never used twice within an epoch, not even
+    after a kill that lost records somebody has read: each opening jumps to a new stride.
+    """
+
+    def __init__(self, capacity: int, epoch: str) -> None:
+        self._capacity = capacity
+        self._changed = threading.Condition()
+        self._waiting: deque[Row] = deque()
+        self._in_flight: tuple[Row, ...] = ()
+        self._recent: deque[JournalRow] = deque()
+        self._is_at_work = False
+        self._listeners: dict[object, Callable[[], None]] = {}
+        self._newest: dict[str, int] = {}
+        self._rebased: tuple[str, Mapping[int, int]] = ("", {})
+        self._epoch = epoch
+        self._number_behind(0, 0)
+        self.n_dropped = 0
+
+    @property
+    def epoch(self) -> str:
+        return self._epoch
+
+    def rebase(self, epoch: str, last_seq: int, last_batch: int, newest: Mapping[str, int]) -> None:
+        """Go on in a database that was found later, behind what it already holds."""
+        with self._changed:
+            before, first_seq = self._epoch, last_seq
+            self._epoch, self._newest = epoch, dict(newest)
+            self._number_behind(last_seq, last_batch)
+            moved = {0: first_seq}
+            kept: deque[Row] = deque()
+            for row in self._waiting:
+                if isinstance(row, DeliveryRow):  # in numbers that are void now
+                    continue
+                if isinstance(row, JournalRow):
+                    again = self._numbered(row)
+                    moved[row.seq], row = again.seq, again  # noqa: PLW2901 - the same record under its new number
+                kept.append(row)
+            self._waiting = kept
+            self._rebased = (before, moved)
+
+    def place_of(self, epoch: str, seq: int) -> int | None:
+        """Where a place of the epoch before ``rebase`` is now; None for any other epoch."""
+        with self._changed:
+            before, moved = self._rebased
+            if epoch != before:
+                return None
+            return moved[max((known for known in moved if known <= seq), default=0)]
+
+    def append(self, row: JournalRow) -> str:
+        """Accept a record under the next number, which replaces ``seq`` of the given row -> its cursor."""
+        with self._changed:
+            numbered = self._numbered(row)
+            self._add(numbered)
+            for on_news in self._listeners.values():
+                on_news()
+            return f"{self._epoch}-{numbered.seq}"
+
+    def add(self, document: DocumentRow) -> None:
+        """Accept a document."""
+        with self._changed:
+            self._add(document)
+
+    def add_delivery(self, name: str, cursor: str) -> bool:
+        """Accept how far an uplink has delivered, in place of what waits of it; False for another epoch's cursor."""
+        with self._changed:
+            epoch, _, digits = cursor.partition("-")
+            if epoch != self._epoch:
+                return False
+            newest = DeliveryRow(name, int(digits))
+            self._waiting = deque(
+                row for row in self._waiting if not (isinstance(row, DeliveryRow) and row.name == newest.name)
+            )
+            self._add(newest)
+            return True
+
+    def listen(self, key: object, on_news: Callable[[], None]) -> None:
+        """Call ``on_news`` with each record that is accepted, until ``unlisten``."""
+        with self._changed:
+            self._listeners[key] = on_news
+
+    def unlisten(self, key: object) -> None:
+        with self._changed:
+            self._listeners.pop(key, None)
+
+    def newest(self, kinds: Sequence[str]) -> int:
+        """The newest number given to any of these kinds, 0 where there is none."""
+        with self._changed:
+            return max((self._newest.get(kind, 0) for kind in kinds), default=0)
+
+    def head(self) -> str:
+        """Cursor of the newest record."""
+        with self._changed:
+            return f"{self._epoch}-{self._next_seq - 1}"
+
+    def in_memory(self) -> InMemory:
+        """The newest records, on disk or not."""
+        with self._changed:
+            held = (row for row in (*self._in_flight, *self._waiting) if isinstance(row, JournalRow))
+            return InMemory(self._epoch, self._floor, self._next_seq - 1, (*self._recent, *held))
+
+    def held(self) -> tuple[str, tuple[JournalRow, ...]]:
+        """The epoch and the records not yet on disk, oldest first."""
+        with self._changed:
+            rows = (*self._in_flight, *self._waiting)
+            return self._epoch, tuple(row for row in rows if isinstance(row, JournalRow))
+
+    def wait_for_rows(self, timeout_s: float, has_other_work: Callable[[], bool]) -> None:
+        """Sleep until a row waits, ``wake`` finds other work, or the time is out."""
+        with self._changed:
+            self._changed.wait_for(lambda: bool(self._waiting) or has_other_work(), timeout_s)
+
+    def take(self) -> tuple[Row, ...]:
+        """All that waits, now in flight: end with ``settle`` or ``give_back``, and then ``rest``."""
+        with self._changed:
+            self._is_at_work = True
+            self._in_flight = tuple(self._waiting)
+            self._waiting.clear()
+            return self._in_flight
+
+    def settle(self, stored: Sequence[JournalRow] = ()) -> None:
+        """What was in flight is on disk; ``stored`` are the records of it that are new there."""
+        with self._changed:
+            self._in_flight = ()
+            self._recent.extend(stored)
+            while len(self._recent) > RECENT:
+                self._floor = self._recent.popleft().seq
+
+    def rest(self) -> None:
+        """Nothing is done to the disk until rows wait again or other work is found."""
+        with self._changed:
+            self._is_at_work = False
+            self._changed.notify_all()
+
+    def give_back(self) -> None:
+        """What was in flight could not be written: it waits again, in its old order."""
+        with self._changed:
+            self._waiting.extendleft(reversed(self._in_flight))
+            self._in_flight = ()
+            self._drop_over_capacity()
+
+    def wake(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def wait_until_empty(self, timeout_s: float) -> bool:
+        """True once all is on disk and the disk is left alone."""
+        with self._changed:
+            return self._changed.wait_for(
+                lambda: not self._waiting and not self._in_flight and not self._is_at_work, timeout_s
+            )
+
+    def __len__(self) -> int:
+        with self._changed:
+            return len(self._in_flight) + len(self._waiting)
+
+    def _add(self, row: Row) -> None:
+        self._waiting.append(row)
+        self._drop_over_capacity()
+        self._changed.notify_all()
+
+    def _drop_over_capacity(self) -> None:
+        while self._waiting and len(self._in_flight) + len(self._waiting) > self._capacity:
+            self._waiting.popleft()
+            self.n_dropped += 1
+
+    def _number_behind(self, last_seq: int, last_batch: int) -> None:
+        """The next number is the first of the stride behind ``last_seq``."""
+        self._floor, self._last_batch = last_seq, last_batch
+        self._next_seq = (last_seq // SEQ_STRIDE + 1) * SEQ_STRIDE
+
+    def _numbered(self, row: JournalRow) -> JournalRow:
+        """The row with the next number; a batch is linked to the one accepted before it."""
+        seq, self._next_seq = self._next_seq, self._next_seq + 1
+        self._newest[row.kind] = seq
+        is_batch = row.kind in KINDS and not KINDS[row.kind].is_revised
+        previous = self._last_batch if is_batch else 0
+        if is_batch:
+            self._last_batch = seq
+        record_id = row.id or f"{row.kind}-{seq}"
+        return replace(row, seq=seq, previous=previous, id=record_id)

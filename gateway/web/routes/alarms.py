@@ -1,0 +1,102 @@
+"""/api/v1/alarms: who must know what, since when, and who has seen it."""
+
+import asyncio
+from typing import Annotated, Final, Literal, Protocol
+
+from fastapi import APIRouter, Path, Query, Request
+from pydantic import BaseModel, Field
+from starlette.responses import Response
+
+from gateway.history import ALARM, Reader
+from gateway.web.routes.calibration.asking import answered, who
+from gateway.web.routes.estimates import HistoryQuery
+from gateway.web.routes.events import entries_of
+from gateway.web.schemas import Body, problem_responses
+
+
+class AlarmDesk(Protocol):
+    """Who keeps the alarms. Blocking calls, each from a thread of its own; answers are JSON as described below."""
+
+    def standing(self) -> str:
+        """An array of Alarm, the worst first."""
+        ...
+
+    def acknowledge(self, alarm_id: str, by: str, note: str | None) -> str:
+        """The Alarm after it. Raises AlarmRefusedError."""
+        ...
+
+
+class AlarmStep(BaseModel):
+    """When an alarm came to a state, and on what; null is unknown, or nothing of the kind."""
+
+    state: Literal["early", "final", "cleared"]
+    t: str = Field(json_schema_extra={"format": "date-time"})
+    probability: float | None = Field(description="that the limit is passed, 0 to 1", examples=[0.971])
+    found: float | None = Field(examples=[2561.3])
+    std: float | None = Field(examples=[14.2])
+    limit: float | None = Field(examples=[2500.0])
+    unit: str | None = Field(examples=["kg"])
+    detail: str | None
+
+
+class AlarmSeen(BaseModel):
+    """Who has seen it."""
+
+    by: str = Field(description="name of the token; `local` where none are in use", examples=["yard"])
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    note: str | None
+
+
+class Alarm(BaseModel):
+    """One alarm in its last revision."""
+
+    id: str = Field(examples=["alarm-1790000300000000000-9f86d081884c"])
+    revision: int = Field(description="rises with each step and with the acknowledgement")
+    vehicle_id: str | None
+    kind: Literal["overload", "imbalance", "sensor_fault", "drift", "no_estimate"]
+    where: str | None = Field(description="on the vehicle, or in what", examples=["rear_axle"])
+    state: Literal["early", "final", "cleared"]
+    is_active: bool
+    t_start: str = Field(json_schema_extra={"format": "date-time"})
+    t_end: str | None = Field(description="null: it stands")
+    sentence: str = Field(examples=["The vehicle weighs 2561 +- 28 kg, 2500 kg are permitted (confirmed)"])
+    steps: list[AlarmStep] = Field(description="what became of it, oldest first")
+    acknowledged: AlarmSeen | None
+
+
+class AlarmsPage(BaseModel):
+    """Those that stand now, the worst first, and a piece of the history in the order of last revisions."""
+
+    active: list[Alarm]
+    items: list[Alarm]
+    next_cursor: str | None
+    last_cursor: str | None
+
+
+class Acknowledgement(Body):
+    """A word to it."""
+
+    note: str = Field("", max_length=200, description="kept with the alarm; left out: none is")
+
+
+AlarmId = Annotated[str, Path(max_length=100, examples=["alarm-1790000300000000000-9f86d081884c"])]
+_REFUSALS: Final = problem_responses(400, 404, 409, 422, 503)
+
+
+def alarms_router(reader: Reader, desk: AlarmDesk) -> APIRouter:
+    """The routes of the alarms."""
+    router = APIRouter(prefix="/api/v1", tags=["alarms"])
+
+    @router.get("/alarms", response_model=AlarmsPage, responses=problem_responses(422, 503))
+    async def alarms(query: Annotated[HistoryQuery, Query()]) -> Response:
+        """What stands, and what stood. One that changes comes again, behind all that was there: follow next_cursor."""
+        history = await entries_of(reader, ALARM, query)
+        standing = await asyncio.to_thread(desk.standing)
+        return Response(f'{{"active":{standing},{history}', media_type="application/json")
+
+    @router.post("/alarms/{alarm_id}/acknowledgement", response_model=Alarm, responses=_REFUSALS)
+    async def acknowledge(request: Request, alarm_id: AlarmId, said: Acknowledgement) -> Response:
+        """You have seen it: kept with your token's name and the time, and told to whoever is told of the alarm."""
+        return await answered(request, lambda: desk.acknowledge(alarm_id, who(request), said.note or None))
+
+    return router

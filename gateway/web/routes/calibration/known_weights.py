@@ -1,0 +1,269 @@
+"""/api/v1/known-weights: what somebody knows of a load conditions every later estimate, until it is taken back.
+
+``/calibration/tare`` and ``/calibration/tickets`` are the same list, of one kind each.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Final, Literal, Protocol
+
+from fastapi import APIRouter, Path, Query, Request
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from starlette.responses import Response
+
+from gateway.core.known_weights import KnownWeightKind
+from gateway.errors import WeightRefusedError
+from gateway.records import json_line
+from gateway.stated_weight import StatedWeight
+from gateway.web.routes.calibration.asking import REFUSALS, answered, who
+from gateway.web.routes.calibration.stated import Stated, StatedTold
+from gateway.web.schemas import Body, problem_responses
+
+KNOWN_WEIGHTS_PATH: Final = "/known-weights"
+TARE_PATH: Final = "/calibration/tare"
+TICKETS_PATH: Final = "/calibration/tickets"
+EMPTY: Final = (KnownWeightKind.EMPTY,)
+WEIGHED: Final = tuple(kind for kind in KnownWeightKind if kind is not KnownWeightKind.EMPTY)
+_NO_CALIBRATION: Final = ("no_calibration", "there is no calibration, and so nothing to correct")
+_NO_SUCH: Final = ("no_such_weight", "there is no such known weight that still stands")
+
+
+class KnownWeightService(Protocol):
+    """Who keeps them. Blocking calls, each from a thread of its own; answers are JSON as described below."""
+
+    def state(self, kinds: Sequence[KnownWeightKind] = ...) -> str:
+        """A KnownWeightState."""
+        ...
+
+    def add(self, kind: KnownWeightKind, by: str, note: str | None, stated: StatedWeight | None = None) -> str:
+        """The new KnownWeightEntry; nothing stated: the vehicle is empty now. Raises WeightRefusedError."""
+        ...
+
+    def confirm(self, by: str, entry_id: str) -> str:
+        """The KnownWeightState after it. Raises WeightRefusedError."""
+        ...
+
+    def take_back(self, by: str, entry_id: str, kinds: Sequence[KnownWeightKind] = ...) -> str:
+        """The KnownWeightState after it. Raises WeightRefusedError."""
+        ...
+
+    def take_back_empty(self, by: str, *, to_factory: bool) -> str:
+        """The KnownWeightState after it, of this kind. Raises WeightRefusedError."""
+        ...
+
+
+class NoKnownWeights:
+    """Where nothing is weighed there is nothing to condition."""
+
+    def state(self, kinds: Sequence[KnownWeightKind] = ()) -> str:
+        """An empty list."""
+        offer = {"is_possible": False, "reason": _NO_CALIBRATION[0], "detail": _NO_CALIBRATION[1], "load": None}
+        known = {"known_weights_id": None, "n_teaching": 0, "mean_error_kg": None, "error_std_kg": None}
+        return json_line({**known, "offer": offer, "fault": None, "history": []})
+
+    def add(self, kind: KnownWeightKind, by: str, note: str | None, stated: StatedWeight | None = None) -> str:
+        """Always refused."""
+        raise WeightRefusedError(*_NO_CALIBRATION)
+
+    def confirm(self, by: str, entry_id: str) -> str:
+        """Always refused."""
+        raise WeightRefusedError(*_NO_SUCH)
+
+    def take_back(self, by: str, entry_id: str, kinds: Sequence[KnownWeightKind] = ()) -> str:
+        """Always refused."""
+        raise WeightRefusedError(*_NO_SUCH)
+
+    def take_back_empty(self, by: str, *, to_factory: bool) -> str:
+        """Always refused."""
+        raise WeightRefusedError(*_NO_SUCH)
+
+
+Note = Annotated[
+    str, Field(max_length=200, description="kept in the history: number of the ticket, scales used, place")
+]
+
+
+class KnownWeightRequest(Body):
+    """What is known, and of what kind."""
+
+    note: Note = ""
+    kind: KnownWeightKind = Field(description="`empty`: it is empty now, and was so while it was last weighed")
+    weight: Stated | None = Field(None, description="not for `empty`; of both axles for `axle_pads`")
+
+    @model_validator(mode="after")
+    def _fits(self) -> "KnownWeightRequest":
+        if (self.kind is KnownWeightKind.EMPTY) != (self.weight is None):
+            raise ValueError("`empty` has no weight, and every other kind has one")
+        if self.kind is KnownWeightKind.AXLE_PADS and self.weight is not None and self.weight.by != "axles":
+            raise ValueError("axle_pads weigh both axles: give front_axle_kg and rear_axle_kg")
+        return self
+
+
+class TareRequest(Body):
+    """The claim that makes a tare."""
+
+    note: Note = ""
+    is_empty: Literal[True] = Field(
+        description="you know that the vehicle is empty, and was so while it was last weighed (`offer` says when)"
+    )
+
+
+class TicketRequest(Body):
+    """The weight on the ticket."""
+
+    note: Note = ""
+    weight: Stated
+
+
+class EndingTold(BaseModel):
+    """When, by whom and why a known weight was taken back."""
+
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    by: str
+    why: Literal["withdrawn", "back_to_factory"]
+
+
+class ConfirmationTold(BaseModel):
+    """When and by whom a held known weight was confirmed."""
+
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    by: str
+
+
+class KnownWeightEntry(BaseModel):
+    """One known weight: what is true of a load, and what was estimated of it without this entry."""
+
+    id: str = Field(examples=["sha256:9f86d081"])
+    kind: KnownWeightKind
+    state: Literal["in_use", "held", "ended", "other_calibration"] = Field(
+        description="held: its estimate contradicts it by more than three standard deviations; it counts once confirmed"
+    )
+    at: str = Field(json_schema_extra={"format": "date-time"}, description="when it was stated")
+    by: str = Field(description="name of the token; `local` where none are in use", examples=["workshop"])
+    note: str | None
+    vehicle_id: str | None
+    calibration_id: str = Field(description="it belongs to this calibration")
+    estimator: str
+    t_start: str = Field(description="of the load that it is of")
+    t_end: str
+    batch_ids: list[str] = Field(description="the newest of the batches it rests on, newest last")
+    n_batches: int
+    stated: StatedTold | None = Field(description="null: the vehicle was empty")
+    payload_kg: float = Field(examples=[270.0])
+    payload_std_kg: float = Field(description="of the scale or the paper", examples=[5.0])
+    front_share_pct: float | None = Field(description="null: nobody stated where the load lies")
+    front_share_std_pct: float | None
+    estimated_payload_kg: float = Field(description="without it, by what was known before", examples=[276.0])
+    estimated_payload_std_kg: float
+    is_contradicted: bool
+    confirmed: ConfirmationTold | None
+    ended: EndingTold | None
+
+
+class OfferedLoad(BaseModel):
+    """The load that was weighed last, as it is estimated now."""
+
+    payload_kg: float
+    payload_std_kg: float
+    front_share_pct: float
+    front_share_std_pct: float
+    n_batches: int
+    t_start: str
+    t_end: str
+
+
+class Offer(BaseModel):
+    """Whether "it is empty now" is possible, and of which load; else why not."""
+
+    is_possible: bool
+    reason: str | None = Field(examples=["no_counted_batch"])
+    detail: str | None
+    load: OfferedLoad | None
+
+
+class KnownWeightState(BaseModel):
+    """Every known weight, newest first, and what they teach together."""
+
+    known_weights_id: str | None = Field(description="hash of those in use, as estimates name it; null: there are none")
+    n_teaching: int
+    mean_error_kg: float | None = Field(description="estimated without it less known: mean over those in use")
+    error_std_kg: float | None = Field(description="scatter of these errors; null with fewer than two")
+    offer: Offer
+    fault: str | None = Field(description="what is wrong with the file")
+    history: list[KnownWeightEntry]
+
+
+class UndoQuery(BaseModel):
+    """How far to go back."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    to: Literal["previous", "factory"] = Field("previous", description="the last one, or all of them")
+
+
+EntryId = Annotated[str, Path(max_length=80, description="as the history has it")]
+_ADDED: Final = {**REFUSALS, **problem_responses(400, 422)}
+_CHANGED: Final = {**REFUSALS, **problem_responses(404, 422)}
+
+
+def known_weights_router(service: KnownWeightService) -> APIRouter:
+    """The routes of known weights, and those of tare and tickets, which are kinds of them."""
+    router = APIRouter(prefix="/api/v1", tags=["calibration"])
+
+    @router.get(KNOWN_WEIGHTS_PATH, response_model=KnownWeightState)
+    async def known_weights(request: Request) -> Response:
+        """Every known weight, what they teach together, and the load that "it is empty now" would be of."""
+        return await answered(request, service.state)
+
+    @router.post(KNOWN_WEIGHTS_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
+    async def add_known_weight(request: Request, claim: KnownWeightRequest) -> Response:
+        """State what is known of a load: it counts from the next batch on. On disk when answered.
+
+        One that its estimate contradicts is kept as `held` and counts once somebody confirms it.
+        """
+        stated = None if claim.weight is None else claim.weight.stated()
+        return await answered(request, lambda: service.add(claim.kind, who(request), claim.note or None, stated), 201)
+
+    @router.post(KNOWN_WEIGHTS_PATH + "/{entry_id}/confirm", response_model=KnownWeightState, responses=_CHANGED)
+    async def confirm_known_weight(request: Request, entry_id: EntryId) -> Response:
+        """Take a held one into use: both numbers were seen, and the known one is right."""
+        return await answered(request, lambda: service.confirm(who(request), entry_id))
+
+    @router.delete(KNOWN_WEIGHTS_PATH + "/{entry_id}", response_model=KnownWeightState, responses=_CHANGED)
+    async def take_back_known_weight(request: Request, entry_id: EntryId) -> Response:
+        """Take one back: from the next batch on all numbers are as if it had never been stated."""
+        return await answered(request, lambda: service.take_back(who(request), entry_id))
+
+    @router.get(TARE_PATH, response_model=KnownWeightState)
+    async def tare_state(request: Request) -> Response:
+        """The known weights of kind `empty`."""
+        return await answered(request, lambda: service.state(EMPTY))
+
+    @router.post(TARE_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
+    async def set_tare(request: Request, claim: TareRequest) -> Response:
+        """It is empty now: the same as a known weight of kind `empty`."""
+        return await answered(request, lambda: service.add(EMPTY[0], who(request), claim.note or None), 201)
+
+    @router.delete(TARE_PATH, response_model=KnownWeightState, responses=_CHANGED)
+    async def undo_tare(request: Request, query: Annotated[UndoQuery, Query()]) -> Response:
+        """Take the last known weight of kind `empty` back, or all of them."""
+        return await answered(request, lambda: service.take_back_empty(who(request), to_factory=query.to == "factory"))
+
+    @router.get(TICKETS_PATH, response_model=KnownWeightState)
+    async def ticket_state(request: Request) -> Response:
+        """The known weights of loads: tickets, axle pads and delivery notes."""
+        return await answered(request, lambda: service.state(WEIGHED))
+
+    @router.post(TICKETS_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
+    async def add_ticket(request: Request, claim: TicketRequest) -> Response:
+        """A weighbridge's ticket: the same as a known weight of kind `ticket`."""
+        stated = claim.weight.stated()
+        return await answered(
+            request, lambda: service.add(KnownWeightKind.TICKET, who(request), claim.note or None, stated), 201
+        )
+
+    @router.delete(TICKETS_PATH + "/{entry_id}", response_model=KnownWeightState, responses=_CHANGED)
+    async def withdraw_ticket(request: Request, entry_id: EntryId) -> Response:
+        """Take a ticket back."""
+        return await answered(request, lambda: service.take_back(who(request), entry_id, WEIGHED))
+
+    return router

@@ -1,0 +1,113 @@
+"""A real Home Assistant beside a real broker: a vehicle appears there, fills, and is seen to be away.
+
+Runs where `hass` and mosquitto are found (support.parts); docs/real-parts.md says which versions it was run with, and
+how they are installed.
+"""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from support.broker import Broker, needs_mosquitto, running_broker
+from support.estimates import make_estimate
+from support.home_assistant import HomeAssistant
+from support.parts import needs
+from support.patience import wait_until
+
+from gateway.config import VehicleSection
+from gateway.config.outward import UplinkSection
+from gateway.estimate import Weight, Weights
+from gateway.estimate_json import estimate_to_json
+from gateway.store import Store
+from gateway.uplink import Outbox, Uplink, uplink_settings
+
+pytestmark = [needs("hass"), needs_mosquitto]
+
+BIRTH = {"vehicle_id": "van-17", "vin": "WVWZZZ1KZAW000001", "version": "1.2.3", "estimator": "cross_spectrum"}
+PAYLOAD, OVERLOAD = "sensor.van_17_payload", "binary_sensor.van_17_overload"
+HEAVY = Weights(gross=Weight(2600.4, 8.0, 2500.0, None), front_axle=Weight(1200.2, 6.0, None, None))
+
+
+@contextmanager
+def vehicle(store: Store, broker: Broker) -> Iterator[Uplink]:
+    """The product's own uplink, as the service starts it."""
+    section = UplinkSection(host="127.0.0.1", port=broker.port, tls=False, home_assistant="homeassistant")
+    settings = uplink_settings(section, VehicleSection(id="van-17"))
+    assert settings is not None
+    uplink = Uplink(settings, Outbox(store.reader(), store, "fleet"), BIRTH)
+    uplink.start()
+    try:
+        yield uplink
+    finally:
+        uplink.stop()
+
+
+def weighed_until_shown(assistant: HomeAssistant, store: Store, first: int, weights: Weights | None = None) -> int:
+    """Batch after batch until Home Assistant shows the newest; the number of that one.
+
+    Home Assistant subscribes to a vehicle's topics some seconds after it has shown its entities.
+    """
+    newest = first
+    for newest in range(first, first + 30):
+        found = make_estimate(newest)
+        store.write_estimate(estimate_to_json(replace(found, weights=weights) if weights else found))
+        end_s = time.monotonic() + 2.0
+        while time.monotonic() < end_s:
+            if assistant.state(PAYLOAD) == f"{100.0 + newest}":
+                return newest
+            time.sleep(0.1)
+    raise AssertionError(f"{assistant.state(PAYLOAD)} is shown and not {100.0 + newest}: {assistant.log}")
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[HomeAssistant, Broker]]:
+    folder = tmp_path_factory.mktemp("home")
+    with running_broker(folder) as broker, HomeAssistant(folder / "config") as assistant:
+        assistant.add_broker(broker.port)
+        yield assistant, broker
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    opened = Store.open(tmp_path / "state")
+    yield opened
+    opened.close()
+
+
+def test_a_vehicle_appears_fills_and_is_seen_to_be_away(home: tuple[HomeAssistant, Broker], store: Store) -> None:
+    assistant, broker = home
+    with vehicle(store, broker):
+        assert wait_until(lambda: PAYLOAD in assistant.states("van_17")), assistant.log
+        weighed_until_shown(assistant, store, 3, HEAVY)
+        states = assistant.states("van_17")
+        assert len(states) == 9
+        assert states["sensor.van_17_gross_weight"]["state"] == "2600.4"
+        assert states[OVERLOAD]["state"] == "on"
+        assert states["sensor.van_17_rear_axle"]["state"] == "unknown"  # which is not 0
+        payload = states[PAYLOAD]["attributes"]
+        assert (payload["unit_of_measurement"], payload["device_class"]) == ("kg", "weight")
+    # switched off: every entity says so, and no old number stands there as if it were today's
+    assert wait_until(lambda: {one["state"] for one in assistant.states("van_17").values()} == {"unavailable"})
+
+
+def test_it_comes_back_after_a_restart_of_home_assistant(home: tuple[HomeAssistant, Broker], store: Store) -> None:
+    assistant, broker = home
+    with vehicle(store, broker):
+        last = weighed_until_shown(assistant, store, 40)
+        assistant.restart()
+        assert wait_until(lambda: PAYLOAD in assistant.states("van_17")), assistant.log
+        weighed_until_shown(assistant, store, last + 1)
+
+
+@pytest.mark.xfail(reason="estimates are not retained at the broker: a parked van is unknown until its next drive")
+def test_a_parked_van_keeps_its_weight_over_a_restart(home: tuple[HomeAssistant, Broker], store: Store) -> None:
+    assistant, broker = home
+    with vehicle(store, broker):
+        last = weighed_until_shown(assistant, store, 80)
+        assistant.restart()
+        assert wait_until(lambda: assistant.state(PAYLOAD) not in (None, "unavailable"))
+        time.sleep(10.0)  # what is retained at the broker arrives once Home Assistant has subscribed
+        assert assistant.state(PAYLOAD) == f"{100.0 + last}"

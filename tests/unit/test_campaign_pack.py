@@ -1,0 +1,150 @@
+"""springscale campaign pack: a campaign as one archive, which calibrate and evaluate take as they take the folder."""
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from support.known_load_logs import write_known_loads
+
+from gateway.bus.frames import merge_frames
+from gateway.bus.logs import open_whole_log, write_candump
+from gateway.bus.signals import Encoder, load_signal_map
+from gateway.cli import springscale
+from gateway.errors import CampaignError, ConfigurationError
+from gateway.offline.bundle import CONTRIBUTION, MANIFEST, TEMPLATE, pack, unpacked
+from gateway.records import Frames
+from gateway.workbench.simulate import bench_of, write_campaign
+
+
+def run(*arguments: str) -> str:
+    result = CliRunner().invoke(springscale, list(arguments), catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def with_strangers(log: Path) -> None:
+    """The same log with frames that no map names, and with a position."""
+    chunks, _ = open_whole_log(log)
+    frames = merge_frames(list(chunks))
+    stamps = frames.t_ns[::50]
+    vin = Frames(
+        stamps,
+        np.full(len(stamps), 0x7E8, np.uint32),
+        np.full(len(stamps), 8, np.uint8),
+        np.tile(np.frombuffer(b"VIN12345", np.uint8), (len(stamps), 1)),
+    )
+    place = {"Latitude": np.full(len(stamps), 48.0), "Longitude": np.full(len(stamps), 9.0)}
+    here = Encoder(load_signal_map("springscale:reference")).encode("GPS_POSITION", stamps, place)
+    write_candump(merge_frames([frames, vin, here]), "can0", log)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("campaign")
+    write_campaign(bench_of("experiment", longest_s=320.0), folder)
+    for log in folder.glob("*/can.log.gz"):
+        with_strangers(log)
+    (folder / CONTRIBUTION).write_text(TEMPLATE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bundle(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    output = tmp_path_factory.mktemp("packed") / "van.zip"
+    told = json.loads(run("campaign", "pack", str(folder), "--output", str(output), "--json"))
+    assert len(told["runs"]) == 10
+    return output
+
+
+def test_calibrate_and_evaluate_take_the_archive_as_the_folder(folder: Path, bundle: Path, tmp_path: Path) -> None:
+    answers = []
+    for name, campaign in (("folder", folder / "campaign.toml"), ("bundle", bundle)):
+        calibration = tmp_path / f"{name}.json"
+        options = ["--estimator", "cross_spectrum", "--window-s", "60"]
+        run("calibrate", str(campaign), "--output", str(calibration), *options)
+        told = json.loads(
+            run("evaluate", str(campaign), "--calibration", str(calibration), "--window-s", "60", "--json")
+        )
+        answers.append([(one["payload_kg"], one["true_payload_kg"], one["rejected"]) for one in told["batches"]])
+    assert len(answers[0]) >= 10
+    assert answers[0] == answers[1]
+
+
+def test_only_mapped_frames_leave_the_vehicle(bundle: Path, tmp_path: Path) -> None:
+    campaign = unpacked(bundle, tmp_path)
+    chunks, _ = open_whole_log(campaign.parent / "runs/01.log.gz")
+    assert {int(i) for chunk in chunks for i in np.unique(chunk.can_id)} == {0x120, 0x121, 0x130}
+    assert json.loads((tmp_path / MANIFEST).read_text())["has_position"] is False
+
+
+def test_the_position_goes_along_where_it_is_wanted(folder: Path, tmp_path: Path) -> None:
+    pack(folder, tmp_path / "van.zip", with_position=True)
+    campaign = unpacked(tmp_path / "van.zip", tmp_path / "out")
+    chunks, _ = open_whole_log(campaign.parent / "runs/01.log.gz")
+    assert 0x131 in {int(i) for chunk in chunks for i in np.unique(chunk.can_id)}
+
+
+def test_the_same_folder_gives_the_same_bytes(folder: Path, bundle: Path, tmp_path: Path) -> None:
+    pack(folder, tmp_path / "again.zip")
+    assert (tmp_path / "again.zip").read_bytes() == bundle.read_bytes()
+
+
+def test_an_archive_that_was_changed_or_cut_is_refused(bundle: Path, tmp_path: Path) -> None:
+    changed = tmp_path / "changed.zip"
+    with zipfile.ZipFile(bundle) as old, zipfile.ZipFile(changed, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, content.replace(b"payload_kg = 270", b"payload_kg = 200"))
+    with pytest.raises(CampaignError, match=r"campaign\.toml was changed"):
+        unpacked(changed, tmp_path / "a")
+    (tmp_path / "cut.zip").write_bytes(bundle.read_bytes()[:5000])
+    with pytest.raises(CampaignError, match="no whole archive"):
+        unpacked(tmp_path / "cut.zip", tmp_path / "b")
+    with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
+        archive.writestr("campaign.toml", "")
+    with pytest.raises(CampaignError, match="was not made by"):
+        unpacked(tmp_path / "other.zip", tmp_path / "c")
+
+
+def test_nothing_is_unpacked_outside_the_folder(bundle: Path, tmp_path: Path) -> None:
+    evil = tmp_path / "evil.zip"
+    with zipfile.ZipFile(evil, "w") as archive:
+        archive.writestr("../escaped.txt", "x")
+        archive.writestr(MANIFEST, json.dumps({"files": {"../escaped.txt": "00"}}))
+    with pytest.raises(CampaignError):
+        unpacked(evil, tmp_path / "in")
+    assert not (tmp_path / "escaped.txt").exists()
+
+
+def test_without_permission_nothing_is_packed(tmp_path: Path) -> None:
+    write_known_loads(tmp_path, duration_s=100.0)
+    with pytest.raises(ConfigurationError, match=r"contribution\.toml: no such file. Write it like this") as refusal:
+        pack(tmp_path, tmp_path / "van.zip")
+    assert TEMPLATE in str(refusal.value)
+    (tmp_path / CONTRIBUTION).write_text(TEMPLATE.replace("may_be_published = true ", "may_be_published = false"))
+    with pytest.raises(ConfigurationError, match="may_be_published"):
+        pack(tmp_path, tmp_path / "van.zip")
+    assert not (tmp_path / "van.zip").exists()
+
+
+def test_a_map_that_lies_elsewhere_is_named(tmp_path: Path) -> None:
+    """The half-car's campaign names a database of the package by its whole path."""
+    write_known_loads(tmp_path, duration_s=100.0)
+    (tmp_path / CONTRIBUTION).write_text(TEMPLATE)
+    with pytest.raises(ConfigurationError, match="lies outside"):
+        pack(tmp_path, tmp_path / "van.zip")
+
+
+def test_the_page_shows_the_template() -> None:
+    page = (Path(__file__).parents[2] / "docs/contribute.md").read_text(encoding="utf-8")
+    assert f"```toml\n{TEMPLATE}```" in page
+
+
+def test_what_is_there_is_not_written_over(folder: Path, bundle: Path) -> None:
+    before = bundle.read_bytes()
+    with pytest.raises(ConfigurationError, match="is there already"):
+        pack(folder, bundle)
+    assert bundle.read_bytes() == before

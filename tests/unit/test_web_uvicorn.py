@@ -1,0 +1,78 @@
+"""What the door relies on of uvicorn's insides: they have no promise, so the range is pinned and each is named here.
+
+A new minor version of uvicorn: raise the bound in pyproject.toml, run this and tests/scenarios/test_web_flood.py.
+"""
+
+import asyncio
+import inspect
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+import uvicorn
+from packaging.requirements import Requirement
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
+from uvicorn.protocols.utils import get_remote_addr
+from uvicorn.server import ServerState
+
+from gateway.service.web_server import WebServer
+from gateway.web.door.connection import GuardedConnection
+from gateway.web.door.tls import TlsConfig
+
+# Callbacks of the protocol that are overridden and call the one above them, with their arguments
+OVERRIDDEN = {
+    "connection_made": ["self", "transport"],
+    "connection_lost": ["self", "exc"],
+    "data_received": ["self", "data"],
+    "pause_writing": ["self"],
+    "resume_writing": ["self"],
+    "on_message_begin": ["self"],
+    "on_headers_complete": ["self"],
+    "on_body": ["self", "body"],
+    "on_message_complete": ["self"],
+    "send_400_response": ["self", "msg"],
+}
+OF_A_CONNECTION = ("loop", "transport", "scope", "cycle", "flow", "url", "headers", "connections", "client", "logger")
+OF_A_CYCLE = ("response_started", "response_complete", "disconnected", "message_event")
+
+
+def test_the_range_is_pinned_to_the_versions_that_were_looked_at() -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    (wanted,) = [one for one in map(Requirement, project["dependencies"]) if one.name == "uvicorn"]
+    assert any(one.operator == "<" for one in wanted.specifier)
+    assert wanted.specifier.contains(version("uvicorn"))
+
+
+@pytest.mark.parametrize(("name", "arguments"), OVERRIDDEN.items())
+def test_the_callbacks_are_there_with_their_arguments(name: str, arguments: list[str]) -> None:
+    assert list(inspect.signature(getattr(HttpToolsProtocol, name)).parameters) == arguments
+    assert getattr(GuardedConnection, name) is not getattr(HttpToolsProtocol, name)
+
+
+def test_a_connection_and_its_cycle_have_what_is_looked_at() -> None:
+    async def look() -> None:
+        config = uvicorn.Config(lambda: None, http=HttpToolsProtocol)  # type: ignore[arg-type,return-value]
+        config.load()
+        connection = HttpToolsProtocol(config=config, server_state=ServerState(), app_state={})
+        made = inspect.getsource(HttpToolsProtocol)
+        for name in OF_A_CONNECTION:
+            assert hasattr(connection, name) or f"self.{name}" in made, name
+        assert "write_paused" in dir(connection.flow) or connection.flow is None
+        assert isinstance(ServerState().connections, set)
+
+    asyncio.run(look())
+    cycle = inspect.getsource(RequestResponseCycle)
+    assert all(f"self.{name}" in cycle for name in OF_A_CYCLE)
+    assert list(inspect.signature(get_remote_addr).parameters) == ["transport"]
+
+
+def test_the_server_and_its_settings_have_what_is_looked_at() -> None:
+    assert hasattr(uvicorn.Server, "capture_signals")
+    assert WebServer.capture_signals is not uvicorn.Server.capture_signals
+    assert {"ssl", "is_ssl", "get_loop_factory"} <= set(dir(uvicorn.Config)) | set(
+        vars(uvicorn.Config(lambda: None))  # type: ignore[arg-type,return-value]
+    ) | {"ssl"}
+    assert TlsConfig.load is not uvicorn.Config.load
+    server = uvicorn.Server(uvicorn.Config(lambda: None))  # type: ignore[arg-type,return-value]
+    assert (server.started, server.should_exit) == (False, False)
