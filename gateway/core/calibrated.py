@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import lru_cache
 
-from gateway.core.cargo import ShapePrior, shape_prior
+from gateway.core.cargo import ShapePrior, is_said, shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
@@ -30,8 +30,13 @@ class CalibratedVehicle:
 
     @property
     def shape_prior(self) -> ShapePrior | None:
-        """What is believed of a load's shape, from what the fitter said and from the known loads."""
-        if self.cross_spectrum is None:
+        """What is believed of a load's shape, from what the fitter said and from the known loads.
+
+        None where one load alone was driven and nothing is said: the shape of that load is all that the half-car was
+        fitted with, its covariance says how little is known of it, and a second shape would have no scale to go by.
+        """
+        known = self.cross_spectrum
+        if known is None or (known.payload_seen_kg[0] == known.payload_seen_kg[1] and not is_said(self.vehicle)):
             return None
         return _shape_prior(self.vehicle, *self.cross_spectrum.known_shape)
 

@@ -26,7 +26,7 @@ from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.cross_spectrum.packing import Packing, packings
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
-from gateway.core.cross_spectrum.shape import EVIDENCE, Node, Shaped, shaped
+from gateway.core.cross_spectrum.shape import EVIDENCE, EVIDENCE_WITHOUT_ROLL, Node, Shaped, shaped
 from gateway.posterior import NORMAL_TAILS, Source
 from gateway.records import F64
 
@@ -87,17 +87,20 @@ def locate(
     spectra: CrossSpectra,
     calibration: CrossSpectrumCalibration,
     prior: ShapePrior | None = None,
-    evidence: float = EVIDENCE,
+    evidence: float | None = None,
 ) -> Located:
     """The most probable load of ``spectra`` under a flat prior on payload and share.
 
-    ``prior`` is what is believed of its shape and ``evidence`` how much the batch counts against it; without a prior
-    the load has the shape of the known ones. How much each axle moves depends on the load: we recompute the stroke
+    ``prior`` is what is believed of its shape and ``evidence`` how much the batch counts against it (None: as usual);
+    without a prior the load has the shape of the known ones. How much each axle moves depends on the load: we recompute the stroke
     speeds at each solution and continue the search from it. With a roll rate the load is first sought as if it lay on
     the centre line; then roll shows where it lies, and the search continues from there. Where the roll rate is lost,
     the sensor still reads roll: it is taken to sit where calibration has it, with the load on the centre line.
     """
-    if spectra.roll is None or not has_roll(calibration.parameters):
+    is_rolling = spectra.roll is not None and has_roll(calibration.parameters)
+    if evidence is None:
+        evidence = EVIDENCE if is_rolling else EVIDENCE_WITHOUT_ROLL
+    if not is_rolling:
         whittle, peak = _best(spectra.without_roll, calibration)
         shape = _shaped(whittle, peak, calibration, 0.0, prior, evidence)
         located = _located(whittle, peak, shape, calibration, 0.0, evidence)

@@ -25,6 +25,7 @@ EVIDENCE: Final = 0.5
 """How much a batch's evidence counts against shapes, calibration and nature, 1 being what its own statistics say.
 Chosen on simulated vans that serve no other purpose (`benchmarks.accuracy budget`).
 """
+EVIDENCE_WITHOUT_ROLL: Final = 0.2  # of a sensor that takes roll for heave and nobody can tell; as in calibration
 LEAST_PROBABILITY: Final = 1e-3  # of a shape that is worth weighing, before and after
 POINTS: Final = (0.025, 0.5, 0.975)
 
