@@ -1,4 +1,4 @@
-"""docs/learning_curve.md and docs/advice.md: what these studies found, from their numbers alone."""
+"""The pages of the learning curve and of the advice: what these studies found, from their numbers alone."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Final

@@ -1,4 +1,4 @@
-"""docs/learning_curve.md, advice.md, coverage.md and their like say what the numbers beside them say, and nothing else.
+"""docs/learning_curve.md, coverage.md, budget.md and their like say what the numbers beside them say, and nothing else.
 
 They come from `python -m benchmarks.accuracy NAME --output DIR`: NAME.md, and its numbers NAME.json.
 """
@@ -18,22 +18,19 @@ from benchmarks.accuracy.coverage_table import ALL_KINDS
 from benchmarks.accuracy.delivery_page import delivery_page
 from benchmarks.accuracy.disturbances_page import WELL, disturbances_page, held_or_refused, is_mended
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
-from benchmarks.accuracy.pages import advice_page, learning_curve_page
+from benchmarks.accuracy.pages import learning_curve_page
 from benchmarks.accuracy.phones import CAN, phones_page
-from benchmarks.accuracy.sensitivity import sensitivity_page
 from benchmarks.accuracy.siblings import siblings_page
 from benchmarks.accuracy.siblings.study import Way
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "learning_curve": learning_curve_page,
-    "advice": advice_page,
     "coverage": coverage_page,
     "disturbances": disturbances_page,
     "siblings": siblings_page,
     "events": delivery_page,
     "alarm_rules": alarms_page,
-    "sensitivity": sensitivity_page,
     "budget": budget_page,
     "phone_accuracy": phones_page,
 }

@@ -50,7 +50,9 @@ def test_it_solves_the_regression_of_what_was_seen() -> None:
     seen = []
     for i, each in enumerate(columns):
         posterior = Posterior(
-            truth + [12.0, -0.3], np.diag([25.0, 0.04]), {Source.CALIBRATION: each[:3], Source.SENSOR: each[3:]}
+            truth + np.array([12.0, -0.3]),
+            np.diag([25.0, 0.04]),
+            {Source.CALIBRATION: each[:3], Source.SENSOR: each[3:]},
         )
         seen.append(Observation(str(i), T_NS + i, ID, BY, posterior, truth, noise))
     known = knowing(*seen)

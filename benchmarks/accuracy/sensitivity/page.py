@@ -1,4 +1,4 @@
-"""docs/sensitivity.md: what `python -m benchmarks.accuracy sensitivity` found, from its numbers alone."""
+"""The page of the sensitivity: what `python -m benchmarks.accuracy sensitivity` found, from its numbers alone."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
