@@ -38,7 +38,7 @@ class CalibratedVehicle:
         known = self.cross_spectrum
         if known is None or (known.payload_seen_kg[0] == known.payload_seen_kg[1] and not is_said(self.vehicle)):
             return None
-        return _shape_prior(self.vehicle, *self.cross_spectrum.known_shape)
+        return _shape_prior(self.vehicle, *known.known_shape)
 
     def is_out_of_range(self, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]) -> bool:
         """True where a 95 % interval lies wholly outside what calibration saw, plus a quarter of its span.

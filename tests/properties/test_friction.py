@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.half_car_road import CAR, VAN, batch_over_road, weighed
+from support.half_car_road import CAR, VAN, batch_over_road, weighed_as_known
 
 from gateway.calibration.half_car import calibrate_cross_spectrum, prior_of
 from gateway.calibration.known_run import KnownRun
@@ -136,11 +136,11 @@ def test_a_load_reads_the_same_on_smooth_and_on_rough_roads(
     shaken_mps2: float, calibration: CrossSpectrumCalibration
 ) -> None:
     batch = drive(300.0, 48.0, 77, shaken_mps2, with_friction(shaken_mps2))
-    found = weighed(batch, calibration)
+    found = weighed_as_known(batch, calibration)
     assert found.payload.number == pytest.approx(300.0, abs=9.0)
     assert found.front_share.number == pytest.approx(48.0, abs=0.2)
     blind = calibration.parameters.copy()
     blind[[i for i, name in enumerate(PARAMETERS) if "_friction_" in name]] = 0.0
-    without = weighed(batch, replace(calibration, parameters=blind))
+    without = weighed_as_known(batch, replace(calibration, parameters=blind))
     is_refused = without.rejected == (Why.MODEL_MISFIT,)  # dampers that no drift explains
     assert is_refused or abs(without.payload.number - 300.0) > 2.0 * abs(found.payload.number - 300.0)

@@ -4,17 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.half_car_road import CAR
+from support.half_car_road import CAR, weighed_as_known
 from support.rolling_car import ROLLING_CAR
 from support.rolling_road import WIDE_VAN, batch_over_two_tracks
 
 from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.half_car import HalfCar, frequency_response, strokes
 from gateway.core.cross_spectrum.model.parameters import INDEX
-from gateway.core.estimator import estimate
 from gateway.core.vehicle import Load
 from gateway.records import F64, Batch
 
@@ -93,7 +91,6 @@ def test_a_load_reads_the_same_on_smooth_and_on_rough_roads(
     shaken_mps2: float, calibration: CrossSpectrumCalibration
 ) -> None:
     load = Load(330.0, 46.0)
-    calibrated = CalibratedVehicle("id", WIDE_VAN, (0.0, 420.0), (44.0, 52.0), cross_spectrum=calibration)
-    found = estimate(drive(load, 77, shaken_mps2), calibrated, "cross_spectrum")
+    found = weighed_as_known(drive(load, 77, shaken_mps2), calibration)
     assert found.payload.number == pytest.approx(load.payload_kg, abs=12.0)
     assert found.front_share.number == pytest.approx(load.front_share_pct, abs=0.25)

@@ -113,8 +113,8 @@ def test_a_vehicle_that_no_drift_explains_is_refused(calibration: CrossSpectrumC
 def test_payload_and_share_say_how_their_errors_go_together(calibration: CrossSpectrumCalibration) -> None:
     """Errors of many batches are correlated as each of them says, in sign at least."""
     estimates = [answered(batch_over_road(*LOAD, seed=200 + k, duration_s=100.0), calibration) for k in range(12)]
-    told = float(np.mean([one.correlation for one in estimates]))
+    told = float(np.mean([one.payload_front_share_correlation for one in estimates]))
     seen = float(np.corrcoef([[e.payload.number, e.front_share.number] for e in estimates], rowvar=False)[0, 1])
-    assert all(-1.0 < one.correlation < 1.0 for one in estimates)
+    assert all(-1.0 < one.payload_front_share_correlation < 1.0 for one in estimates)
     if abs(told) > 0.5:
         assert np.sign(seen) == np.sign(told)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cross_spectrum import by_cross_spectrum
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar, frequency_response
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, is_positive
@@ -114,3 +115,9 @@ def weighed(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
     """What the cross spectrum tells of the batch, with no limit to the loads."""
     calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 0.0), (0.0, 0.0), cross_spectrum=calibration)
     return estimate(batch, calibrated, "cross_spectrum")
+
+
+def weighed_as_known(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
+    """The same of a load that is known to have the shape of the known loads."""
+    blank = Estimate(batch.t_start_ns, batch.t_end_ns, "cross_spectrum")
+    return by_cross_spectrum(batch, calibration, None, blank)

@@ -212,7 +212,8 @@ def disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why | 
         return Why.MODEL_MISFIT
     is_moved = located.sideways is not None and located.sideways.is_mount_changed
     if is_moved or located.scores.is_changed(calibration):
-        return Why.SENSOR_CHANGED if is_moved or found.reach == 0.0 else Why.MODEL_MISFIT
+        as_known = beyond(located.as_known, calibration.known_loads, calibration.empty_mass_kg)
+        return Why.SENSOR_CHANGED if is_moved or min(found.reach, as_known) == 0.0 else Why.MODEL_MISFIT
     if located.tension > MOST_TENSION:
         return Why.MODEL_MISFIT
     if not found.posterior.std(PAYLOAD) <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:

@@ -27,6 +27,7 @@ from gateway.core.cross_spectrum.packing import Packing, packings
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
 from gateway.core.cross_spectrum.shape import EVIDENCE, EVIDENCE_WITHOUT_ROLL, Node, Shaped, shaped
+from gateway.core.vehicle import Load
 from gateway.posterior import NORMAL_TAILS, Source
 from gateway.records import F64
 
@@ -71,6 +72,7 @@ class Located:
     scores: SensorScores
     is_reversed: bool
     is_ambiguous: bool
+    as_known: Load  # what it would be, had it the shape of the known loads
     sideways: Sideways | None = None
 
 
@@ -270,8 +272,12 @@ def _located(
     columns = {Source.DAY: day_columns(found, at.steady)[:, -2:], Source.LOAD_LENGTH: packing_columns(found)[:, -2:]}
     if shape is not None:
         columns |= _of_shape(shape, columns[Source.LOAD_LENGTH])
-    misfit = whittle.misfit(point)
-    parameters = calibration.parameters.copy()
+    likeliest = (float(calibration.parameters[_GYRATION]), peak.found.x) if shape is None else shape.likeliest
+    fitted = _with_gyration(calibration, likeliest[0])
+    at_peak = _point(likeliest[1], fitted, cg_left_m)
+    misfit = whittle.misfit(at_peak)
+    judged = whittle.curvature(at_peak, [*range(len(PARAMETERS)), len(point.theta), len(point.theta) + 1])
+    parameters = fitted.parameters.copy()
     parameters[DRIFTING] = drifting
     own = found[-2:, -2:] + at.own[-2:, -2:]
     rivalled = own + sum((each.T @ each for each in columns.values()), np.zeros((2, 2)))
@@ -284,9 +290,10 @@ def _located(
         gain_moves=gain_moves(whole, whittle, point, found)[-2:],
         rival_covariance=peak.rivals,
         misfit=misfit,
-        tension=min(tension_of(x[:-2] - one.drifting) for one in packings(calibration.parameters)),
-        scores=scores_of(whole, point, found, replace(calibration, parameters=parameters)),
-        is_reversed=_is_reversed(whittle, point, misfit, calibration),
+        tension=min(tension_of(likeliest[1][:-2] - one.drifting) for one in packings(calibration.parameters)),
+        scores=scores_of(judged, at_peak, found, replace(fitted, parameters=parameters)),
+        is_reversed=_is_reversed(whittle, at_peak, misfit, fitted),
+        as_known=_point(peak.found.x, calibration, cg_left_m).load,
         is_ambiguous=bool(np.any(np.diag(peak.rivals) > MOST_RIVALRY * np.diag(rivalled))),
     )
 

@@ -53,7 +53,8 @@ class Shaped:
     """The posterior over shapes: x (k,) at its mean log_s; the median load (2,), payload in kg and front share 0..1.
 
     column (2,) is one standard deviation of what the shape leaves open, tails its 2.5 and 97.5 % points in these;
-    goods_part (0 to 1) is the part of its variance that is the same for all loads of the vehicle.
+    goods_part (0 to 1) is the part of its variance that is the same for all loads of the vehicle. likeliest is the log
+    s and the peak of the shape that explains the batch best.
     """
 
     log_s: float
@@ -62,6 +63,7 @@ class Shaped:
     column: F64
     tails: tuple[float, float]
     goods_part: float
+    likeliest: tuple[float, F64]
 
 
 def shaped(
@@ -75,7 +77,7 @@ def shaped(
     nodes, founds = _profile(prior, wheelbase_m, start, weighed_as, evidence)
     if len(nodes) == 1:
         x = founds[0].x
-        return Shaped(float(nodes[0]), x, x[-2:], np.zeros(2), NORMAL_TAILS, 0.0)
+        return Shaped(float(nodes[0]), x, x[-2:], np.zeros(2), NORMAL_TAILS, 0.0, (float(nodes[0]), founds[0].start))
     within = (prior.log_s >= nodes[0]) & (prior.log_s <= nodes[-1])
     log_s = prior.log_s[within]
     cost = PchipInterpolator(nodes, [evidence * found.cost + found.improbable for found in founds])(log_s)
@@ -91,8 +93,10 @@ def shaped(
         column = np.array([payload_std, float(weight @ (away[:, 0] * away[:, 1])) / payload_std])
         low, middle, high = _points(away[:, 0] / payload_std, weight)
         load, tails = load + middle * column, (middle - low, high - middle)
+    best = min(range(len(nodes)), key=lambda i: founds[i].cost)
+    likeliest = float(nodes[best]), founds[best].start
     narrowed = float(weight @ (log_s - mean_log_s) ** 2) / prior.variance
-    return Shaped(mean_log_s, path(mean_log_s), load, column, tails, prior.habit * min(narrowed, 1.0))
+    return Shaped(mean_log_s, path(mean_log_s), load, column, tails, prior.habit * min(narrowed, 1.0), likeliest)
 
 
 def _profile(
