@@ -10,6 +10,7 @@ from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, 
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
+from gateway.estimate import Z95
 from gateway.records import Why
 from gateway.status import State
 from gateway.web import Scope, TokenFile
