@@ -268,6 +268,13 @@ FIELDS: Final = (
         "the same before known weights were taken into account; absent: there are none",
         presence=_KNOWN,
     ),
+    EstimateField(
+        "epoch_posterior",
+        "epoch.posterior",
+        POSTERIOR,
+        "of all batches of this load together",
+        presence=_KNOWN,
+    ),
     EstimateField("vin", "vin", TEXT, "vehicle identification number", presence=_KNOWN),
     EstimateField(
         "provisional",

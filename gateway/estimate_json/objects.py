@@ -59,7 +59,7 @@ def _epoch(known: Mapping[str, Any]) -> Epoch | None:
     payload, front_share, cg_left = (
         _quantity(known, f"epoch.{name}") for name in ("payload", "front_share", "cg_left")
     )
-    return Epoch(payload, front_share, known["epoch.n_batches"], cg_left)
+    return Epoch(payload, front_share, known["epoch.n_batches"], cg_left, known.get("epoch.posterior"))
 
 
 def csv_cells(told: Mapping[str, Any]) -> dict[str, Any]:

@@ -45,6 +45,14 @@ def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: 
     assert re.findall(r"(?:src|href)=\"(?!/|#)", page) == []
 
 
+@pytest.mark.parametrize("path", ["/", "/cab"])
+def test_an_id_stands_once_in_a_page(client: Client, path: str) -> None:
+    """Two parts of the dashboard had one, and a script filled the first that it found."""
+    ids = re.findall(r'\sid="([^"]+)"', client.get(path).text)
+    assert len(ids) > 10
+    assert sorted(ids) == sorted(set(ids))
+
+
 def test_every_file_the_page_names_is_there(client: Client) -> None:
     named = re.findall(r"(?:src|href|chart-library)=\"(/[^\"]*)\"", client.get("/").text)
     assert LIBRARY_URL in named

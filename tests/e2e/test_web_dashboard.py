@@ -10,6 +10,7 @@ from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, 
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
+from gateway.estimate import Z95
 from gateway.records import Why
 from gateway.status import State
 from gateway.web import Scope, TokenFile
@@ -101,7 +102,8 @@ def test_the_charts_show_estimates_bands_truth_and_model(drawn: Watched) -> None
     page = drawn.page
     truth, band, _early, estimate, refused = page.evaluate("document.getElementById('payload-chart').data")
     assert [y for y in truth["y"] if y is not None] == [0, 270, 270]
-    assert sorted({y for y in band["y"] if y is not None}) == [-10, 14, 258, 282]
+    ends_kg = [kg + side * Z95 * 6.0 for kg in (2.0, 270.0) for side in (-1.0, 1.0)]
+    assert sorted({y for y in band["y"] if y is not None}) == pytest.approx(ends_kg, abs=1e-5)
     assert [y for y in estimate["y"] if y is not None] == [2, 2, 2, 2, 270, 270]
     assert refused["text"] == ["not weighed: too slow, gap<br>until 01/01/1970, 00:15"]
     expect(page.locator("#payload-chart-words")).to_contain_text("3 of 4 batches weighed; the last 270 kg")

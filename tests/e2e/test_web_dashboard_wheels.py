@@ -12,10 +12,12 @@ import pytest
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched, demo_calibration, weighed
 from support.web import Gateway, serving
 
+from gateway.core import weights
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.vehicle import cg_left_m, left_share_pct
-from gateway.core.weights import Sideways, place_of
-from gateway.estimate import Estimate, Quantity
+from gateway.core.fusion import epoch_of
+from gateway.core.vehicle import cg_left_m
+from gateway.estimate import Estimate
+from gateway.posterior import Posterior
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect
@@ -33,16 +35,13 @@ def tracked() -> CalibratedVehicle:
 
 def leaning(n: int, calibrated: CalibratedVehicle, left_m: float = LEFT_M) -> Estimate:
     """The n-th batch with its payload that far left of the centre line."""
-    cg_left = Quantity.normal(cg_left_m(calibrated.vehicle, PAYLOAD_KG, left_m), 0.008)
-    return replace(
-        weighed(n, PAYLOAD_KG, 48.0, calibrated),
-        front_share=Quantity.normal(48.0, 0.6),  # more than the stated empty share's
-        cg_left=cg_left,
-        left_share=Quantity.normal(left_share_pct(cg_left.number, 1.5), 100.0 * cg_left.std / 1.5),
-        roll_share_front=0.6,
-        roll_share_front_std=0.05,
-        front_share_cg_left_correlation=0.5,
-    )
+    whole_left_m = cg_left_m(calibrated.vehicle, PAYLOAD_KG, left_m)
+    std = np.array([6.0, 0.6, 0.008])
+    together = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.5], [0.0, 0.5, 1.0]])
+    posterior = Posterior(np.array([PAYLOAD_KG, 48.0, whole_left_m]), np.outer(std, std) * together)
+    answered = weighed(n, PAYLOAD_KG, 48.0, calibrated).answered(posterior)
+    on_road = weights.weighed(replace(answered, roll_share_front=0.6, roll_share_front_std=0.05), calibrated.vehicle)
+    return replace(on_road, epoch=epoch_of(posterior, 2))
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +89,8 @@ def test_the_ellipse_is_that_of_the_covariance(site: str, watched: Watched) -> N
     page.goto(site)
     drawn = page.locator("#van ellipse.spread")
     vehicle, found = tracked().vehicle, leaning(1, tracked())
-    place = place_of(vehicle, found.payload, found.front_share, math.nan, Sideways.of(found))
+    assert found.posterior is not None
+    place = weights.place_of(vehicle, found.posterior)
     assert place is not None
     along, across = place.std_m * ALONG, place.left_std_m * ACROSS
     common = place.correlation * along * across

@@ -8,12 +8,13 @@ from typing import Any
 
 from gateway.calibration.file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.fusion import epoch_of
 from gateway.core.spectrum import spectra_of
-from gateway.estimate import Epoch, Estimate, Quantity
+from gateway.estimate import Estimate
 from gateway.records import Why
 from gateway.status import BusStatus, SignalHealth, State, Status, StoreStatus, UplinkStatus
 from gateway.web import KnownLoad
-from support.estimates import WINDOW_NS, make_estimate
+from support.estimates import WINDOW_NS, make_estimate, posterior_of
 from support.half_car_road import batch_over_road
 from support.patience import PATIENCE_S
 from support.web import Gateway
@@ -47,12 +48,10 @@ def demo_calibration() -> CalibratedVehicle:
 def weighed(n: int, payload_kg: float, front_share_pct: float, calibrated: CalibratedVehicle) -> Estimate:
     """The n-th batch as the cross-spectral estimator would answer."""
     return replace(
-        make_estimate(n),
+        make_estimate(n).answered(posterior_of(payload_kg, front_share_pct, 6.0, 0.2)),
         estimator="cross_spectrum",
         calibration_id=calibrated.id,
-        payload=Quantity(payload_kg, 6.0, (payload_kg - 12.0, payload_kg + 12.0)),
-        front_share=Quantity(front_share_pct, 0.2, (front_share_pct - 0.4, front_share_pct + 0.4)),
-        epoch=Epoch(Quantity(payload_kg, 4.0), Quantity(), 2),
+        epoch=epoch_of(posterior_of(payload_kg, front_share_pct, 4.0, 0.15), 2),
     )
 
 
