@@ -13,13 +13,10 @@ import pytest
 from benchmarks.accuracy.coverage_drives import TRIPS
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.coverage_table import ALL_KINDS
-from benchmarks.accuracy.disturbances_page import WELL, disturbances_page, held_or_refused, is_mended
-from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "coverage": coverage_page,
-    "disturbances": disturbances_page,
 }
 
 
@@ -37,13 +34,3 @@ def test_coverage_pools_at_least_200_batches_of_every_kind_of_drive() -> None:
     lines = numbers("coverage")["lines"]
     assert {line["kind"] for line in lines} == {*TRIPS, ALL_KINDS}
     assert min(line["n_batches"] for line in lines if line["kind"] == ALL_KINDS) >= 200
-
-
-def test_every_disturbance_is_held_refused_or_mended() -> None:
-    lines = {line["kind"]: line for line in numbers("disturbances")["lines"] if line["kind"] != ALL_KINDS}
-    assert set(lines) == set(DISTURBANCES)
-    undisturbed = lines[UNDISTURBED.name]
-    for name, line in lines.items():
-        assert min(held_or_refused(line, "payload"), held_or_refused(line, "front_share")) >= WELL, name
-        if DISTURBANCES[name].is_mended:
-            assert is_mended(line, undisturbed), name
