@@ -1,51 +1,22 @@
-"""Fills the measured tables of docs/hardware.md and docs/feed.md from disturbances.json and feed_cost.json.
+"""Fills the measured cost in docs/feed.md from feed_cost.json.
 
-feed_cost.json comes from `python -m benchmarks.speed.feed --output docs/feed_cost.json`. --check compares.
+That comes from `python -m benchmarks.speed.feed --output docs/feed_cost.json`. --check compares.
 """
 
 import json
 import re
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from generated import keep_up_to_date
 
 DOCS: Final = Path(__file__).parent
-SHOWN: Final = (
-    "as recorded",
-    "jitter of 3 ms",
-    "heaps every 40 ms",
-    "2 % of frames lost",
-    "gyro late by 20 ms",
-    "accelerometer's gain + 2 %",
-    "sensor moved 0.2 m back",
-    "sensor turned by 10 degrees",
-    "no roll rate",
-    "load sideways, no roll rate",
-)
 
 
 def filled(page: Path, mark: str, text: str) -> str:
     """The page with what stands between two comments replaced."""
     between = re.compile(rf"(<!-- {mark}: .*?-->\n).*?(<!-- end of {mark} -->)", re.DOTALL)
     return between.sub(lambda found: f"{found[1]}{text}{found[2]}", page.read_text(encoding="utf-8"))
-
-
-def disturbances() -> str:
-    """The lines that a choice of hardware decides."""
-    lines = json.loads((DOCS / "disturbances.json").read_text(encoding="utf-8"))["lines"]
-    by_name = {line["kind"]: line for line in lines}
-    rows = [_row(name, by_name[name]) for name in SHOWN]
-    head = "| | batches | refused | payload, mean error | front share, mean error |\n|---|---|---|---|---|\n"
-    return head + "".join(f"{row}\n" for row in rows)
-
-
-def _row(name: str, line: dict[str, Any]) -> str:
-    def percent(quantity: str) -> str:
-        error = line[f"{quantity}_mean_abs_pct"]
-        return "–" if error is None else f"{error:.1f} %"
-
-    return f"| {name} | {line['n_batches']} | {line['n_rejected']} | {percent('payload')} | {percent('front_share')} |"
 
 
 def cost() -> str:
@@ -60,8 +31,7 @@ def cost() -> str:
 
 
 def main() -> None:
-    hardware, feed = DOCS / "hardware.md", DOCS / "feed.md"
-    keep_up_to_date(hardware, filled(hardware, "disturbances", disturbances()), "docs/disturbances.json")
+    feed = DOCS / "feed.md"
     keep_up_to_date(feed, filled(feed, "cost", cost()), "docs/feed_cost.json")
 
 

@@ -1,6 +1,6 @@
 """How often are the rules of the alarms right, and do they come and go? Loads about a limit, their errors as stated.
 
-alarms(n_loads, seed) -> numbers for docs/alarm_rules.json
+alarms(n_loads, seed) -> numbers for alarm_rules.json
 
 No vehicle is simulated: each load's gross weight lies so many of a batch's standard deviations from the limit, half of
 each batch's error is its own and half is shared by all batches of the load, and
@@ -104,7 +104,7 @@ def _line(told: list[Load]) -> dict[str, Any]:
 
 
 def alarms_page(found: Mapping[str, Any]) -> str:
-    """docs/alarm_rules.md, from the numbers alone."""
+    """The page alarm_rules.md, from the numbers alone."""
     n_loads, rules = found["n_loads"], AlarmRules()
     rows = [_row(line, n_loads) for line in found["lines"]]
     return "\n".join(

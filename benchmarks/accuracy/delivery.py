@@ -1,6 +1,6 @@
 """Are load events found, and none invented? Simulated delivery days, told batch by batch as the service would.
 
-delivery(seed, n_days) -> numbers for docs/events.json
+delivery(seed, n_days) -> numbers for events.json
 """
 
 import math

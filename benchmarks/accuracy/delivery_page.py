@@ -1,4 +1,4 @@
-"""docs/events.md: what `python -m benchmarks.accuracy delivery` found, from its numbers alone."""
+"""The page of the load events: what `python -m benchmarks.accuracy delivery` found, from its numbers alone."""
 
 from collections.abc import Mapping
 from typing import Any, Final

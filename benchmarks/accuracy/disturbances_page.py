@@ -1,4 +1,4 @@
-"""docs/disturbances.md: what `python -m benchmarks.accuracy disturbances` found, from its numbers alone."""
+"""The page of the disturbances: what `python -m benchmarks.accuracy disturbances` found, from its numbers alone."""
 
 from collections.abc import Mapping
 from typing import Any, Final

@@ -155,7 +155,7 @@ def _figures(batches: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def phones_page(found: Mapping[str, Any]) -> str:
-    """docs/phone_accuracy.md from the numbers alone."""
+    """The page phone_accuracy.md from the numbers alone."""
     n = found["n_vans"] * found["n_rounds"]
     rows = [
         f"| {row['sensor']} | {row['n_batches']} | {row['n_rejected']} | {row['payload']['mean_abs_kg']:.1f} kg "

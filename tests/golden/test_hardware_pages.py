@@ -1,14 +1,12 @@
-"""docs/hardware.md, feed.md and phone.md say what was measured and what the commands print."""
+"""docs/feed.md and phone.md say what was measured and what the commands print."""
 
 import make_hardware
 import make_phone
 
 
 def test_the_tables_are_those_of_the_numbers() -> None:
-    hardware, feed = make_hardware.DOCS / "hardware.md", make_hardware.DOCS / "feed.md"
-    assert make_hardware.filled(hardware, "disturbances", make_hardware.disturbances()) == hardware.read_text()
+    feed = make_hardware.DOCS / "feed.md"
     assert make_hardware.filled(feed, "cost", make_hardware.cost()) == feed.read_text()
-    assert make_hardware.disturbances().count("\n") == len(make_hardware.SHOWN) + 2
 
 
 def test_the_page_shows_what_import_prints() -> None:

@@ -1,4 +1,4 @@
-"""docs/budget.md: what `python -m benchmarks.accuracy budget` found, from its numbers alone."""
+"""The page of the budget: what `python -m benchmarks.accuracy budget` found, from its numbers alone."""
 
 from collections.abc import Mapping
 from typing import Any, Final

@@ -1,6 +1,6 @@
 """What a line tells of its next vehicle: simulated siblings calibrated in six ways, on the same drives.
 
-``drives`` draws lines, siblings and what they drive, ``study`` calibrates and judges, ``page`` makes docs/siblings.md
+``drives`` draws lines, siblings and what they drive, ``study`` calibrates and judges, ``page`` makes a page
 of it.
 """
 

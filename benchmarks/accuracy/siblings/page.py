@@ -1,4 +1,4 @@
-"""docs/siblings.md: what `python -m benchmarks.accuracy siblings` found, from its numbers alone."""
+"""The page of the siblings: what `python -m benchmarks.accuracy siblings` found, from its numbers alone."""
 
 from collections.abc import Mapping
 from typing import Any, Final

@@ -1,4 +1,4 @@
-"""The paper's numbers beside ours: rows for the report, for docs/accuracy.md and for machines."""
+"""The paper's numbers beside ours: rows for the report, for accuracy.md and for machines."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ QUICK: Final = "A quick try with a part of the driving and shorter batches: its 
 
 
 def accuracy_page(results: Mapping[str, Any]) -> str:
-    """docs/accuracy.md, from results.json alone."""
+    """accuracy.md, from results.json alone."""
     head = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
     lines = ["| " + " | ".join(row.cells) + " |" for row in rows_of(results["tables"])]
     is_whole = results.get("is_whole", True)  # not said by results that were always of the whole
