@@ -22,11 +22,13 @@ from gateway.estimate import Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.store import Store
 from gateway.uplink import Outbox, Uplink, uplink_settings
+from gateway.uplink.home_assistant import ENTITIES
 
 pytestmark = [needs("hass"), needs_mosquitto]
 
 BIRTH = {"vehicle_id": "van-17", "vin": "WVWZZZ1KZAW000001", "version": "1.2.3", "estimator": "cross_spectrum"}
 PAYLOAD, OVERLOAD = "sensor.van_17_payload", "binary_sensor.van_17_overload"
+CONNECTED = "binary_sensor.van_17_connected"
 HEAVY = Weights(gross=Weight(2600.4, 8.0, 2500.0, None), front_axle=Weight(1200.2, 6.0, None, None))
 
 
@@ -72,14 +74,16 @@ def test_a_vehicle_appears_fills_and_is_seen_to_be_away(home: tuple[HomeAssistan
         assert wait_until(lambda: PAYLOAD in assistant.states("van_17")), assistant.log
         weighed_and_shown(assistant, store, 3, HEAVY)
         states = assistant.states("van_17")
-        assert len(states) == 9
+        assert len(states) == len(ENTITIES)
         assert states["sensor.van_17_gross_weight"]["state"] == "2600.4"
         assert states[OVERLOAD]["state"] == "on"
         assert states["sensor.van_17_rear_axle"]["state"] == "unknown"  # which is not 0
         payload = states[PAYLOAD]["attributes"]
         assert (payload["unit_of_measurement"], payload["device_class"]) == ("kg", "weight")
-    # switched off: every entity says so, and no old number stands there as if it were today's
-    assert wait_until(lambda: {one["state"] for one in assistant.states("van_17").values()} == {"unavailable"})
+        assert states[CONNECTED]["state"] == "on"
+    # switched off: it is seen to be away, and its last weight stays, as that of a parked van
+    assert wait_until(lambda: assistant.state(CONNECTED) == "off"), assistant.state(CONNECTED)
+    assert assistant.state(PAYLOAD) == "103.0"
 
 
 def test_it_comes_back_after_a_restart_of_home_assistant(home: tuple[HomeAssistant, Broker], store: Store) -> None:
