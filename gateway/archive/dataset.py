@@ -49,7 +49,7 @@ PROVENANCE: Final[Mapping[str, str]] = {
 }
 """Columns that no estimate has; `calibration_id` and `known_weights_id` are among the estimate's own."""
 
-_LEFT_OUT: Final = frozenset({"spectra", "provisional", "way", "posterior", "measured_posterior"})
+_LEFT_OUT: Final = frozenset({"spectra", "provisional", "way", "posterior", "measured_posterior", "epoch_posterior"})
 """Large; never true of a whole batch; of many parts."""
 
 OWN_STD: Final[Mapping[str, tuple[str, str]]] = {

@@ -14,7 +14,9 @@ RANGE_MARGIN = 0.25  # of the span seen in calibration, at either end
 
 @dataclass(frozen=True, slots=True)
 class CalibratedVehicle:
-    """One calibration file, ready for use. ``id`` is the hash of its content."""
+    """One calibration file, ready for use. ``id`` is the hash of its content. ``is_shape_known``: what is weighed has
+    the shape of the known loads, as runs left out of a calibration have.
+    """
 
     id: str
     vehicle: Vehicle
@@ -22,6 +24,7 @@ class CalibratedVehicle:
     front_share_seen_pct: tuple[float, float]
     ratio_index: RatioIndexCalibration | None = None
     cross_spectrum: CrossSpectrumCalibration | None = None
+    is_shape_known: bool = False
 
     @property
     def unsprung(self) -> Unsprung:
@@ -36,7 +39,11 @@ class CalibratedVehicle:
         fitted with, its covariance says how little is known of it, and a second shape would have no scale to go by.
         """
         known = self.cross_spectrum
-        if known is None or (known.payload_seen_kg[0] == known.payload_seen_kg[1] and not is_said(self.vehicle)):
+        if (
+            self.is_shape_known
+            or known is None
+            or (known.payload_seen_kg[0] == known.payload_seen_kg[1] and not is_said(self.vehicle))
+        ):
             return None
         return _shape_prior(self.vehicle, *known.known_shape)
 

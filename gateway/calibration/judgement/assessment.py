@@ -95,7 +95,10 @@ def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:
         without = {n: replace(whole, ratio_index=taught) for n, taught in (ratio.without if ratio else {}).items()}
     else:
         cross = outcome.cross_spectrum
-        without = {n: replace(whole, cross_spectrum=taught) for n, taught in (cross.without if cross else {}).items()}
+        without = {
+            n: replace(whole, cross_spectrum=taught, is_shape_known=True)
+            for n, taught in (cross.without if cross else {}).items()
+        }
     runs = [one.identification for one in outcome.split if one.identification.number in without]
     return [one for run in runs for one in judge([run], without[run.number], estimator)]
 
