@@ -118,6 +118,8 @@ def test_an_overload_by_the_settings_is_told_everywhere(config: Path, caplog: py
         [reading] = told["own_readings"]
         assert (reading["signal"], reading["unit"]) == ("axle_weight", "kg")
         weights = cab.get("/api/v1/estimates")["items"][-1]["weights"]
+        low_kg, high_kg = weights["gross"].pop("interval95_kg")
+        assert low_kg < 1600.0 < high_kg
         assert {**weights["gross"], "std_kg": None} == {
             "kg": 1600.0,
             "std_kg": None,
