@@ -1,7 +1,7 @@
 """Load events and trips: what was loaded or unloaded where and when, and what was carried how far.
 
 Made of estimates alone (their numbers, their times, the way they went), purely: the service, a log and a restart give
-the same. docs/events.md says how well they are found.
+the same.
 """
 
 from gateway.core.change import Rules
