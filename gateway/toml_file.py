@@ -72,7 +72,7 @@ def checked(
 def describe_faults(where: Path | str, fault: ValidationError) -> str:
     """One line a fault: file, key, what is wrong and what stands there.
 
-    A list is not told to be too short for want of what is told to be wrong in it.
+    A list is not reported as too short when the missing entries are already reported as wrong.
     """
     faults = fault.errors(include_url=False)
     within = {each["loc"][:n] for each in faults for n in range(len(each["loc"]))}

@@ -76,7 +76,7 @@ def feed(url: str, databroker: VSSClient, every_s: float, stopping: threading.Ev
 
 
 def publish(databroker: VSSClient, path: str, point: Datapoint) -> None:
-    """One signal. A value that the databroker refuses (out of the bounds of its type or its specification) is told,
+    """One signal. A value that the databroker refuses (outside its type or specification) is reported,
     and becomes not available there: no old value stands in its place. Raises VSSClientError where it fails.
     """
     try:

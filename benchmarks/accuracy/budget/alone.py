@@ -2,9 +2,9 @@
 
     alone(n_vans, seed) -> one Row a source
 
-The vans carry no roll rate, and nobody says what they carry: every source is there. ``slope`` is the regression of the
-shifts found upon those that the estimator's own slopes predict for the cause that was drawn, ``z2`` the mean square of
-the shifts found over the variance that its columns state.
+The vans have no roll rate and no declared load, so every source is present. ``slope`` is the regression of the shifts
+found on the shifts that the estimator's own slopes predict for the cause that was drawn. ``z2`` is the mean square of
+the shifts found over the variance that the columns state.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -177,9 +177,9 @@ def _sensor(bench: _Bench) -> Iterator[Shift]:
 
 
 def _shape(bench: _Bench) -> Iterator[Shift]:
-    """A load of any shape that is believed possible, weighed as a load of which nobody said anything.
+    """A load whose shape is drawn from the prior, weighed with no shape declared.
 
-    Predicted is by how much the answer differs from that under the true shape, which the same half-car finds.
+    The predicted shift is the answer minus the answer under the true shape, both from the same half-car.
     """
     prior = bench.calibrated.shape_prior
     assert prior is not None

@@ -36,7 +36,7 @@ def budget_page(found: Mapping[str, Any]) -> str:
             f"{n_vans} simulated vans, calibrated on six known loads without a roll rate, drive once with a load like "
             "the calibrated ones and once more, on the same road in the same way, for each source with that alone "
             "drawn from the distribution that the estimator states of it: springs, tyres and dampers of another day; "
-            "another temperature of the sensors; a load of another length and height, of which nobody said anything; "
+            "another temperature of the sensors; an undeclared load of another length and height; "
             "one that stands beside the centre line; a calibration by a fitter who was wrong about the empty front "
             "share. Stated and found are root mean squares: of the standard deviations that the columns of a source "
             "state, and of the shifts found. The slope is that of the shifts found over those predicted for what was "
@@ -88,7 +88,7 @@ def _alone_cells(row: Mapping[str, Any]) -> list[str]:
 
 
 def _alone_verdicts(rows: list[Mapping[str, Any]]) -> list[str]:
-    """What lies outside of what is right, source by source."""
+    """The figures outside their limits, source by source."""
     return [
         f"- {row['source']}, {words}: {what} is {row[key]:.2f}, {_side(row[key], limits)}."
         for row in rows

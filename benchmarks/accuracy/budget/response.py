@@ -1,4 +1,4 @@
-"""By how much an answer moves when springs, tyres and dampers are truly other than the calibration has them."""
+"""How far an answer moves when the true springs, tyres and dampers differ from the calibration."""
 
 from collections.abc import Mapping
 

@@ -84,7 +84,7 @@ CONSTANTS: Final = (
     ),
     Constant(
         "SPREAD_PART", "gateway.core.cargo", Acts.IN_WEIGHING,
-        "how many loads of which nobody said anything are unlike the known ones",
+        "the share of undeclared loads that are unlike the known loads",
     ),
     Constant(
         "COMPACT_SCATTER", "gateway.core.cargo", Acts.IN_WEIGHING,
