@@ -12,11 +12,11 @@ from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file import CalibrationFile, LikeFile, line_of_files, load_like
 from gateway.calibration.inspection import Inspection, Kind
 from gateway.calibration.judgement import LearningCurve, curve_of
-from gateway.calibration.plan import LoadPlan, plan_first, plan_next
+from gateway.calibration.plan import LoadPlan, StatedWidths, plan_first, plan_next, stated_widths, usual_drive
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, window
 from gateway.cli.text.inspection import inspection_json, inspection_sentences
-from gateway.cli.text.plan import plan_sentences
+from gateway.cli.text.plan import plan_sentences, widths_sentence
 from gateway.cli.text.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
@@ -120,10 +120,14 @@ def calibrate(
     if report is not None:
         _report(report, loaded, outcome, _curve(loaded, outcome) if wants_curve else None)
     plan = plan_next(outcome, loaded.vehicle) if wants_plan else None
+    fitted = outcome.cross_spectrum
+    speed_mps = usual_drive([one.identification for one in outcome.split]).speed_mps
+    widths = stated_widths(fitted.calibration, loaded.vehicle, speed_mps) if fitted else None
     if as_json:
-        click.echo(json_line(_record(outcome.file, output, plan) | {"inspection": inspection_json(inspection)}))
+        record = _record(outcome.file, output, plan, widths) | {"inspection": inspection_json(inspection)}
+        click.echo(json_line(record))
     else:
-        click.echo(_sentences(outcome.file, output, plan, said=inspection.warnings))
+        click.echo(_sentences(outcome.file, output, plan, widths, said=inspection.warnings))
 
 
 def _command(
@@ -210,7 +214,9 @@ def _report(directory: Path, campaign: Campaign, outcome: Outcome, curve: Learni
     click.echo(str(written), err=True)
 
 
-def _record(file: CalibrationFile, output: Path | None, plan: LoadPlan | None) -> dict[str, object]:
+def _record(
+    file: CalibrationFile, output: Path | None, plan: LoadPlan | None, widths: StatedWidths | None
+) -> dict[str, object]:
     return {
         "calibration_id": file.id,
         "output": str(output) if output else None,
@@ -218,11 +224,18 @@ def _record(file: CalibrationFile, output: Path | None, plan: LoadPlan | None) -
         "seen": file.seen.model_dump(mode="json"),
         "expected_errors": {name: errors.model_dump(mode="json") for name, errors in file.expected_errors.items()},
         "warnings": list(file.warnings),
+        **({"stated_widths": widths.to_json()} if widths else {}),
         **({"plan": plan.to_json()} if plan else {}),
     }
 
 
-def _sentences(file: CalibrationFile, output: Path | None, plan: LoadPlan | None, said: Sequence[str]) -> str:
+def _sentences(
+    file: CalibrationFile,
+    output: Path | None,
+    plan: LoadPlan | None,
+    widths: StatedWidths | None,
+    said: Sequence[str],
+) -> str:
     """What was calibrated, with the warnings that are not ``said`` above it."""
     low, high = file.seen.payload_kg
     lines = [
@@ -231,6 +244,7 @@ def _sentences(file: CalibrationFile, output: Path | None, plan: LoadPlan | None
         f"id {file.id}",
         *([f"inherited from {len(file.line.members)} of its line"] if file.line else []),
         *(f"warning: {warning}" for warning in file.warnings if warning not in said),
+        *([widths_sentence(widths)] if widths else []),
         *([plan_sentences(plan)] if plan else []),
     ]
     return "\n".join(lines)

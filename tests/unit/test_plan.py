@@ -16,10 +16,11 @@ from support.known_runs import split_run
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.half_car import CrossSpectrumFit, calibrate_cross_spectrum, prior_of
 from gateway.calibration.inspection import Inspection, RunVerdict
-from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, usual_drive
+from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, stated_widths, usual_drive
 from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
 from gateway.cli import springscale
-from gateway.cli.text.plan import plan_sentences
+from gateway.cli.text.plan import plan_sentences, widths_sentence
+from gateway.core.cargo import Carries
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError, CampaignError
 from gateway.posterior import exactly
@@ -129,6 +130,21 @@ def test_a_plan_says_when_enough_is_driven(outcome: Outcome) -> None:
     assert str(best_next(enough)).startswith("Enough is driven")
     assert not replace(enough, now=replace(known, reach_share=0.5)).is_enough_driven
     assert not replace(enough, now=replace(known, payload_std_kg=2.0 * known.payload_std_kg)).is_enough_driven
+
+
+def test_what_it_costs_to_say_nothing_of_the_loads_is_stated(outcome: Outcome) -> None:
+    assert outcome.cross_spectrum is not None
+    known = outcome.cross_spectrum.calibration
+    widths = stated_widths(known, VAN, 14.0)
+    assert widths is not None
+    assert widths.payload_kg == pytest.approx(0.5 * VAN.payload_range_kg[1])
+    assert widths.compact_kg < widths.now_kg  # whoever says that loads are like the known ones gains
+    said = replace(VAN, carries=Carries.PARCELS)
+    assert stated_widths(known, said, 14.0) is None
+    text = widths_sentence(widths)
+    assert f"± {widths.now_kg:.0f} kg (95 %)" in text
+    assert f"± {widths.carries_kg[Carries.PARCELS]:.0f} with parcels" in text
+    assert set(json.loads(json.dumps(widths.to_json()))["carries_kg"]) == {"pallets", "parcels", "long_goods", "tools"}
 
 
 def test_without_the_half_car_there_is_no_plan(outcome: Outcome) -> None:

@@ -1,6 +1,6 @@
 """A plan as sentences a fitter understands."""
 
-from gateway.calibration.plan import Expected, LoadPlan, PlacedLoad
+from gateway.calibration.plan import Expected, LoadPlan, PlacedLoad, StatedWidths
 from gateway.estimate import Z95
 
 
@@ -25,6 +25,16 @@ def plan_sentences(plan: LoadPlan) -> str:
             "from springs and road alone; so do the signs of the roll rate and of sensor_offset_left_m"
         )
     return "\n".join(lines)
+
+
+def widths_sentence(widths: StatedWidths) -> str:
+    """What saying what the vehicle carries would bring."""
+    kinds = ", ".join(f"± {width:.0f} with {kind}" for kind, width in widths.carries_kg.items())
+    return (
+        f"Nobody said what the vehicle carries: it states a load of {widths.payload_kg:g} kg to ± {widths.now_kg:.0f} "
+        f"kg (95 %). Say it in [vehicle]: carries would make it {kinds}, payload_length_m = 0.8 "
+        f"± {widths.compact_kg:.0f}."
+    )
 
 
 def _now(plan: LoadPlan) -> str:
