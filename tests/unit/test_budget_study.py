@@ -22,7 +22,7 @@ from benchmarks.accuracy.budget.nature import (
     on_that_day,
 )
 from benchmarks.accuracy.budget.response import day_covariance, response_to
-from benchmarks.accuracy.budget.together import Weighing, rows_of_weighings
+from benchmarks.accuracy.budget.together import Weighing, refusals_of, rows_of_weighings
 from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.core.cargo import shape_prior
 from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD
@@ -120,11 +120,13 @@ def test_slopes_and_squares_by_hand() -> None:
 
 def weighing(i: int, error: float, *, half_width: float = 2.0) -> Weighing:
     score = 2.0 * half_width + 40.0 * max(abs(error) - half_width, 0.0)
-    return Weighing("van", f"van {i}", True, False, (), {"payload": (error, half_width, score, error**2)})
+    return Weighing(
+        "van", f"van {i}", True, False, (), {"payload": (error, half_width, score, error**2)}, {"misfit": half_width}
+    )
 
 
 def test_the_figures_of_all_at_once_by_hand() -> None:
-    refused = Weighing("van", "van 9", True, False, ("gap",), {})
+    refused = Weighing("van", "van 9", True, False, ("gap",), {}, {})
     rows = rows_of_weighings([weighing(1, 1.0), weighing(2, -1.5), weighing(3, 2.5), refused])
     (row,) = [one for one in rows if one["n_batches"]]
     payload = row["payload"]
@@ -135,6 +137,18 @@ def test_the_figures_of_all_at_once_by_hand() -> None:
     assert payload["z2"] == pytest.approx((1.0 + 2.25 + 6.25) / 3.0)
     assert payload["coverage_by_van"] is None
     assert row["cg_left"]["n"] == 0
+
+
+def test_refusals_of_healthy_vans_are_counted_by_reason_and_by_van() -> None:
+    def batch(van: str, *rejected: str, misfit: float) -> Weighing:
+        return Weighing(van, f"{van} 1", True, False, rejected, {}, {"misfit": misfit})
+
+    rows = [batch("a", misfit=0.2), batch("a", "too_slow", misfit=0.3), batch("b", "sensor_changed", misfit=0.4)]
+    found = refusals_of(rows)
+    assert found["rate"]["share"] == pytest.approx(1.0 / 3.0)  # a slow drive is no fault of the instrument
+    assert found["rate"]["low"] < 1.0 / 3.0 < found["rate"]["high"]
+    assert found["watched"] == {"misfit": pytest.approx({"p50": 0.3, "p99": 0.398, "most": 0.4})}
+    assert refusals_of([])["rate"] is None
 
 
 def test_the_page_says_what_is_right_and_what_is_not() -> None:
@@ -152,3 +166,4 @@ def test_the_page_says_what_is_right_and_what_is_not() -> None:
     assert "- day" not in page
     assert "intervals hold 100 % of the truths" in page
     assert "| yes | nothing | payload, % | 5 | 0 | 1.00 | 100 %" in page
+    assert "| yes | 5 | none | 2.00, 2.00, 2.00 | none |" in page

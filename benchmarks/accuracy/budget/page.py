@@ -14,6 +14,14 @@ TOGETHER: Final = (
     "Roll rate", "Said", "Quantity", "Batches", "Rejected",
     "Mean abs. error", "95 % covers", "by van", "z squared", "+-", "score (ideal)",
 )  # fmt: skip
+WATCHED: Final = {
+    "misfit": "misfit",
+    "tension": "tension",
+    "sensor_position_score": "sensor position",
+    "sensor_noise_score": "sensor noise",
+}
+REFUSALS: Final = ("Roll rate", "Batches", "Refused", *(f"{name}: 50, 99, 100 %" for name in WATCHED.values()))
+MOST_REFUSED: Final = 0.01
 QUANTITIES: Final = {"payload": "payload, %", "front_share": "front share, %", "cg_left": "lateral place, cm"}
 SLOPE: Final = (0.8, 1.25)
 Z2_ALONE: Final = (0.7, 1.4)
@@ -63,6 +71,15 @@ def budget_page(found: Mapping[str, Any]) -> str:
             *_table(TOGETHER, [cells for row in found["together"] for cells in _together_cells(row)]),
             "",
             *_together_verdicts(found["together"]),
+            "",
+            "## Refusals of healthy vans",
+            "",
+            "Nothing is wrong with these vans and sensors, so every batch refused as misfit or as a changed sensor is "
+            "refused for nothing. The rate is of those, with its 95 % limits by van; the other columns tell how near "
+            "to its limit each watched figure comes (ratios; at 1 a batch is refused). Nothing is said of the loads. "
+            f"Right is a rate of at most {100.0 * MOST_REFUSED:g} %.",
+            "",
+            *_table(REFUSALS, [_refusal_cells(row) for row in found["together"] if not row["is_shape_said"]]),
             "",
         ]
     )
@@ -120,6 +137,13 @@ def _together_cells(row: Mapping[str, Any]) -> list[list[str]]:
         for name, words in QUANTITIES.items()
         if row[name]["n"]
     ]
+
+
+def _refusal_cells(row: Mapping[str, Any]) -> list[str]:
+    found = row["refusals"]
+    watched = [found["watched"].get(name) for name in WATCHED]
+    ratios = ["none" if one is None else f"{one['p50']:.2f}, {one['p99']:.2f}, {one['most']:.2f}" for one in watched]
+    return ["yes" if row["has_roll_rate"] else "no", str(row["n_batches"]), share_cell(found["rate"]), *ratios]
 
 
 def _together_verdicts(rows: list[Mapping[str, Any]]) -> list[str]:

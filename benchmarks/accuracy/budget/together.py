@@ -33,6 +33,7 @@ from gateway.calibration.judgement.coverage import interval_scores
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cross_spectrum.drift import MOST_TENSION
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import cg_left_m
 from gateway.estimate import Estimate
@@ -41,6 +42,8 @@ from gateway.records import Why
 ESTIMATOR: Final = "cross_spectrum"
 MIXED: Final = TRIPS["mixed"]
 QUANTITIES: Final = ("payload", "front_share", "cg_left")
+WATCHED: Final = ("misfit", "tension", "sensor_position_score", "sensor_noise_score")
+INSTRUMENTAL: Final = frozenset({Why.MODEL_MISFIT, Why.SENSOR_CHANGED, Why.SENSOR_DISAGREEMENT, Why.WRONG_SIGN})
 PERCENT_OF_M: Final = 100.0  # lateral places are stated in metres: in centimetres on the page
 
 
@@ -56,6 +59,7 @@ class Weighing:
     is_shape_said: bool
     rejected: tuple[str, ...]
     judged: dict[str, tuple[float, float, float, float]]
+    watched: dict[str, float]  # what a batch may be refused for, over its limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +97,7 @@ def rows_of_weighings(weighings: Sequence[Weighing]) -> list[dict[str, Any]]:
                 "n_rejected": sum(bool(one.rejected) for one in some),
                 "rejected_by_reason": {why: reasons.count(why) for why in sorted({*reasons})},
                 **{name: asdict(figures_of(name, some)) for name in QUANTITIES},
+                "refusals": refusals_of(some),
             }
         )
     return rows
@@ -114,6 +119,21 @@ def figures_of(quantity: str, weighings: Iterable[Weighing]) -> Figures:
         float(np.mean(score)),
         *(asdict(coverage_of(held, each)) if len({*each}) > 1 else None for each in (by_run, by_van)),
     )
+
+
+def refusals_of(weighings: Sequence[Weighing]) -> dict[str, Any]:
+    """Nothing is wrong with these vans: how near each watched figure comes to its limit (quantiles of the ratio), and
+    the share of batches refused for a reason of the instrument, with its 95 % limits by van.
+    """
+    refused = [any(Why(why) in INSTRUMENTAL for why in one.rejected) for one in weighings]
+    rate = coverage_of(refused, [one.van for one in weighings]) if len({one.van for one in weighings}) > 1 else None
+    watched = {}
+    for name in WATCHED:
+        ratios = [one.watched[name] for one in weighings if math.isfinite(one.watched.get(name, math.nan))]
+        if ratios:
+            p50, p99, most = np.quantile(ratios, (0.5, 0.99, 1.0)).tolist()
+            watched[name] = {"p50": p50, "p99": p99, "most": most}
+    return {"rate": asdict(rate) if rate else None, "watched": watched}
 
 
 def of_one_van(scope: Scope, seed: int, number: int) -> list[Weighing]:
@@ -168,7 +188,28 @@ def _weighed(
             judged = {name: _judged(found, name, *truth) for name, truth in truths.items()} if found.counted else {}
             known = {name: row for name, row in judged.items() if math.isfinite(row[0])}
             rejected = tuple(map(str, found.rejected))
-            yield Weighing(vehicle.name, f"{vehicle.name} {run.number}", has_roll_rate, is_said, rejected, known)
+            yield Weighing(
+                vehicle.name,
+                f"{vehicle.name} {run.number}",
+                has_roll_rate,
+                is_said,
+                rejected,
+                known,
+                _watched(found, calibrated),
+            )
+
+
+def _watched(found: Estimate, calibrated: CalibratedVehicle) -> dict[str, float]:
+    """Each figure that a batch may be refused for, over its limit; a score of noise below zero is none."""
+    limits, seen = calibrated.cross_spectrum, found.diagnostics
+    if limits is None or "misfit" not in seen:
+        return {}
+    return {
+        "misfit": seen["misfit"] / limits.misfit_limit,
+        "tension": seen["tension"] / MOST_TENSION,
+        "sensor_position_score": abs(seen["sensor_position_score"]) / limits.most_position_score,
+        "sensor_noise_score": max(seen["sensor_noise_score"], 0.0) / limits.most_noise_score,
+    }
 
 
 def _judged(found: Estimate, quantity: str, true: float, scale: float) -> tuple[float, float, float, float]:

@@ -80,7 +80,15 @@ CONSTANTS: Final = (
     ),
     Constant(
         "EVIDENCE", "gateway.core.cross_spectrum.shape", Acts.IN_WEIGHING,
-        "how much a batch's evidence of its load's shape counts",
+        "how much a batch's evidence counts against calibration and nature",
+    ),
+    Constant(
+        "SHAPE_EVIDENCE", "gateway.core.cross_spectrum.shape", Acts.IN_WEIGHING,
+        "how many times as much it counts against shapes",
+    ),
+    Constant(
+        "EVIDENCE_DOF", "gateway.core.cross_spectrum.shape", Acts.IN_WEIGHING,
+        "how slowly a shape that it speaks against becomes impossible",
     ),
     Constant(
         "SPREAD_PART", "gateway.core.cargo", Acts.IN_WEIGHING,

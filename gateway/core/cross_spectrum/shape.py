@@ -22,10 +22,15 @@ NODES_PER_WHEELBASE2: Final = (0.004, 0.013, 0.032, 0.06, 0.095, 0.14, 0.2, 0.3)
 m.
 """
 EVIDENCE: Final = 0.5
-"""How much a batch's evidence counts against shapes, calibration and nature, 1 being what its own statistics say.
+"""How much a batch's evidence counts against calibration and nature, 1 being what its own statistics say.
 Chosen on simulated vans that serve no other purpose (`benchmarks.accuracy budget`).
 """
 EVIDENCE_WITHOUT_ROLL: Final = 0.2  # of a sensor that takes roll for heave and nobody can tell; as in calibration
+SHAPE_EVIDENCE: Final = 2.0  # against shapes it counts so many times as much, with Student's tail; chosen likewise
+EVIDENCE_DOF: Final = 4.0
+"""Degrees of freedom of that tail: a batch is one witness of how much the half-car errs, so a shape that it speaks
+against stays possible (K. L. Lange, R. J. A. Little and J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989) 881-896).
+"""
 LEAST_PROBABILITY: Final = 1e-3  # of a shape that is worth weighing, before and after
 POINTS: Final = (0.025, 0.5, 0.975)
 
@@ -80,7 +85,9 @@ def shaped(
         return Shaped(float(nodes[0]), x, x[-2:], np.zeros(2), NORMAL_TAILS, 0.0, (float(nodes[0]), founds[0].start))
     within = (prior.log_s >= nodes[0]) & (prior.log_s <= nodes[-1])
     log_s = prior.log_s[within]
-    cost = PchipInterpolator(nodes, [evidence * found.cost + found.improbable for found in founds])(log_s)
+    least = min(found.cost for found in founds)
+    against = [_against(found.cost - least, evidence) + found.improbable for found in founds]
+    cost = PchipInterpolator(nodes, against)(log_s)
     path = PchipInterpolator(nodes, np.stack([found.x for found in founds]))
     weight = prior.probability[within] * np.exp(-(cost - cost.min()))
     weight /= weight.sum()
@@ -122,10 +129,15 @@ def _profile(
             found[node] = weighed_as(node, x)
             x = found[node].start
             least = min(least, found[node].cost)
-            if evidence * (found[node].cost - least) > -np.log(LEAST_PROBABILITY):
+            if _against(found[node].cost - least, evidence) > -np.log(LEAST_PROBABILITY):
                 break
     inside = sorted(found)
     return np.array(inside), [found[node] for node in inside]
+
+
+def _against(excess: float, evidence: float) -> float:
+    """Minus the logarithm of how probable the batch makes a shape whose cost is so much above the best one's."""
+    return 0.5 * (EVIDENCE_DOF + 1.0) * float(np.log1p(2.0 * SHAPE_EVIDENCE * evidence * excess / EVIDENCE_DOF))
 
 
 def _points(x: F64, weight: F64) -> tuple[float, float, float]:
