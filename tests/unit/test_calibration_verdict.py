@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,6 +15,7 @@ from gateway.calibration.judgement import Assessment, Grade, Judged, Judgement, 
 from gateway.calibration.plan import Expected
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity
+from gateway.posterior import Posterior, Source
 from gateway.records import Why
 
 VAN = Vehicle("van", 1240.0, 2.8)  # ranges of 450 kg and of 20 points
@@ -88,6 +90,20 @@ def test_batches_of_one_run_say_no_more_of_coverage_than_the_run() -> None:
     rows = [judged(run, 30.0 if run <= 2 else 1.0) for run in range(1, 6)]
     once, often = verdict(rows * 2), verdict(rows * 8)
     assert grade_of(once, "payload_coverage") == grade_of(often, "payload_coverage")
+
+
+@pytest.mark.parametrize(("error_kg", "grade"), [(10.0, Grade.FIT), (4.0, Grade.FIT), (0.5, Grade.RESERVED)])
+def test_intervals_that_are_far_too_wide_are_a_fault_too(error_kg: float, grade: Grade) -> None:
+    """Ten runs, 10 kg stated besides what a campaign cannot show: its day and its sensor."""
+    sources = {Source.DAY: np.array([[50.0, 0.1]]), Source.SENSOR: np.array([[50.0, 0.1]])}
+    rows = []
+    for run in range(1, 11):
+        one = judged(run, error_kg)
+        posterior = Posterior(np.array([one.estimate.payload.number, 50.0]), np.diag([100.0, 1.0]), sources)
+        rows.append(replace(one, estimate=replace(one.estimate, posterior=posterior)))
+    found = verdict(rows)
+    assert grade_of(found, "payload_width") is grade
+    assert f"are {error_kg / 10.0:.2f} times" in next(one.text for one in found.reasons if one.rule == "payload_width")
 
 
 @pytest.mark.parametrize(("n_refused", "grade"), [(1, Grade.FIT), (3, Grade.RESERVED), (6, Grade.UNFIT)])

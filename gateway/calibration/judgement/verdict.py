@@ -7,7 +7,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from statistics import fmean
 from typing import Final
+
+from scipy.special import gammainc
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import RunVerdict, Severity
@@ -19,11 +22,13 @@ from gateway.calibration.plan import Expected
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Z95
+from gateway.posterior import FRONT_SHARE, PAYLOAD, Source
 from gateway.words import counted
 
 FIT_ERROR_PCT: Final = 10.0  # of the range (12)
 MOST_ERROR_PCT: Final = 20.0  # a guess at mid-range errs by 25 % over evenly spread loads
 LEAST_COVERAGE: Final = 0.7  # intervals of 95 % that surely hold the truth less often mislead
+TOO_WIDE: Final = 1e-3  # so seldom are errors as small by chance, where intervals are right (chi-squared over runs)
 FEW_REJECTED: Final = 0.2
 MOST_REJECTED: Final = 0.5
 VALIDATION_FACTOR: Final = 2.0  # validation errors beyond this many times those of runs left out
@@ -96,6 +101,7 @@ def _errors_and_intervals(judgement: Judgement) -> Iterator[Reason]:
     yield from (_error(table.errors, part, target) for target in TARGETS)
     for target in TARGETS:
         yield from _coverage(table.judged, part, target)
+        yield from _width(table.judged, part, target)
     yield _answered(table.errors, part)
     if part is Part.LEFT_OUT and Part.VALIDATION in judgement.tables:
         yield from _agreement(table.errors.payload, judgement.tables[Part.VALIDATION].errors.payload)
@@ -144,6 +150,31 @@ def _coverage(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[
         f"95 % intervals of {target.replace('_', ' ')} hold the truth in {100.0 * coverage.share:.0f} % of the batches "
         f"of {PART_NAMES[part]}; what {coverage.n_clusters} runs can tell of it is {100.0 * coverage.low:.0f} to "
         f"{100.0 * coverage.high:.0f} %.",
+    )
+
+
+def _width(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[Reason]:
+    """Coverage from its other side: errors far smaller than what is stated. Batches of one run count as one.
+
+    The errors are held against what a campaign can show of them: it has one day, one sensor and its own shape of load.
+    """
+    entry = {"payload": PAYLOAD, "front_share": FRONT_SHARE}[target]
+    by_run: dict[int, list[float]] = {}
+    for one in judged:
+        if (stated := one.estimate.posterior) is not None:
+            compared = one.compared(target)
+            std = stated.without(Source.DAY, Source.SENSOR, Source.GOODS, Source.LOAD_LENGTH).std(entry)
+            by_run.setdefault(one.run, []).append(((compared.estimated - compared.true) / std) ** 2)
+    if len(by_run) < 2:
+        return
+    squared = sum(fmean(of_run) for of_run in by_run.values())
+    is_wide = gammainc(0.5 * len(by_run), 0.5 * squared) < TOO_WIDE
+    yield Reason(
+        f"{target}_width",
+        Grade.RESERVED if is_wide else Grade.FIT,
+        f"Errors of {target.replace('_', ' ')} over the {PART_NAMES[part]} are {math.sqrt(squared / len(by_run)):.2f} "
+        "times the standard deviation stated without day, sensor and shape of load; 1 is right"
+        + (": intervals are wider than they need be." if is_wide else "."),
     )
 
 
