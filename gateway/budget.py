@@ -5,7 +5,8 @@ it.
 """
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -50,6 +51,29 @@ def budget_of(posterior: Posterior, *, is_shape_said: bool, is_empty_weighed: bo
     with_remedies = (_with_remedy(line, posterior, is_shape_said, is_empty_weighed) for line in lines)
     known = [line for line in with_remedies if line.payload_kg > 0.0 or line.front_share_pct > 0.0]
     return tuple(sorted(known, key=lambda line: (-line.payload_kg, line.source)))
+
+
+def typical_budget(budgets: Sequence[tuple[BudgetLine, ...]]) -> tuple[BudgetLine, ...]:
+    """Of several batches together: root mean squares by source, with the remedy that the most batches have."""
+    rows: dict[str, list[BudgetLine]] = {}
+    for line in (line for budget in budgets for line in budget):
+        rows.setdefault(line.source, []).append(line)
+
+    def rms(numbers: Iterable[float]) -> float:
+        return math.sqrt(math.fsum(number**2 for number in numbers) / len(budgets))
+
+    lines = [
+        BudgetLine(
+            source,
+            rms(line.payload_kg for line in some),
+            rms(line.front_share_pct for line in some),
+            rms(line.cg_left_m for line in some),
+            Counter(line.remedy for line in some).most_common(1)[0][0],
+            rms(line.payload_with_remedy_kg for line in some),
+        )
+        for source, some in rows.items()
+    ]
+    return tuple(sorted(lines, key=lambda line: (-line.payload_kg, line.source)))
 
 
 def _line(source: str, std: np.ndarray, posterior: Posterior) -> BudgetLine:

@@ -133,6 +133,15 @@ def test_the_plan_says_what_to_drive_next(numbers: Mapping[str, Any], page: Page
     assert [row[0][:2] for row in planned[2:5]] == ["1.", "2.", "3."]
 
 
+def test_the_budget_says_where_the_stated_error_comes_from(numbers: Mapping[str, Any], page: Page) -> None:
+    shown = [table for table in page.tables if table[0][-1] == "what would narrow it"]
+    drawn = [[row[1] for row in table[1:]] for table in shown]
+    budgets = numbers["error_budget"]
+    assert drawn == [[f"{line['payload_kg']:.1f} kg" for line in budgets[name]] for name in numbers["errors"]]
+    assert {line["source"] for line in budgets["cross_spectrum"]} >= {"own", "calibration", "day", "model"}
+    assert {line["source"] for line in budgets["ratio_index"]} == {"own", "calibration"}  # a regression has no more
+
+
 def test_an_evaluation_has_a_report_of_its_own(made: Path) -> None:
     told = run(
         "evaluate", str(made / "campaign.toml"), "--calibration", str(made / "vehicle.json"), "--estimator",

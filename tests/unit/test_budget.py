@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.budget import OWN, Remedy, budget_of
+from gateway.budget import OWN, Remedy, budget_of, typical_budget
 from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, SHAPE, Posterior, Source, exactly
 
 
@@ -76,3 +76,15 @@ def test_what_adds_nothing_has_no_line() -> None:
     assert budget_of(exactly(300.0, 50.0), is_shape_said=False) == ()
     quiet = Posterior(np.array([300.0, 50.0]), np.eye(2), {Source.DAY: np.zeros((3, 2))})
     assert [line.source for line in budget_of(quiet, is_shape_said=False)] == [OWN]
+
+
+def test_several_batches_have_the_root_mean_squares_of_their_lines() -> None:
+    """A source that one batch lacks counts as nothing there, so that squares still add up to the mean variance."""
+    both, one = with_all(), with_all().without(Source.SIDEWAYS)
+    together = typical_budget([budget_of(each, is_shape_said=True) for each in (both, one)])
+    variance = 0.5 * (both.covariance + one.covariance)
+    assert sum(line.payload_kg**2 for line in together) == pytest.approx(variance[PAYLOAD, PAYLOAD])
+    by_source = {line.source: line for line in together}
+    assert by_source[Source.SIDEWAYS].payload_kg == pytest.approx(20.0 / math.sqrt(2.0))
+    assert by_source[Source.SIDEWAYS].remedy is Remedy.READ_ROLL_RATE
+    assert together[0].payload_kg == max(line.payload_kg for line in together)

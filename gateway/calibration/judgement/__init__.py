@@ -14,6 +14,7 @@ from gateway.calibration.judgement.assessment import (
     Part,
     assess_calibration,
     assess_evaluation,
+    stated_budget,
 )
 from gateway.calibration.judgement.coverage import Coverage, coverage_of
 from gateway.calibration.judgement.evaluation import (
@@ -65,5 +66,6 @@ __all__ = [
     "judge",
     "observed_coverage",
     "standardised",
+    "stated_budget",
     "verdicts_of",
 ]

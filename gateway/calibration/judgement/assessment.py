@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from gateway.budget import BudgetLine, budget_of, typical_budget
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
 from gateway.calibration.file import CalibrationFile, RegressionPart
 from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
+from gateway.core.cargo import is_said
 from gateway.core.vehicle import Vehicle
 
 
@@ -60,6 +62,18 @@ class Assessment:
     vehicle: Vehicle
     judgements: tuple[Judgement, ...]
     outcome: Outcome | None = None
+
+
+def stated_budget(judgement: Judgement, vehicle: Vehicle) -> tuple[BudgetLine, ...]:
+    """Where the error that the service states comes from, over batches weighed as it weighs; empty where none was.
+
+    Runs left out are no such batches: they are known to have the shape of the other known loads.
+    """
+    part = next((one for one in (Part.VALIDATION, Part.ALL, Part.IDENTIFICATION) if one in judgement.tables), None)
+    posteriors = [one.estimate.posterior for one in judgement.tables[part].judged] if part else []
+    is_shape_said = is_said(vehicle)
+    budgets = [budget_of(one, is_shape_said=is_shape_said) for one in posteriors if one is not None]
+    return typical_budget(budgets) if budgets else ()
 
 
 def assess_calibration(campaign: Campaign, outcome: Outcome) -> Assessment:

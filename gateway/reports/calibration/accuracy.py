@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from scipy.special import ndtri
 
+from gateway.budget import BudgetLine
 from gateway.calibration.judgement import (
     LEVELS,
     PART_NAMES,
@@ -20,7 +21,7 @@ from gateway.calibration.judgement import (
     standardised,
 )
 from gateway.records import F64
-from gateway.reports.calibration.error_tables import batches_table, runs_table, summary_table
+from gateway.reports.calibration.error_tables import batches_table, budget_table, runs_table, summary_table
 from gateway.reports.calibration.text import decimal, estimator_name, percent
 from gateway.reports.charts import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
 from gateway.words import counted
@@ -29,8 +30,8 @@ _MARKERS: Final[Mapping[Part, Marker]] = {Part.LEFT_OUT: "circle", Part.VALIDATI
 _COLOURS: Final[Mapping[Part, int]] = {Part.LEFT_OUT: 0, Part.VALIDATION: 1, Part.IDENTIFICATION: 3, Part.ALL: 0}
 
 
-def accuracy_section(judgement: Judgement) -> Section:
-    """Everything about one estimator's errors."""
+def accuracy_section(judgement: Judgement, budget: Sequence[BudgetLine] = ()) -> Section:
+    """Everything about one estimator's errors; ``budget`` is where those that it states come from."""
     name = estimator_name(judgement.estimator)
     targets = [target for target in TARGETS if _has_answers(judgement, target)]
     charts = (
@@ -45,7 +46,7 @@ def accuracy_section(judgement: Judgement) -> Section:
         f"Accuracy of the {name}",
         (*(PART_TEXT[part] for part in judgement.tables), *_sideways(judgement)),
         tuple(chart for chart in charts if chart is not None),
-        (summary_table(judgement),),
+        (summary_table(judgement), *([budget_table(budget)] if budget else [])),
         (("Errors run by run", tables), ("Every batch", batches)),
     )
 

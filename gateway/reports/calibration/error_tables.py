@@ -1,9 +1,10 @@
 """The error table (12) for people: in short, run by run and batch by batch."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
+from gateway.budget import BudgetLine
 from gateway.calibration.judgement import (
     PART_NAMES,
     CgLeftErrors,
@@ -15,6 +16,8 @@ from gateway.calibration.judgement import (
     TargetErrors,
 )
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
+from gateway.estimate import Z95
+from gateway.reasons import REMEDIES, SOURCES
 from gateway.records import iso_utc
 from gateway.reports.calibration.text import NONE, decimal, percent
 from gateway.reports.charts import Table
@@ -49,6 +52,26 @@ def summary_table(judgement: Judgement) -> Table:
         ("Batches of", "Quantity", "answered", *_COLUMNS),
         tuple(rows),
         n_heads=2,
+    )
+
+
+def budget_table(budget: Sequence[BudgetLine]) -> Table:
+    """Where the stated error comes from."""
+    rows = [
+        (
+            SOURCES[line.source].capitalize(),
+            decimal(line.payload_kg, " kg", 1),
+            decimal(line.front_share_pct, " pp"),
+            decimal(1000.0 * line.cg_left_m, " mm", 1) if math.isfinite(line.cg_left_m) else NONE,
+            f"{REMEDIES[line.remedy]}: ± {Z95 * line.payload_with_remedy_kg:.0f} kg" if line.remedy else NONE,
+        )
+        for line in budget
+    ]
+    return Table(
+        "Where the stated error comes from: standard deviations by source (root mean squares over the batches, largest "
+        "first), and what would narrow it, with the 95 % interval of the payload that this would leave",
+        ("Source", "payload", "front share", "centre of gravity, left", "what would narrow it"),
+        tuple(rows),
     )
 
 

@@ -20,9 +20,11 @@ from gateway.calibration.judgement import (
     LearningCurve,
     Verdict,
     assess_calibration,
+    stated_budget,
     verdicts_of,
 )
 from gateway.calibration.plan import LoadPlan, plan_next
+from gateway.estimate_json.errors import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import half_car_section
 from gateway.reports.calibration.learning import learning_section
@@ -78,7 +80,8 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: LoadPlan |
 
 
 def _evaluation_sections(assessment: Assessment) -> list[Section]:
-    return [*(accuracy_section(judgement) for judgement in assessment.judgements), provenance_section(assessment)]
+    accuracy = [accuracy_section(one, stated_budget(one, assessment.vehicle)) for one in assessment.judgements]
+    return [*accuracy, provenance_section(assessment)]
 
 
 def _write(
@@ -173,6 +176,9 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: Loa
         "errors": {
             one.estimator: {str(part): table.to_json() for part, table in one.tables.items()}
             for one in assessment.judgements
+        },
+        "error_budget": {
+            one.estimator: budget_to_json(stated_budget(one, assessment.vehicle)) for one in assessment.judgements
         },
         "plan": plan.to_json() if plan else None,
     }
