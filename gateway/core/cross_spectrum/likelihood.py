@@ -30,6 +30,7 @@ from gateway.records import F64
 EFFECTIVE_SHARE: Final = 0.5  # neighbouring Hann bins and half-overlapping segments repeat each other
 ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen (`benchmarks.accuracy sensitivity`)
 ROAD_SLOPE_STD: Final = 0.3
+MOST_KEPT: Final = 48  # curvatures: a load under eight shapes has about thirty
 EVIDENCE_WEIGHT: Final = 0.2  # minutes of driving repeat the same model error; chosen likewise
 
 
@@ -114,6 +115,7 @@ class Whittle:
         self._level_weight = self._n / (1.0 / self._p + ROAD_RIPPLE**2 * float(np.sum(self._n)))
         self._slope = _centred(np.log(freq_hz))
         self._last: _Whitened | None = None
+        self._curvatures: dict[tuple[bytes, tuple[float, ...], tuple[int, ...]], Curvature] = {}
 
     def cost(self, point: Point) -> float:
         """Negative log-likelihood, up to a constant."""
@@ -144,7 +146,18 @@ class Whittle:
         return float(evidence / ((self._p**2 - 1.0) * excess[many].size))
 
     def curvature(self, point: Point, free: Sequence[int]) -> Curvature:
-        """Derivatives for the ``free`` entries of theta (n,) and, numbered on from n, of ``Point.loaded``."""
+        """Derivatives for the ``free`` entries of theta (n,) and, numbered on from n, of ``Point.loaded``.
+
+        The last few are kept: an answer asks again for what it has found under its likeliest shape.
+        """
+        key = point.theta.tobytes(), point.loaded, tuple(free)
+        if key not in self._curvatures:
+            if len(self._curvatures) == MOST_KEPT:
+                del self._curvatures[next(iter(self._curvatures))]
+            self._curvatures[key] = self._curvature(point, free)
+        return self._curvatures[key]
+
+    def _curvature(self, point: Point, free: Sequence[int]) -> Curvature:
         z = self._whitened(point)
         slopes = spectral_slopes(point.theta, point.loaded, self.ground, self.spectra, free, (z.model, z.driven))
         d = z.by(slopes)

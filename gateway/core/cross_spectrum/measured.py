@@ -22,7 +22,6 @@ SPEED_CHANGE_MAX_MPS2 = 0.3  # braking and pulling away pitch the body without a
 SPEED_SAMPLE_STEP = 8
 LEAST_SEGMENTS = 6
 LEAST_SHARE_WITH_ROLL = 0.7  # of the segments; with fewer, what the roll rate tells is not worth what it costs
-_NO_SEGMENT = np.empty((0, 0), np.complex128)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,29 +157,25 @@ def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra
     Where the roll rate is to be read and most segments lack it, they are read without.
     """
     batches = tuple(batches)
-    joined, freq_hz = _joined(batches, reading, with_roll=False)
-    if reading.with_roll and all(batch.roll_rate_radps is not None for batch in batches):
-        rolling, _ = _joined(batches, reading, with_roll=True)
-        if len(rolling.delays_s) >= max(LEAST_SEGMENTS, LEAST_SHARE_WITH_ROLL * len(joined.delays_s)):
-            joined = rolling
-    if len(joined.delays_s) < LEAST_SEGMENTS:
+    chosen = [_steady_starts(batch, reading, with_roll=False) for batch in batches]
+    with_roll = reading.with_roll and all(batch.roll_rate_radps is not None for batch in batches)
+    if with_roll:
+        rolling = [_steady_starts(batch, reading, with_roll=True) for batch in batches]
+        with_roll = _n(rolling) >= max(LEAST_SEGMENTS, LEAST_SHARE_WITH_ROLL * _n(chosen))
+        chosen = rolling if with_roll else chosen
+    if _n(chosen) < LEAST_SEGMENTS:
         return None
-    return _grouped(joined, freq_hz, reading)
+    every_hz = frequencies_hz(reading.n_segment, batches[0].rate_hz)
+    low_hz, high_hz = reading.band_hz
+    kept = np.flatnonzero((every_hz >= low_hz - every_hz[1]) & (every_hz <= high_hz + every_hz[1]))
+    parts = [_segments(*pair, reading, kept, with_roll=with_roll) for pair in zip(batches, chosen, strict=True)]
+    sensed = tuple(np.concatenate(of_one) for of_one in zip(*(part.sensed for part in parts), strict=True))
+    joined = _Segments(sensed, np.concatenate([part.delays_s for part in parts]))
+    return _grouped(joined, every_hz[kept], reading)
 
 
-def _joined(batches: Sequence[Batch], reading: Reading, *, with_roll: bool) -> tuple[_Segments, F64]:
-    """Segments of all batches and the frequencies (m + 2,) of their transforms."""
-    parts: list[_Segments] = []
-    freq_hz = np.empty(0)
-    for batch in batches:
-        every_hz = frequencies_hz(reading.n_segment, batch.rate_hz)
-        step_hz = every_hz[1]
-        kept = np.flatnonzero((every_hz >= reading.band_hz[0] - step_hz) & (every_hz <= reading.band_hz[1] + step_hz))
-        freq_hz = every_hz[kept]
-        parts.append(_segments(batch, reading, kept, with_roll=with_roll))
-    n_sensors = 3 if with_roll else 2
-    sensed = tuple(np.concatenate([part.sensed[i] for part in parts] or [_NO_SEGMENT]) for i in range(n_sensors))
-    return _Segments(sensed, np.concatenate([part.delays_s for part in parts] or [np.empty((0, 0))])), freq_hz
+def _n(starts: Sequence[I64]) -> int:
+    return sum(len(one) for one in starts)
 
 
 def why_no_spectra(batch: Batch, reading: Reading) -> Why:
@@ -214,28 +209,35 @@ def log_amplitude_of(acceleration: F64, pitch_rate: F64) -> F64:
     return found
 
 
-def _segments(batch: Batch, reading: Reading, kept: I64, *, with_roll: bool) -> _Segments:
-    n_segment = reading.n_segment
+def _sensed(batch: Batch, *, with_roll: bool) -> list[F64]:
     sensed = [batch.vertical_acceleration_mps2, batch.pitch_rate_radps]
-    if with_roll and batch.roll_rate_radps is not None:
-        sensed.append(batch.roll_rate_radps)
-    has_all = np.logical_and.reduce([np.isfinite(one) for one in sensed])
+    return [*sensed, batch.roll_rate_radps] if with_roll and batch.roll_rate_radps is not None else sensed
+
+
+def _steady_starts(batch: Batch, reading: Reading, *, with_roll: bool) -> I64:
+    """First samples (k,) of segments in which all sensors read and the speed is steady."""
+    n_segment = reading.n_segment
+    has_all = np.logical_and.reduce([np.isfinite(one) for one in _sensed(batch, with_roll=with_roll)])
     starts = segment_starts(batch.usable & has_all, n_segment, n_segment // 2)
-    if starts.size:
-        speeds_mps = np.lib.stride_tricks.sliding_window_view(batch.speed_mps, n_segment)[starts]
-        is_steady = np.ptp(speeds_mps, axis=1) < SPEED_CHANGE_MAX_MPS2 * n_segment / batch.rate_hz
-        starts, speeds_mps = starts[is_steady], speeds_mps[is_steady]
     if not starts.size:
-        nothing = np.empty((0, len(kept)), np.complex128)
-        return _Segments((nothing,) * len(sensed), np.empty((0, len(range(0, n_segment, SPEED_SAMPLE_STEP)))))
-    freq_hz = frequencies_hz(n_segment, batch.rate_hz)[kept]
-    a, g, *rolling = (segment_transforms(one, starts, n_segment, batch.rate_hz)[:, kept] for one in sensed)
-    if rolling and reading.mount is not None:
-        a, g, *rolling = reading.mount.levelled((a, g, rolling[0]), freq_hz)
-    return _Segments(
-        (a, g, *rolling),
-        reading.wheelbase_m / speeds_mps[:, ::SPEED_SAMPLE_STEP],
-    )
+        return starts
+    speeds_mps = np.lib.stride_tricks.sliding_window_view(batch.speed_mps, n_segment)[starts]
+    steady: I64 = starts[np.ptp(speeds_mps, axis=1) < SPEED_CHANGE_MAX_MPS2 * n_segment / batch.rate_hz]
+    return steady
+
+
+def _segments(batch: Batch, starts: I64, reading: Reading, kept: I64, *, with_roll: bool) -> _Segments:
+    """The segments that begin at ``starts`` (k,), at the ``kept`` of their frequencies."""
+    n_segment = reading.n_segment
+    sampled = starts[:, None] + np.arange(0, n_segment, SPEED_SAMPLE_STEP)
+    sensed = [
+        segment_transforms(one, starts, n_segment, batch.rate_hz)[:, kept]
+        for one in _sensed(batch, with_roll=with_roll)
+    ]
+    if len(sensed) > 2 and reading.mount is not None:
+        a, g, roll = sensed
+        sensed = list(reading.mount.levelled((a, g, roll), frequencies_hz(n_segment, batch.rate_hz)[kept]))
+    return _Segments(tuple(sensed), reading.wheelbase_m / batch.speed_mps[sampled])
 
 
 def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectra:
@@ -253,12 +255,10 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
     alike = np.round(np.stack([np.log(mean_delay_s) / SPEED_BIN, log_amplitude / AMPLITUDE_BIN], axis=1))
     _, member = np.unique(alike, axis=0, return_inverse=True)
     n_segments = np.bincount(member).astype(float)[:, None]
+    is_in = (member == np.arange(len(n_segments))[:, None]) / n_segments
 
     def mean(per_segment: C128 | F64) -> C128:
-        total = np.zeros((len(n_segments), per_segment.shape[1]), np.complex128)
-        np.add.at(total, member, per_segment)
-        total /= n_segments
-        return total
+        return np.asarray(is_in @ per_segment, np.complex128)
 
     def with_roll(roll: C128) -> RollSpectra:
         return RollSpectra(
@@ -267,13 +267,12 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
             with_pitch_rate=mean(roll * np.conj(g) / divisor),
         )
 
-    phase = np.exp(-2j * np.pi * segments.delays_s[:, :, None] * freq_hz)
     return CrossSpectra(
         freq_hz=freq_hz,
         acceleration=np.real(mean(np.abs(a) ** 2 / divisor)),
         pitch_rate=np.real(mean(np.abs(g) ** 2 / divisor)),
         cross=mean(g * np.conj(a) / divisor),
-        delay_phase=mean(np.einsum("t,ktf->kf", weight, phase)),
+        delay_phase=mean(_mean_phase(segments.delays_s, weight, freq_hz)),
         delay_s=np.real(mean(mean_delay_s[:, None])),
         n_segments=n_segments,
         inverse_power=np.real(mean(1.0 / divisor)),
@@ -283,3 +282,14 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
         reading=replace(reading, usual_log_amplitude=usual),
         roll=with_roll(rolling[0]) if rolling else None,
     )
+
+
+def _mean_phase(delays_s: F64, weight: F64, freq_hz: F64) -> C128:
+    """(k, m) mean of exp(-j 2 pi f delay) over delays_s (k, t), by weight (t,), at evenly spaced freq_hz (m,)."""
+    turned = np.exp(-2j * np.pi * freq_hz[0] * delays_s)
+    step = np.exp(-2j * np.pi * (freq_hz[1] - freq_hz[0]) * delays_s)
+    found = np.empty((len(delays_s), len(freq_hz)), np.complex128)
+    for column in range(len(freq_hz)):
+        found[:, column] = turned @ weight
+        turned *= step
+    return found

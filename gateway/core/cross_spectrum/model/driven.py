@@ -15,7 +15,8 @@ from scipy.special import k1
 
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.friction import at_levels, level_weights
-from gateway.core.cross_spectrum.model.half_car import frequency_response
+from gateway.core.cross_spectrum.model.half_car import half_car_numbers
+from gateway.core.cross_spectrum.model.motion import Frame, Motion, Numbers
 from gateway.core.cross_spectrum.model.parameters import (
     NOISES,
     SLACK_KNOTS,
@@ -26,7 +27,7 @@ from gateway.core.cross_spectrum.model.parameters import (
     slack_weights,
     value_of,
 )
-from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_response
+from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_numbers
 from gateway.records import C128, F64
 
 Paths = tuple[C128, ...]
@@ -37,13 +38,13 @@ Paths = tuple[C128, ...]
 class SpectralModel:
     """Vehicles theta (..., n) with their loads, solved but not yet driven at any speed.
 
-    ``paths`` (p, ..., 5, m) are to a unit of road under one axle, at each of friction.levels(); slack (p, ..., m) is
+    ``motion`` is solved at each of friction.levels(), its numbers being (..., 5, 1); slack (p, ..., m) is
     a share of each sensor's power, least_slack and what parameters add; noise (p, ..., 1) is a density in the square of
     the sensor's unit per hertz.
     tracks_apart_m and twist_level are None for a vehicle that does not roll.
     """
 
-    paths: Paths
+    motion: Motion
     slack: F64
     least_slack: float
     noise: F64
@@ -79,8 +80,9 @@ def spectral_model(
     the centre line in m, each (...,).
     """
     with_roll = has_roll(theta)
+    frame = Frame(ground.wheelbase_m, ground.half_track_m if with_roll else None)
     return SpectralModel(
-        paths=responses(theta, load, ground, freq_hz, n_sensors),
+        motion=Motion(numbers_of(theta, load, ground), frame, freq_hz, n_sensors),
         slack=ground.least_slack + np.stack([_slack(theta, knots, freq_hz) for knots in SLACK_KNOTS[:n_sensors]]),
         least_slack=ground.least_slack,
         noise=np.stack([value_of(theta, name) for name in NOISES[:n_sensors]]),
@@ -93,21 +95,13 @@ def spectral_model(
     )
 
 
-def responses(theta: F64, load: tuple[F64 | float, ...], ground: Ground, freq_hz: F64, n_sensors: int) -> Paths:
-    """Responses (p, ..., 5, m) by front and rear axle, at each of friction.levels()."""
+def numbers_of(theta: F64, load: tuple[F64 | float, ...], ground: Ground) -> Numbers:
+    """What is in the equations of motion (..., 5, 1) at each of friction.levels()."""
     acting = at_levels(theta)
     payload_kg, front_share, *cg_left_m = (np.asarray(one)[..., None, None] for one in load)
     if not has_roll(theta):
-        r = frequency_response(half_car(acting, ground), payload_kg, front_share, freq_hz)
-        return (
-            np.stack([r.acceleration_front, r.pitch_rate_front]),
-            np.stack([r.acceleration_rear, r.pitch_rate_rear]),
-        )
-    rolling = rolling_response(
-        rolling_car(acting, ground), SidewaysLoad(payload_kg, front_share, cg_left_m[0]), freq_hz
-    )
-    every = (rolling.together_front, rolling.together_rear, rolling.against_front, rolling.against_rear)
-    return tuple(one[:n_sensors] for one in every)
+        return half_car_numbers(half_car(acting, ground), payload_kg, front_share)
+    return rolling_numbers(rolling_car(acting, ground), SidewaysLoad(payload_kg, front_share, cg_left_m[0]))
 
 
 def driven(model: SpectralModel, spectra: CrossSpectra) -> Driven:
@@ -116,7 +110,8 @@ def driven(model: SpectralModel, spectra: CrossSpectra) -> Driven:
     later_s = spectra.delay_s * model.delay_scale[..., None, :] + model.rear_lag_s[..., None, :]
     phase = spectra.delay_phase * np.exp(-2j * np.pi * spectra.freq_hz * later_s)
     x = along(model.track_offset_m, model, spectra)
-    return Driven(tuple(weights @ path for path in model.paths), phase * (x * k1(x)), _twist(model, spectra))
+    paths = weights @ model.motion.paths
+    return Driven(tuple(np.moveaxis(paths, 1, 0)), phase * (x * k1(x)), _twist(model, spectra))
 
 
 def along(apart_m: F64, model: SpectralModel, spectra: CrossSpectra) -> F64:

@@ -39,9 +39,16 @@ def levels() -> tuple[tuple[float, float], ...]:
     return (-u, -u), (0.0, 0.0), (u, u), (d, -d), (-d, d)
 
 
+_LESS: Final = np.expm1(-np.array(levels()))  # (5, 2) of front and rear axle: 1/s - 1
+
+
 def at_levels(theta: F64) -> F64:
     """Parameters theta (..., p) as they act at each of :func:`levels`: (..., 5, p)."""
-    return np.stack([_at(theta, level) for level in levels()], axis=-2)
+    moved = np.repeat(theta[..., None, :], len(_LESS), axis=-2)
+    for axle, share, rate in RATES:
+        ratio = 1.0 + theta[..., share, None] * _LESS[:, axle]
+        moved[..., rate] += np.log(np.maximum(ratio, LEAST_LEFT))
+    return moved
 
 
 def level_weights(log_amplitudes: F64) -> F64:
@@ -52,11 +59,3 @@ def level_weights(log_amplitudes: F64) -> F64:
     parts = [0.5 * u * (u - 1.0), 1.0 - u**2 - d**2, 0.5 * u * (u + 1.0), 0.5 * d * (d + 1.0), 0.5 * d * (d - 1.0)]
     weights: F64 = np.concatenate(parts, axis=1)
     return weights
-
-
-def _at(theta: F64, log_amplitudes: tuple[float, float]) -> F64:
-    moved = theta.copy()
-    for axle, share, rate in RATES:
-        ratio = 1.0 + theta[..., share] * np.expm1(-log_amplitudes[axle])
-        moved[..., rate] += np.log(np.maximum(ratio, LEAST_LEFT))
-    return moved

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gateway.core.cross_spectrum.model.motion import Frame, Motion, Numbers
 from gateway.records import C128, F64
 from gateway.units import STANDARD_GRAVITY_MPS2
 
@@ -26,13 +27,13 @@ class Axle:
     """Both wheels of one axle together.
 
     The spring stiffens with the static load W (kN) that the payload adds: the logarithm of its rate
-    has a slope at W = 0, which changes by spring_bends_per_kn at each of bend_loads_kn. Helper springs
+    has a slope at W = 0, which changes by spring_bends_per_kn (..., n) at each of bend_loads_kn (n,). Helper springs
     and bump stops bend it sharply, progressive coils gently.
     """
 
     spring_npm: Real
     spring_slope_per_kn: Real
-    spring_bends_per_kn: tuple[Real, ...]
+    spring_bends_per_kn: tuple[float, ...] | F64
     bend_loads_kn: tuple[float, ...]
     damper_nspm: Real
     damper_mount_npm: Real
@@ -81,10 +82,23 @@ def frequency_response(car: HalfCar, payload_kg: Real, front_share: Real, freq_h
     ``front_share`` (0..1) is of the sprung mass with payload. At frequency zero the body follows the
     road: over each axle the displacement is that of the road there.
     """
-    omega = 2.0 * np.pi * freq_hz
-    by_front, by_rear = _body_over_axles(car, payload_kg, front_share, freq_hz)
-    from_front, from_rear = _sensed(car, *by_front, omega), _sensed(car, *by_rear, omega)
-    return Response(from_front[0], from_rear[0], from_front[1], from_rear[1])
+    numbers = half_car_numbers(car, payload_kg, front_share)
+    r = Motion(numbers, Frame(car.wheelbase_m), freq_hz, n_sensors=2).paths
+    return Response(r[0, 0], r[0, 1], r[1, 0], r[1, 1])
+
+
+def half_car_numbers(car: HalfCar, payload_kg: Real, front_share: Real) -> Numbers:
+    """Those of its equations of motion."""
+    rigid_kg, carried_kg = body_masses_kg(car, payload_kg, front_share)
+    added_front_kg, added_rear_kg = added_axle_masses_kg(car, payload_kg, front_share)
+    return Numbers.of(
+        axle_numbers(car.front, spring_npm(car.front, added_front_kg)),
+        axle_numbers(car.rear, spring_npm(car.rear, added_rear_kg)),
+        rigid_kg,
+        carried_kg,
+        (car.payload_mode_hz, car.payload_damping_ratio),
+        (car.sensor_position_m, car.gyro_lag_s),
+    )
 
 
 def strokes(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> tuple[C128, C128]:
@@ -95,52 +109,22 @@ def strokes(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> 
     """
     omega = 2.0 * np.pi * freq_hz
     added = added_axle_masses_kg(car, payload_kg, front_share)
+    numbers = half_car_numbers(car, payload_kg, front_share)
+    body = Motion(numbers, Frame(car.wheelbase_m), freq_hz, n_sensors=2).body
     stretched = []
-    for i, over_axles in enumerate(_body_over_axles(car, payload_kg, front_share, freq_hz)):
+    for i in range(2):
         of_axles = []
         for k, (axle, added_kg) in enumerate(zip((car.front, car.rear), added, strict=True)):
-            wheel = wheel_npm(axle, omega)
+            wheel = axle.tyre_npm - omega**2 * axle.unsprung_kg
             by_road = axle.tyre_npm if i == k else 0.0
-            of_axles.append((wheel * over_axles[k] - by_road) / (suspension_npm(axle, added_kg, omega) + wheel))
+            of_axles.append((wheel * body[k, i] - by_road) / (suspension_npm(axle, added_kg, omega) + wheel))
         stretched.append(np.stack(of_axles))
     return stretched[0], stretched[1]
 
 
-def _body_over_axles(
-    car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64
-) -> tuple[tuple[C128, C128], tuple[C128, C128]]:
-    """The body's displacement over front and rear axle, for a unit of road under the front one; then the rear one."""
-    omega = 2.0 * np.pi * freq_hz
-    mass_ff, mass_rr, mass_fr = body_mass(car, payload_kg, front_share, freq_hz)
-    added_front_kg, added_rear_kg = added_axle_masses_kg(car, payload_kg, front_share)
-    body_front, road_front = axle_forces(car.front, added_front_kg, omega)
-    body_rear, road_rear = axle_forces(car.rear, added_rear_kg, omega)
-    d_ff = body_front - omega**2 * mass_ff
-    d_rr = body_rear - omega**2 * mass_rr
-    d_fr = -(omega**2) * mass_fr
-    determinant = d_ff * d_rr - d_fr * d_fr
-    by_front = road_front / determinant
-    by_rear = road_rear / determinant
-    return (d_rr * by_front, -d_fr * by_front), (-d_fr * by_rear, d_ff * by_rear)
-
-
-def _sensed(car: HalfCar, over_front: C128, over_rear: C128, omega: F64) -> tuple[C128, C128]:
-    """Vertical acceleration at the sensor and pitch rate (nose down), from the body's displacement over the axles."""
-    pitch = (over_rear - over_front) / car.wheelbase_m
-    acceleration = -(omega**2) * (over_front + car.sensor_position_m * pitch)
-    pitch_rate = 1j * omega * pitch * np.exp(-1j * omega * car.gyro_lag_s)
-    return acceleration, pitch_rate
-
-
-def axle_forces(axle: Axle, added_kg: Real, omega: F64) -> tuple[C128, C128]:
-    """Force on the body per minus its displacement, and per road displacement, in N/m.
-
-    With K the suspension and T the wheel held by its tyre: K T / (K + T) and K k_t / (K + T); the wheel's own movement
-    is eliminated.
-    """
-    suspension, wheel = suspension_npm(axle, added_kg, omega), wheel_npm(axle, omega)
-    in_series = suspension / (suspension + wheel)
-    return np.asarray(in_series * wheel, np.complex128), np.asarray(in_series * axle.tyre_npm, np.complex128)
+def axle_numbers(axle: Axle, spring_npm: Real) -> tuple[Real, ...]:
+    """As motion.Numbers has them without roll, under a load that makes the springs so stiff."""
+    return spring_npm, axle.damper_nspm, axle.damper_mount_npm, axle.tyre_npm, axle.unsprung_kg
 
 
 def suspension_npm(axle: Axle, added_kg: Real, omega: F64) -> Rate:
@@ -149,18 +133,12 @@ def suspension_npm(axle: Axle, added_kg: Real, omega: F64) -> Rate:
     return spring_npm(axle, added_kg) + damper / (1.0 + damper / axle.damper_mount_npm)
 
 
-def wheel_npm(axle: Axle, omega: F64) -> Real:
-    """T = k_t - m_u omega^2: both wheels held by their tyres."""
-    wheel: Real = axle.tyre_npm - omega**2 * axle.unsprung_kg
-    return wheel
-
-
 def spring_npm(axle: Axle, added_kg: Real) -> Real:
     """Rate of both springs under ``added_kg`` on the axle."""
     added_kn = added_kg * (STANDARD_GRAVITY_MPS2 / 1000.0)
-    log_stiffening = axle.spring_slope_per_kn * added_kn
-    for bend, load_kn in zip(axle.spring_bends_per_kn, axle.bend_loads_kn, strict=True):
-        log_stiffening = log_stiffening + bend * np.maximum(added_kn - load_kn, 0.0)
+    beyond_kn = np.maximum(added_kn - np.asarray(axle.bend_loads_kn), 0.0)
+    bent = np.sum(axle.spring_bends_per_kn * beyond_kn, axis=-1, keepdims=True)
+    log_stiffening = axle.spring_slope_per_kn * added_kn + bent
     stiffened: Real = axle.spring_npm * np.exp(log_stiffening)
     return stiffened
 
@@ -171,8 +149,11 @@ def added_axle_masses_kg(car: HalfCar, payload_kg: Real, front_share: Real) -> t
     return front_kg, payload_kg - front_kg
 
 
-def body_mass(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> tuple[C128, C128, C128]:
-    """Mass matrix (front-front, rear-rear, front-rear) of body and payload for the displacements over the axles.
+def body_masses_kg(
+    car: HalfCar, payload_kg: Real, front_share: Real
+) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:
+    """Mass matrix (front-front, rear-rear, front-rear) of the body for the displacements over the axles, then of the
+    payload.
 
     A point mass L at d adds L (1 - d/l)^2, L (d/l)^2 and L (1 - d/l)(d/l); written with the masses
     F and R it puts on the axles, the last is q = L/4 - (R - F)^2 / (4 L) and the others F - q and R - q.
@@ -185,17 +166,10 @@ def body_mass(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -
         - (rear_kg - front_kg) ** 2 / 4.0 * inverse_payload
         - payload_kg * car.payload_gyration_m2 / length**2
     )
-    felt = payload_felt(car, freq_hz)
     turning = car.pitch_inertia_kgm2 / length**2
-    front_front = car.empty_mass_kg * share**2 + turning + felt * (front_kg - coupling)
-    rear_rear = car.empty_mass_kg * (1.0 - share) ** 2 + turning + felt * (rear_kg - coupling)
-    front_rear = car.empty_mass_kg * share * (1.0 - share) - turning + felt * coupling
-    return front_front, rear_rear, front_rear
-
-
-def payload_felt(car: HalfCar, freq_hz: F64) -> C128:
-    """By which factor the payload feels heavier than it is, moving on its own floor: a base-excited oscillator."""
-    ratio = freq_hz / car.payload_mode_hz
-    damping = 2j * car.payload_damping_ratio * ratio
-    felt: C128 = (1.0 + damping) / (1.0 - ratio**2 + damping)
-    return felt
+    rigid = (
+        car.empty_mass_kg * share**2 + turning,
+        car.empty_mass_kg * (1.0 - share) ** 2 + turning,
+        car.empty_mass_kg * share * (1.0 - share) - turning,
+    )
+    return rigid, (front_kg - coupling, rear_kg - coupling, coupling)

@@ -120,9 +120,21 @@ class Ground:
         )
 
     @property
+    def half_track_m(self) -> float:
+        """Half the track's width. Raises ValueError where nobody stated it."""
+        if self.track_width_m is None:
+            raise ValueError("a vehicle that rolls needs the width of its track")
+        return 0.5 * self.track_width_m
+
+    @property
     def half_weight_kn(self) -> float:
         """Half the weight of the empty sprung mass."""
         return 0.5 * self.empty_mass_kg * STANDARD_GRAVITY_MPS2 / 1000.0
+
+
+_BENDS: Final = {
+    end: [INDEX[f"spring_bend_{end}_{i}_per_kn"] for i in range(len(BEND_SHARES))] for end in ("front", "rear")
+}
 
 
 def is_positive(name: str) -> bool:
@@ -165,17 +177,27 @@ def value_of(theta: F64, name: str) -> F64:
     return np.exp(column) if is_positive(name) else column
 
 
+_LOGARITHMS: Final = np.array([is_positive(name) for name in INDEX])
+
+
+def _natural(theta: F64) -> F64:
+    """(..., p) all parameters in the units that end their names."""
+    return np.exp(theta, out=theta.copy(), where=_LOGARITHMS[: theta.shape[-1]])
+
+
 def half_car(theta: F64, ground: Ground) -> HalfCar:
     """The vehicles of the parameter vectors theta (..., p), broadcasting against frequency."""
 
+    natural = _natural(theta)
+
     def of(name: str) -> F64:
-        return value_of(theta, name)
+        return natural[..., INDEX[name], None]
 
     def axle(end: str) -> Axle:
         return Axle(
             spring_npm=of(f"spring_{end}_npm"),
             spring_slope_per_kn=of(f"spring_slope_{end}_per_kn"),
-            spring_bends_per_kn=tuple(of(f"spring_bend_{end}_{i}_per_kn") for i in range(len(BEND_SHARES))),
+            spring_bends_per_kn=theta[..., _BENDS[end]],
             bend_loads_kn=tuple(share * ground.half_weight_kn for share in BEND_SHARES),
             damper_nspm=of(f"damper_{end}_nspm"),
             damper_mount_npm=of(f"damper_mount_{end}_npm"),
@@ -200,8 +222,6 @@ def half_car(theta: F64, ground: Ground) -> HalfCar:
 
 def rolling_car(theta: F64, ground: Ground) -> RollingCar:
     """The same with roll. Raises ValueError where the ground does not say how wide the track is."""
-    if ground.track_width_m is None:
-        raise ValueError("a vehicle that rolls needs the width of its track")
 
     def against(end: str) -> Against:
         return Against(
@@ -211,7 +231,7 @@ def rolling_car(theta: F64, ground: Ground) -> RollingCar:
 
     return RollingCar(
         half_car=half_car(theta, ground),
-        half_track_m=0.5 * ground.track_width_m,
+        half_track_m=ground.half_track_m,
         roll_inertia_kgm2=value_of(theta, "roll_inertia_kgm2"),
         payload_roll_gyration_m2=value_of(theta, "payload_roll_gyration_m2"),
         front=against("front"),

@@ -13,12 +13,13 @@ from gateway.core.cross_spectrum.model.driven import (
     SpectralModel,
     along,
     driven,
-    responses,
+    numbers_of,
     spectral_model,
 )
 from gateway.core.cross_spectrum.model.expected import noise, power, tapered, without_noise
 from gateway.core.cross_spectrum.model.friction import level_weights
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix
+from gateway.core.cross_spectrum.model.motion import Motion
 from gateway.core.cross_spectrum.model.parameters import (
     INDEX,
     NOISES,
@@ -30,6 +31,9 @@ from gateway.core.cross_spectrum.model.parameters import (
 from gateway.records import C128, F64
 
 STEP: Final = 1e-5
+_OF_ROAD: Final = frozenset(
+    INDEX[name] for name in ("delay_scale", "rear_lag_s", "track_offset_m", "tracks_apart_m", "twist_level")
+)
 LOAD_STEPS: Final = (0.1, STEP, STEP)  # payload in kg, front share, lateral place of the centre of gravity in m
 
 
@@ -52,12 +56,13 @@ def spectral_slopes(
     is_solved = [entry in VEHICLE_PARAMETERS or entry >= len(theta) for entry in free]
     rows = np.flatnonzero(is_solved).tolist()
     if rows:
-        moved = _moved(theta, load, ground, spectra, [free[row] for row in rows])
+        moved = _moved(theta, load, ground, spectra, [free[row] for row in rows], model.motion)
         changed = _by_response(by, moved, model)
         slopes.auto[:, rows], slopes.cross[:, rows] = changed.auto, changed.cross
+    _fill_in_slack(slopes, free, by, model, spectra)
     for row, entry in enumerate(free):
-        if not is_solved[row]:
-            changed = _by_other(entry, by, model, spectra)
+        if entry in _OF_ROAD:
+            changed = _by_road(entry, by, model, spectra)
             slopes.auto[:, row], slopes.cross[:, row] = changed.auto, changed.cross
     matrix = tapered(without_noise(by, model), spectra)
     return _with_noise(tapered(slopes, spectra), matrix, model, spectra, free)
@@ -71,8 +76,14 @@ def solved_at(
     return model, driven(model, spectra)
 
 
-def _moved(theta: F64, load: tuple[float, ...], ground: Ground, spectra: CrossSpectra, free: Sequence[int]) -> Paths:
-    """Central differences (p, k, b, m) of the responses for ``free`` entries of the vehicle and its load."""
+def _moved(
+    theta: F64, load: tuple[float, ...], ground: Ground, spectra: CrossSpectra, free: Sequence[int], motion: Motion
+) -> Paths:
+    """Changes (p, k, b, m) of the responses with ``free`` entries of the vehicle and its load.
+
+    Central differences say how these move the numbers in the equations of motion, closed forms how the numbers move
+    the responses.
+    """
     k = len(free)
     thetas = np.repeat(theta[None], 2 * k, axis=0)
     loads = [np.full(2 * k, one, float) for one in load]
@@ -83,55 +94,54 @@ def _moved(theta: F64, load: tuple[float, ...], ground: Ground, spectra: CrossSp
         else:
             step[row] = LOAD_STEPS[entry - len(theta)]
             loads[entry - len(theta)][2 * row : 2 * row + 2] += (step[row], -step[row])
-    weights, per_step = level_weights(spectra.log_movement), 0.5 / step[:, None, None]
-    solved = responses(thetas, tuple(loads), ground, spectra.freq_hz, spectra.n_sensors)
-    return tuple(weights @ ((path[:, ::2] - path[:, 1::2]) * per_step) for path in solved)
+    numbers = numbers_of(thetas, tuple(loads), ground).all[..., 0]
+    by_number = (numbers[:, ::2] - numbers[:, 1::2]) * (0.5 / step[:, None])
+    moving = np.flatnonzero(by_number.any(axis=(1, 2)))
+    by_number = np.ascontiguousarray(np.moveaxis(by_number[moving], (2, 1), (0, 1)))  # or BLAS cannot multiply it
+    slopes = motion.slopes(moving.tolist())
+    p, s, m = slopes.shape[2:]
+    by_level = by_number @ slopes.view(float).reshape(len(slopes), len(moving), -1)
+    by_group = level_weights(spectra.log_movement) @ by_level.reshape(len(by_level), -1)
+    changed = by_group.view(complex).reshape(-1, k, p, s, m)
+    return tuple(changed[:, :, :, way].transpose(2, 1, 0, 3) for way in range(s))
 
 
 def _by_response(by: Driven, moved: Paths, model: SpectralModel) -> SpectralMatrix:
     """Change of the matrix with changes ``moved`` (p, k, b, m) of the responses."""
-    slack = (1.0 + model.slack)[:, None, None]
-    changed = _of_two_paths(by.paths[0], by.paths[1], by.phase, slack, moved[0], moved[1])
-    if by.twist is None:
-        return changed
-    against = _of_two_paths(by.paths[2], by.paths[3], by.phase, slack, moved[2], moved[3])
-    return SpectralMatrix(changed.auto + by.twist * against.auto, changed.cross + by.twist * against.cross)
+    slack, back = (1.0 + model.slack)[:, None, None], np.conj(by.phase)
+    changed = SpectralMatrix.zeros(len(model.slack), moved[0].shape[1:])
+    power_by = np.zeros(moved[0].shape, np.complex128)
+    for way, share in enumerate((1.0,) if by.twist is None else (1.0, by.twist)):
+        front, rear = share * by.paths[2 * way], share * by.paths[2 * way + 1]
+        for own, other, d in ((front, by.phase * rear, moved[2 * way]), (rear, back * front, moved[2 * way + 1])):
+            power_by += np.conj(slack * own[:, None] + other[:, None]) * d
+            whole = own + other
+            for row, (i, j) in enumerate(changed.pairs):
+                changed.cross[row] += d[i] * np.conj(whole[j])
+                changed.cross[row] += np.conj(d[j]) * whole[i]
+    return SpectralMatrix(2.0 * power_by.real, changed.cross)
 
 
-def _of_two_paths(front: C128, rear: C128, phase: C128, slack: F64, d_front: C128, d_rear: C128) -> SpectralMatrix:
-    """Change of expected's matrix of two paths (p, b, m) with changes (p, k, b, m) of these."""
-    back = np.conj(phase)
-    whole_front, whole_rear = front + phase * rear, rear + back * front
-    by_front = np.conj(slack * front[:, None] + (phase * rear)[:, None])
-    by_rear = np.conj(slack * rear[:, None] + (back * front)[:, None])
-    auto = 2.0 * np.real(by_front * d_front + by_rear * d_rear)
-    changed = SpectralMatrix.zeros(len(front), d_front.shape[1:])
-    for row, (i, j) in enumerate(changed.pairs):
-        cross = d_front[i] * np.conj(whole_front[j]) + np.conj(d_front[j]) * whole_front[i]
-        cross += d_rear[i] * np.conj(whole_rear[j]) + np.conj(d_rear[j]) * whole_rear[i]
-        changed.cross[row] = cross
-    return SpectralMatrix(auto, changed.cross)
-
-
-def _by_other(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
-    """Change of the matrix (p, b, m) with a parameter that is not the vehicle's; noise comes later and has none."""
-    for sensor, knots in enumerate(SLACK_KNOTS):
-        if entry in knots:
-            return _by_slack(sensor, knots.index(entry), by, model, spectra)
-    if entry in (INDEX["tracks_apart_m"], INDEX["twist_level"]):
-        return _by_twist(entry, by, model, spectra)
-    return _by_phase(_phase_slope(entry, by, model, spectra), by)
-
-
-def _by_slack(sensor: int, knot: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
-    changed = SpectralMatrix.zeros(len(model.slack), by.phase.shape)
-    if sensor < len(model.slack):
-        share = (model.slack[sensor] - model.least_slack) * slack_weights(spectra.freq_hz)[knot]
+def _fill_in_slack(
+    slopes: SpectralMatrix, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra
+) -> None:
+    """By the knots of each sensor's slack, which has a part in that sensor's own power alone."""
+    for sensor, knots in enumerate(SLACK_KNOTS[: len(model.slack)]):
+        rows = [row for row, entry in enumerate(free) if entry in knots]
+        if not rows:
+            continue
         own = power(by.paths[0][sensor]) + power(by.paths[1][sensor])
         if by.twist is not None:
             own = own + by.twist * (power(by.paths[2][sensor]) + power(by.paths[3][sensor]))
-        changed.auto[sensor] = share * own
-    return changed
+        shares = slack_weights(spectra.freq_hz)[[free[row] - knots.start for row in rows]]
+        slopes.auto[sensor, rows] = (model.slack[sensor] - model.least_slack) * shares[:, None] * own
+
+
+def _by_road(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
+    """Change of the matrix (p, b, m) with a parameter of how axles and tracks meet the road."""
+    if entry in (INDEX["tracks_apart_m"], INDEX["twist_level"]):
+        return _by_twist(entry, by, model, spectra)
+    return _by_phase(_phase_slope(entry, by, model, spectra), by)
 
 
 def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
@@ -154,10 +164,8 @@ def _phase_slope(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpe
         return np.asarray(turn * spectra.delay_s, np.complex128)
     if entry == INDEX["rear_lag_s"]:
         return np.asarray(turn, np.complex128)
-    if entry == INDEX["track_offset_m"]:
-        x = along(model.track_offset_m, model, spectra)
-        return np.asarray(by.phase * (-x * k0(x) / k1(x)), np.complex128)
-    return np.zeros_like(by.phase)
+    x = along(model.track_offset_m, model, spectra)
+    return np.asarray(by.phase * (-x * k0(x) / k1(x)), np.complex128)
 
 
 def _by_phase(d_phase: C128, by: Driven) -> SpectralMatrix:

@@ -1,0 +1,316 @@
+"""The equations of motion of a body on two axles, solved, and how the solution changes with each number in them.
+
+The body has a coordinate over the front axle and one over the rear one, and where it rolls a third: how far its left
+side lies over the wheels' mean. In these the suspension is nearly diagonal. With stiffness D(omega), forces F of the
+road and sensors C the sensors read C D^-1 F for a unit of road, and because D is symmetric a change of any number in it
+changes what they read by
+
+    dC u + A (dF - dD u),    u = D^-1 F,  A = C D^-1,
+
+which needs no second solution. half_car and rolling_car say which numbers a vehicle with its load has.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.records import C128, F64
+
+PAIRS: Final = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2), (2, 2))
+"""Of coordinates: where masses stand in ``rigid_kg`` and ``carried_kg``. Without roll the first three."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Where the coordinates are apart; half_track_m is None for a body that does not roll."""
+
+    wheelbase_m: float
+    half_track_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """What a vehicle with its load has in its equations of motion, (q, ..., 1).
+
+    By axle: the rates of springs, dampers, damper mounts and tyres, and the unsprung mass; with roll beside these by
+    how much the left spring is stiffer than the right one and, where the wheels move against each other, the factor of
+    the dampers and the rate of the bar. rigid_kg, by PAIRS, are masses of the body and carried_kg of a payload, which
+    moves on its floor with a frequency (Hz) and a damping ratio (payload). The sensor is so many metres behind the
+    front axle and its gyro so many seconds late; with roll it is so many metres left of the centre line and turned to
+    the left by so many radians.
+    """
+
+    all: F64
+
+    @classmethod
+    def of(cls, *groups: Sequence[float | F64]) -> "Numbers":
+        """Front axle (5; with roll 8), rear axle, rigid_kg (3; 6), carried_kg, payload (2) and sensor (2; 4).
+
+        Each a number or (..., 1); they broadcast.
+        """
+        flat = [one for group in groups for one in group]
+        every = np.empty((len(flat), *(np.broadcast_shapes(*{np.shape(one) for one in flat}) or (1,))))
+        for row, one in zip(every, flat, strict=True):
+            row[...] = one
+        return cls(every)
+
+    @property
+    def groups(self) -> tuple[slice, ...]:
+        """Where each of them stands."""
+        return _UPRIGHT if len(self.all) == _UPRIGHT[-1].stop else _ROLLING
+
+    def group(self, i: int) -> F64:
+        """(n, ..., 1) one of them."""
+        return self.all[self.groups[i]]
+
+    @property
+    def axles(self) -> F64:
+        """(n, 2, ..., 1) front and rear."""
+        return np.stack([self.group(FRONT), self.group(REAR)], axis=1)
+
+
+FRONT, REAR, RIGID, CARRIED, PAYLOAD, SENSOR = range(6)  # the groups
+SPRING, DAMPER, MOUNT, TYRE, UNSPRUNG, UNEVEN, FACTOR, BAR = range(8)  # an axle's numbers
+
+
+def _slices(*sizes: int) -> tuple[slice, ...]:
+    ends = np.cumsum(sizes).tolist()
+    return tuple(slice(end - size, end) for end, size in zip(ends, sizes, strict=True))
+
+
+_UPRIGHT: Final = _slices(5, 5, 3, 3, 2, 2)
+_ROLLING: Final = _slices(8, 8, 6, 6, 2, 4)
+
+
+class _Suspension:
+    """Springs, and beside them dampers on their elastic mounts: ``rate``, and its slopes by damper and mount."""
+
+    def __init__(self, spring: F64, damper: F64, mount: F64, omega: F64) -> None:
+        self._turn, self._mount, self._damped = 1j * omega, mount, 1j * omega * damper
+        self._yields = 1.0 / (1.0 + self._damped / mount)
+        self.rate = spring + self._damped * self._yields
+
+    @property
+    def by_damper(self) -> C128:
+        slope: C128 = self._turn * self._yields**2
+        return slope
+
+    @property
+    def by_mount(self) -> C128:
+        slope: C128 = (self._damped * self._yields / self._mount) ** 2
+        return slope
+
+
+class _Axles:
+    """How stiff front and rear axle hold the body, and by what force the road moves them.
+
+    ``stiffness`` and ``force`` are (1, 2, ..., m), with roll (3, 2, ..., m): of both wheels together, of one against
+    the other, and of what either adds to the other. With K, K' the suspension together and against, D the left spring's
+    rate less the right one's, T the wheels held by their tyres k, and the wheels' own movement eliminated, the
+    stiffness is K T / (K + T), K' T / (K' + T) and, to first order in D, D / 2 T / (K + T) T / (K' + T); the force has
+    k in place of one T.
+    """
+
+    def __init__(self, numbers: F64, omega: F64) -> None:
+        spring, damper, mount, self._tyre, unsprung, *self._rolls = numbers
+        self._damper, self._omega2 = damper, omega**2
+        self._wheel = self._tyre - self._omega2 * unsprung
+        self._ways = [_Suspension(spring, damper, mount, omega)]
+        if self._rolls:
+            _, factor, bar = self._rolls
+            self._ways.append(_Suspension(spring + bar, damper * factor, mount, omega))
+        self._softs = [1.0 / (way.rate + self._wheel) for way in self._ways]
+        per_tyre = [way.rate * soft for way, soft in zip(self._ways, self._softs, strict=True)]
+        if self._rolls:
+            self._both = 0.5 * self._softs[0] * self._softs[1] * self._wheel
+            per_tyre.append(self._rolls[0] * self._both)
+        self._per_tyre = np.stack(per_tyre)
+        self.stiffness = self._per_tyre * self._wheel
+        self.force = self._per_tyre * self._tyre
+
+    def slopes(self, rows: Sequence[int]) -> tuple[C128, C128]:
+        """(k, 1 or 3, 2, ..., m) of stiffness and force, by those of an axle's numbers."""
+        per_tyre = np.zeros((len(rows), *self._per_tyre.shape), np.complex128)
+        by_rate = [self._by_rate(i) for i in range(len(self._ways))]
+        by_wheel = self._by_wheel()
+        for into, row in zip(per_tyre, rows, strict=True):
+            if row == SPRING:
+                into[:] = sum(by_rate)
+            elif row == DAMPER:
+                factors = (1.0, *self._rolls[1:2])
+                parts = zip(self._ways, by_rate, factors, strict=True)
+                into[:] = sum(by * (way.by_damper * factor) for way, by, factor in parts)
+            elif row == MOUNT:
+                into[:] = sum(by * way.by_mount for way, by in zip(self._ways, by_rate, strict=True))
+            elif row in (TYRE, UNSPRUNG):
+                into[:] = by_wheel if row == TYRE else -self._omega2 * by_wheel
+            elif row == UNEVEN:
+                into[2] = self._both
+            else:
+                into[:] = by_rate[1] * (self._ways[1].by_damper * self._damper if row == FACTOR else 1.0)
+        stiffness, force = per_tyre * self._wheel, per_tyre * self._tyre
+        for i, row in enumerate(rows):
+            if row == TYRE:
+                stiffness[i] += self._per_tyre
+                force[i] += self._per_tyre
+            elif row == UNSPRUNG:
+                stiffness[i] -= self._omega2 * self._per_tyre
+        return stiffness, force
+
+    def _by_rate(self, i: int) -> C128:
+        """What is per tyre, by the rate of one suspension."""
+        found = np.zeros_like(self._per_tyre)
+        found[i] = self._wheel * self._softs[i] ** 2
+        if self._rolls:
+            found[2] = -self._per_tyre[2] * self._softs[i]
+        return found
+
+    def _by_wheel(self) -> C128:
+        """And by T."""
+        found = np.empty_like(self._per_tyre)
+        for i, (way, soft) in enumerate(zip(self._ways, self._softs, strict=True)):
+            found[i] = -way.rate * soft**2
+        if self._rolls:
+            one, other = self._softs
+            found[2] = self._rolls[0] * (0.5 * one * other - self._both * (one + other))
+        return found
+
+
+class Motion:
+    """The equations of one or many vehicles, solved at frequencies (m,) > 0.
+
+    Coordinates are c = 2, or 3 with roll; ways s = 2 (both tracks alike under the front axle, under the rear one), with
+    roll 4 (then one track against the other). Sensors are vertical acceleration, pitch rate (nose down) and with roll
+    the roll rate, of which the first ``n_sensors`` count.
+    """
+
+    def __init__(self, numbers: Numbers, frame: Frame, freq_hz: F64, n_sensors: int) -> None:
+        self._numbers, self._frame, self._omega = numbers, frame, 2.0 * np.pi * freq_hz
+        self._axles = _Axles(numbers.axles, self._omega)
+        self._mode_hz, damping_ratio = numbers.group(PAYLOAD)
+        self._ratio = freq_hz / self._mode_hz
+        self._damping = 2j * damping_ratio * self._ratio
+        self._below = 1.0 / (1.0 - self._ratio**2 + self._damping)
+        self._felt = (1.0 + self._damping) * self._below  # by which factor the payload feels heavier than it is
+        self._carried_kg = numbers.group(CARRIED)
+        self._pairs = PAIRS[: len(self._carried_kg)]
+        compliance = self._compliance()
+        self.body = self._body(compliance)
+        """(c, s, ..., m) how far the body moves at each coordinate, for a unit of road."""
+        sensors = self._rows(n_sensors)
+        self.paths: C128 = _product(sensors, self.body)
+        """(p, s, ..., m) what the sensors read for a unit of road."""
+        self._by_force = _product(sensors, compliance)
+
+    def slopes(self, wanted: Sequence[int]) -> C128:
+        """(..., k, p, s, m) how the paths change with the ``wanted`` of ``Numbers.all``, in rising order."""
+        p, s, *several, m = self.paths.shape
+        found = np.empty((*several, len(wanted), p, s, m), np.complex128)
+        by_number = np.moveaxis(found, range(len(several)), range(3, 3 + len(several)))
+        moved = {pair: self._moved(*pair) for pair in self._pairs}
+        groups = [[i - one.start for i in wanted if one.start <= i < one.stop] for one in self._numbers.groups]
+        of_axles = sorted({*groups[FRONT], *groups[REAR]})
+        stiffness, force = self._axles.slopes(of_axles)
+        start = 0
+        for group, rows in enumerate(groups):
+            into, start = by_number[start : start + len(rows)], start + len(rows)
+            if group in (FRONT, REAR):
+                at = [of_axles.index(row) for row in rows]
+                self._by_axle(into, group, stiffness[at, :, None, None, group], force[at, :, None, group], moved)
+            elif group in (RIGID, CARRIED):
+                for row, i in enumerate(rows):
+                    inertia = self._omega**2 if group == RIGID else self._omega**2 * self._felt
+                    np.multiply(moved[self._pairs[i]], inertia, out=into[row])
+            elif group == PAYLOAD and rows:
+                into[:] = self._by_felt(moved)[rows]
+            elif group == SENSOR:
+                into[:] = self._by_sensor()[rows]
+        return found
+
+    def _compliance(self) -> C128:
+        """(c, c, ..., m) the inverse of the stiffness; roll is eliminated first."""
+        stiffness = self._axles.stiffness
+        inertia = self._omega**2 * (self._numbers.group(RIGID) + self._felt * self._carried_kg)
+        d_ff, d_rr, d_fr = stiffness[0, 0] - inertia[0], stiffness[0, 1] - inertia[1], -inertia[2]
+        if len(inertia) == 3:
+            per_determinant = 1.0 / (d_ff * d_rr - d_fr**2)
+            return np.stack([d_rr, -d_fr, -d_fr, d_ff]).reshape(2, 2, *d_ff.shape) * per_determinant
+        d_pp = stiffness[1, 0] + stiffness[1, 1] - inertia[5]
+        coupled = stiffness[2] - inertia[3:5]
+        by_f, by_r = coupled / d_pp
+        d_ff, d_rr, d_fr = d_ff - by_f * coupled[0], d_rr - by_r * coupled[1], d_fr - by_f * coupled[1]
+        per_determinant = 1.0 / (d_ff * d_rr - d_fr**2)
+        e_ff, e_rr, e_fr = d_rr * per_determinant, d_ff * per_determinant, -d_fr * per_determinant
+        e_fp, e_rp = -by_f * e_ff - by_r * e_fr, -by_f * e_fr - by_r * e_rr
+        e_pp = 1.0 / d_pp - by_f * e_fp - by_r * e_rp
+        return np.stack([e_ff, e_fr, e_fp, e_fr, e_rr, e_rp, e_fp, e_rp, e_pp]).reshape(3, 3, *e_ff.shape)
+
+    def _body(self, compliance: C128) -> C128:
+        """(c, s, ..., m)."""
+        force = self._axles.force
+        together = compliance[:, :2] * force[0]
+        if len(compliance) == 2:
+            return together
+        roll = compliance[:, 2, None]
+        against = compliance[:, :2] * force[2] + roll * force[1]
+        return np.concatenate([together + roll * force[2], against], axis=1)
+
+    def _late(self) -> C128:
+        """A gyro's rate by the angle that it measures."""
+        return 1j * self._omega * np.exp(-1j * self._omega * self._numbers.group(SENSOR)[1])
+
+    def _rows(self, n_sensors: int) -> C128:
+        """(p, c, ..., m) what the sensors read of each coordinate."""
+        position_m, _, *mounted = self._numbers.group(SENSOR)
+        heave, late = -(self._omega**2), self._late()
+        behind = position_m / self._frame.wheelbase_m
+        pitch = late / self._frame.wheelbase_m
+        rows = [[heave * (1.0 - behind), heave * behind], [-pitch, pitch]]
+        if self._frame.half_track_m is not None:
+            left_m, yaw_rad = mounted
+            roll = late / self._frame.half_track_m
+            rows[0].append(heave * left_m / self._frame.half_track_m)
+            rows[1].append(-yaw_rad * roll)
+            rows.append([-yaw_rad * pitch, yaw_rad * pitch, roll])
+        every = np.broadcast_arrays(*(one for row in rows[:n_sensors] for one in row))
+        return np.stack(every).reshape(n_sensors, len(rows[0]), *every[0].shape)
+
+    def _moved(self, a: int, b: int) -> C128:
+        """(p, s, ..., m) what less stiffness between coordinates a and b does to the paths."""
+        moved: C128 = self._by_force[:, a, None] * self.body[b]
+        return moved if a == b else moved + self._by_force[:, b, None] * self.body[a]
+
+    def _by_axle(self, into: C128, i: int, stiffness: C128, force: C128, moved: dict[tuple[int, int], C128]) -> None:
+        """Slopes by some numbers of an axle, from those of its stiffness and force."""
+        np.multiply(stiffness[:, 0], -moved[i, i], out=into)
+        into[:, :, i] += force[:, 0] * self._by_force[:, i]
+        if stiffness.shape[1] > 1:
+            into -= stiffness[:, 1] * moved[2, 2]
+            into -= stiffness[:, 2] * moved[i, 2]
+            into[:, :, i] += force[:, 2] * self._by_force[:, 2]
+            into[:, :, i + 2] += force[:, 2] * self._by_force[:, i] + force[:, 1] * self._by_force[:, 2]
+
+    def _by_felt(self, moved: dict[tuple[int, int], C128]) -> C128:
+        """By frequency and damping ratio of the payload on its floor."""
+        carried = sum(kg * moved[pair] for kg, pair in zip(self._carried_kg, self._pairs, strict=True))
+        felt = -(self._ratio**2) * self._below**2 * self._omega**2
+        return np.stack([carried * (felt * (2.0 + self._damping) / self._mode_hz), carried * (felt * 2j * self._ratio)])
+
+    def _by_sensor(self) -> C128:
+        found = np.zeros((len(self._numbers.group(SENSOR)), *self.paths.shape), np.complex128)
+        pitch = (self.body[1] - self.body[0]) / self._frame.wheelbase_m
+        found[0, 0] = -(self._omega**2) * pitch
+        found[1, 1:] = -1j * self._omega * self.paths[1:]
+        if self._frame.half_track_m is not None:
+            roll, late = self.body[2] / self._frame.half_track_m, self._late()
+            found[2, 0] = -(self._omega**2) * roll
+            found[3, 1] = -late * roll
+            found[3, 2:] = late * pitch
+        return found
+
+
+def _product(rows: C128, columns: C128) -> C128:
+    """(p, s, ...) of matrices (p, c, ...) and (c, s, ...)."""
+    return np.asarray(sum(rows[:, i, None] * columns[i] for i in range(len(columns))), np.complex128)
