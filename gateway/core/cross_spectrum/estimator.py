@@ -35,7 +35,7 @@ MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
 # chosen, both; `benchmarks.accuracy sensitivity` tells what hangs on them
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
 UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
-MOST_LAG_CHANGE_S: Final = 0.002  # beyond it, roll is taken out once more, at the lag that was found
+MOST_LAG_CHANGE_S: Final = 0.002  # beyond it, roll is taken out again, at the lag that was found
 MOST_LAGS: Final = 4  # tried; a lag that still moves has no fixed point
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
 
