@@ -169,6 +169,11 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "no payload and share explain these spectra as well as calibration leads to expect",
             "look for a changed tyre, spring or sensor mount; calibrate anew",
         ),
+        Why.NO_SOLUTION: Explanation(
+            Cause.ANSWER,
+            "the search for the load did not settle, or its numbers broke down",
+            "nothing, if it is rare; else look at what the sensors send, and calibrate anew",
+        ),
     }
 )
 

@@ -87,6 +87,7 @@ class Why(StrEnum):
     TOO_UNCERTAIN = "too_uncertain"
     AMBIGUOUS = "ambiguous"
     MODEL_MISFIT = "model_misfit"
+    NO_SOLUTION = "no_solution"
     SENSOR_DISAGREEMENT = "sensor_disagreement"
     SENSOR_CHANGED = "sensor_changed"
     WRONG_SIGN = "wrong_sign"

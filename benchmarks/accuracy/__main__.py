@@ -20,6 +20,7 @@ from benchmarks.accuracy import budget as on_budget
 from benchmarks.accuracy import coverage as on_coverage
 from benchmarks.accuracy import delivery as on_delivery
 from benchmarks.accuracy import disturbances as on_disturbances
+from benchmarks.accuracy import faults as on_faults
 from benchmarks.accuracy import phones as on_phones
 from benchmarks.accuracy import sensitivity as on_sensitivity
 from benchmarks.accuracy import siblings as on_siblings
@@ -29,6 +30,7 @@ from benchmarks.accuracy.coverage_drives import Scope
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.delivery_page import delivery_page
 from benchmarks.accuracy.disturbances_page import disturbances_page
+from benchmarks.accuracy.faults_page import faults_page
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
 from benchmarks.accuracy.sensitivity import sensitivity_page
 from benchmarks.accuracy.siblings import siblings_page
@@ -143,6 +145,30 @@ def disturbances(n_vans: int, seed: int, workers: int, output: Path | None) -> N
     with counted("calibrating, driving and disturbing vans") as on_van:
         found = on_disturbances.disturbances(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("disturbances", found, disturbances_page(found), output)
+
+
+@studies.command("faults")
+@click.argument("campaign", type=FILE)
+@click.option("--calibration", type=FILE, required=True, help="calibration file of that vehicle")
+@click.option("--runs", type=click.IntRange(min=1), multiple=True, help="numbers of the drives [default: all]")
+@click.option("--seed", type=click.IntRange(min=0), default=on_faults.SEED, show_default=True)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
+@click.option("--kept", type=FILE, default=None, help="directory of cases weighed before: read from there, left there")
+@_output
+def faults(
+    campaign: Path,
+    calibration: Path,
+    runs: tuple[int, ...],
+    seed: int,
+    workers: int,
+    kept: Path | None,
+    output: Path | None,
+) -> None:
+    """What do faulty sensors do to CAMPAIGN's drives? Each log rewritten with each fault; ~2 minutes a drive."""
+    study = on_faults.Study(campaign, calibration, runs or None, kept=kept, seed=seed)
+    with counted("weighing drives with faulty sensors") as on_case:
+        found = on_faults.faults(study, workers=workers, on_case=on_case)
+    _hand_out("sensor-faults", found, faults_page(found), output)
 
 
 @studies.command("delivery")

@@ -27,13 +27,23 @@ PARTS: Final[dict[str, tuple[str, ...]]] = {
     "day": ("--hours", "8"),
     "live": ("--seconds", "10"),
     "service": ("--seconds", "75"),
+    "idle": ("--seconds", "120"),
     "web": ("--seconds", "10"),
     "weigh": (),
     "archive": ("--vehicles", "8"),
     "start": (),
     "simulator": (),
 }
-QUICK: Final = {"decode": "1", "formats": "0.5", "day": "0.5", "live": "3", "service": "70", "web": "3", "archive": "2"}
+QUICK: Final = {
+    "decode": "1",
+    "formats": "0.5",
+    "day": "0.5",
+    "live": "3",
+    "service": "70",
+    "idle": "20",
+    "web": "3",
+    "archive": "2",
+}
 PACKAGES: Final = ("numpy", "python-can", "cantools", "hilspy", "asammdf", "can_decoder", "polars", "isal")
 
 

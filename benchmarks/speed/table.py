@@ -24,8 +24,8 @@ class Line:
 def lines_of(found: Mapping[str, Any]) -> list[Line]:
     """Every line that the figures of a run allow; a part that was left out has none."""
     parts = {
-        "decode": _decode, "formats": _formats, "day": _day, "live": _live, "service": _service, "web": _web,
-        "weigh": _weigh, "archive": _archive, "start": _start, "simulator": _simulator,
+        "decode": _decode, "formats": _formats, "day": _day, "live": _live, "service": _service, "idle": _idle,
+        "web": _web, "weigh": _weigh, "archive": _archive, "start": _start, "simulator": _simulator,
     }  # fmt: skip
     return [line for name, part in parts.items() if name in found for line in part(found[name])]
 
@@ -99,6 +99,15 @@ def _service(found: Mapping[str, Any]) -> Iterator[Line]:
     yield _below(section, "a filtered bus of 2500 frames/s", found["cpu_pct"], "% of a core", 3, 2)
     yield _below(section, "memory", found["peak_mb"], "MB", 150, 0)
     yield _below(section, "frames lost", found["lost"], "frames", 0, 0)
+
+
+def _idle(found: Mapping[str, Any]) -> Iterator[Line]:
+    section = "a parked vehicle: bus asleep, 1000 batches delivered"
+    if "skipped" in found:
+        yield Line(section, "the whole service", f"left out: {found['skipped']}")
+        return
+    yield Line(section, "processor time", f"{found['processor_s_per_hour']:.1f} s an hour")
+    yield Line(section, "written to disk", f"{found['disk_kb_per_hour']:,.0f} kB an hour")
 
 
 def _web(found: Mapping[str, Any]) -> Iterator[Line]:

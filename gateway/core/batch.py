@@ -227,6 +227,6 @@ def _reasons(
         found.extend(why for why in _MISSING if shares.get(why, 0.0) > settings.gap_share_max / len(_MISSING))
     if any(0.0 < sensor.rate_hz < RATE_MIN_SHARE * settings.rate_hz for sensor in sensors):
         found.append(Why.SENSOR_RATE_LOW)
-    if abs(gravity - STANDARD_GRAVITY_MPS2) > GRAVITY_TOLERANCE_MPS2:
+    if usable.any() and not abs(gravity - STANDARD_GRAVITY_MPS2) <= GRAVITY_TOLERANCE_MPS2:
         found.append(Why.GRAVITY_MISSING)
     return tuple(dict.fromkeys(found))

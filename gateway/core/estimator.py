@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from gateway.core.ratio_index.index import indexes_of
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
-from gateway.posterior import FRONT_SHARE, Source
+from gateway.posterior import FRONT_SHARE, Posterior, Source
 from gateway.records import Batch, Why
 
 
@@ -27,10 +27,45 @@ class Estimator(Protocol):
         ...
 
 
+BROKEN_DOWN: Final = (ArithmeticError, ValueError, RuntimeError)
+"""What numpy.linalg (LinAlgError is a ValueError), math, scipy's nnls and interpolation raise on numbers."""
+
+
 def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str) -> Estimate:
-    """What ``batch`` tells by the named estimator: numbers, or why not. Never raises on a batch."""
+    """What ``batch`` tells by the named estimator: numbers, or why not.
+
+    Never raises on a batch, whatever its samples are: where the numbers break down on the way, or the answer is not
+    finite, the batch is refused for it. Raises KeyError for an estimator that does not exist.
+    """
+    with np.errstate(all="ignore"):  # an overflow is judged by what becomes of it
+        blank = _blank(batch, calibrated, estimator)
+        if calibrated is None or batch.rejected:
+            return blank
+        weigh = ESTIMATORS[estimator]
+        try:
+            found = weigh(batch, calibrated, blank)
+            if not found.counted:
+                return found
+            if calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
+                return found.refused(Why.OUT_OF_RANGE)  # known loads have the error of the stated share in common
+            answer = _as_stated(found, calibrated.vehicle)
+            return answer if _is_sound(answer.posterior) else answer.refused(Why.NO_SOLUTION)
+        except BROKEN_DOWN:
+            return blank.refused(Why.NO_SOLUTION)
+
+
+def _is_sound(posterior: Posterior | None) -> bool:
+    """Finite throughout, with errors of its own in every direction; so is no posterior at all."""
+    if posterior is None:
+        return True
+    parts = (posterior.mean, posterior.own, np.array(posterior.tails), *posterior.sources.values())
+    return all(np.isfinite(part).all() for part in parts) and bool(np.all(np.linalg.eigvalsh(posterior.own) > 0.0))
+
+
+def _blank(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str) -> Estimate:
+    """Without an answer: what every estimate tells of its batch."""
     spectra = spectra_of(batch)
-    blank = Estimate(
+    return Estimate(
         t_start_ns=batch.t_start_ns,
         t_end_ns=batch.t_end_ns,
         estimator=estimator,
@@ -41,18 +76,10 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
         roll_usable_share=_roll_usable_share(batch),
         roughness_mps2=roughness_mps2(spectra, batch.mean_speed_mps),
         shares={str(why): share for why, share in batch.shares.items()},
-        rejected=batch.rejected,
+        rejected=batch.rejected if calibrated else (*batch.rejected, Why.NO_CALIBRATION),
         is_provisional=batch.is_provisional,
         spectra=spectra,
     )
-    if calibrated is None:
-        return replace(blank, rejected=(*batch.rejected, Why.NO_CALIBRATION))
-    if batch.rejected:
-        return blank
-    found = ESTIMATORS[estimator](batch, calibrated, blank)
-    if found.counted and calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
-        return found.refused(Why.OUT_OF_RANGE)  # the known loads have the error of the stated share in common with it
-    return _as_stated(found, calibrated.vehicle)
 
 
 def _as_stated(found: Estimate, vehicle: Vehicle) -> Estimate:

@@ -83,7 +83,7 @@ def test_a_real_cars_rattle_is_no_soft_load() -> None:
 
 def peak(payload_kg: float, front_share: float, cost: float, packing: Packing) -> located._Peak:
     x = np.r_[packing.drifting, payload_kg, front_share]
-    return located._Peak(Found(x, cost, np.eye(len(x))), packing)
+    return located._Peak(Found(x, cost, np.eye(len(x)), is_converged=True), packing)
 
 
 FIRM, SOFT = packings(np.zeros(100))
@@ -126,7 +126,7 @@ def test_an_answer_of_two_peaks_is_wider(
         return rivalry(found, [*peaks, peak_of(rival, found.cost + behind)])
 
     def peak_of(x: np.ndarray, cost: float) -> located._Peak:
-        return located._Peak(Found(x, cost, np.eye(len(x))), Packing(x[: len(DRIFTING)]))
+        return located._Peak(Found(x, cost, np.eye(len(x)), is_converged=True), Packing(x[: len(DRIFTING)]))
 
     monkeypatch.setattr(located, "_rivalry", beside)
     found = weighed(batch, calibration)

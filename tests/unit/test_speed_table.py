@@ -34,6 +34,13 @@ def test_who_is_not_installed_is_left_out_with_a_word():
     assert figures["wc -l"] == "7 ns a frame, 0.17 x ours"
 
 
+def test_what_a_parked_vehicle_costs_is_told():
+    idle = {"n_delivered": 1000, "processor_s_per_hour": 12.34, "disk_kb_per_hour": 1234.0}
+    assert [line.figure for line in lines_of({"idle": idle})] == ["12.3 s an hour", "1,234 kB an hour"]
+    (absent,) = lines_of({"idle": {"skipped": "mosquitto is not installed"}})
+    assert absent.figure == "left out: mosquitto is not installed"
+
+
 def test_parts_that_were_not_run_have_no_lines():
     assert lines_of({}) == []
     assert {line.section for line in lines_of({"simulator": {"stage": 3.0}})} == {"simulator"}

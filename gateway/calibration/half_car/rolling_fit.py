@@ -10,6 +10,7 @@ docs/adr/roll-takes-turns.md). Taking turns, what roll gets wrong stays in roll.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -57,7 +58,7 @@ def fit_roll(known: Sequence[KnownSpectra], upright: Found, prior: Prior, start:
     own = found.covariance[:m, :m]
     beside = moves @ upright.covariance
     covariance = np.block([[upright.covariance, beside.T], [beside, own + beside @ moves.T]])
-    return Found(theta, found.cost, covariance)
+    return replace(found, x=theta, covariance=covariance)
 
 
 def _moves(seen: Sequence[tuple[KnownSpectra, Whittle]], theta: F64, found: Found) -> F64:

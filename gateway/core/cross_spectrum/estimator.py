@@ -35,7 +35,8 @@ MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
 # chosen, both; `benchmarks.accuracy sensitivity` tells what hangs on them
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
 UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
-MOST_LAG_CHANGE_S: Final = 0.002  # beyond it, roll is taken out once more, at the lag that was found
+MOST_LAG_CHANGE_S: Final = 0.002  # beyond it, roll is taken out again, at the lag that was found
+MOST_LAGS: Final = 4  # tried; a lag that still moves has no fixed point
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
 
 
@@ -43,6 +44,8 @@ ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibrat
 class Weighed:
     """What a batch's spectra show: the most probable load, how far it lies beyond the known ones (reach), how much more
     the model errs away from the calibration's speeds and roads (unseen, 1 or more), and all of it as a posterior.
+
+    is_settled: the lag at which roll was taken out is the lag that was found, by searches that converged.
     """
 
     spectra: CrossSpectra
@@ -50,6 +53,7 @@ class Weighed:
     reach: float
     unseen: float
     posterior: Posterior
+    is_settled: bool
 
 
 def by_cross_spectrum(
@@ -78,14 +82,19 @@ def weigh(batch: Batch, calibration: CrossSpectrumCalibration, prior: ShapePrior
     if spectra is None or why is not None:
         return why or Why.TOO_SHORT
     unseen = _unseen(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
-    located = locate(spectra, calibration, prior)
-    lag_s = float(located.point.theta[INDEX["gyro_lag_s"]])
-    if located.sideways is not None and abs(lag_s - calibration.parameters[INDEX["gyro_lag_s"]]) > MOST_LAG_CHANGE_S:
-        spectra = cross_spectra_of([batch], calibration.reading.with_gyro_late_by(lag_s)) or spectra
+    taken_out_s = float(calibration.parameters[INDEX["gyro_lag_s"]])
+    for _ in range(MOST_LAGS):
         located = locate(spectra, calibration, prior)
+        lag_s = float(located.point.theta[INDEX["gyro_lag_s"]])
+        is_settled = located.sideways is None or abs(lag_s - taken_out_s) <= MOST_LAG_CHANGE_S
+        if is_settled:
+            break
+        spectra = cross_spectra_of([batch], calibration.reading.with_gyro_late_by(lag_s)) or spectra
+        taken_out_s = lag_s
     reach = beyond(located.point.load, calibration.known_loads, calibration.empty_mass_kg)
     gain = gain_of(batch.gravity_mps2, calibration.gravity_mps2)
-    return Weighed(spectra, located, reach, unseen, posterior_of(located, calibration, unseen, reach, gain))
+    posterior = posterior_of(located, calibration, unseen, reach, gain)
+    return Weighed(spectra, located, reach, unseen, posterior, is_settled and located.is_converged)
 
 
 def _unfit(batch: Batch, spectra: CrossSpectra | None, calibration: CrossSpectrumCalibration) -> Why | None:
@@ -99,7 +108,7 @@ def _unfit(batch: Batch, spectra: CrossSpectra | None, calibration: CrossSpectru
         return Why.NOT_ENOUGH_EXCITATION
     freq_hz = spectra.freq_hz[1:-1]
     seen = (freq_hz >= COHERENCE_BAND_HZ[0]) & (freq_hz <= COHERENCE_BAND_HZ[1])
-    return Why.SENSOR_DISAGREEMENT if float(np.mean(spectra.coherence[seen])) < LEAST_COHERENCE else None
+    return None if float(np.mean(spectra.coherence[seen])) >= LEAST_COHERENCE else Why.SENSOR_DISAGREEMENT
 
 
 def _off_its_speeds(batch: Batch, calibration: CrossSpectrumCalibration) -> Why | None:
@@ -216,9 +225,10 @@ def disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why | 
         return Why.SENSOR_CHANGED if is_moved or min(found.reach, as_known) == 0.0 else Why.MODEL_MISFIT
     if located.tension > MOST_TENSION:
         return Why.MODEL_MISFIT
-    if not found.posterior.std(PAYLOAD) <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:
-        return Why.AMBIGUOUS if located.is_ambiguous else Why.TOO_UNCERTAIN
-    return None
+    if found.is_settled and found.posterior.std(PAYLOAD) <= MOST_PAYLOAD_STD_SHARE * calibration.empty_mass_kg:
+        return None
+    too_wide = Why.AMBIGUOUS if located.is_ambiguous else Why.TOO_UNCERTAIN
+    return too_wide if found.is_settled else Why.NO_SOLUTION
 
 
 def _unseen(speed_mps: float, shaken_mps2: float, calibration: CrossSpectrumCalibration) -> float:

@@ -57,7 +57,8 @@ class Located:
     the load moves with each of the half-car's parameters, columns (k, 2) by how much with a standard deviation of the
     causes of each source, gain_moves (2,) with the logarithm of the accelerometer's gain. rival_covariance is what
     peaks add that compete. tails are those of the error from the load's shape. tension is how far what drifts lies off
-    its calibration (drift.tension_of). sideways is None without a roll rate.
+    its calibration (drift.tension_of). is_converged is false where a search that the answer rests on did not settle.
+    sideways is None without a roll rate.
     """
 
     point: Point
@@ -72,6 +73,7 @@ class Located:
     scores: SensorScores
     is_reversed: bool
     is_ambiguous: bool
+    is_converged: bool
     as_known: Load  # what it would be, had it the shape of the known loads
     sideways: Sideways | None = None
 
@@ -127,7 +129,8 @@ def locate(
     x = peak.found.x if shape is None else shape.x
     place = sought_sideways(rolling, _point(x, placed, place.cg_left_m))
     located = _located(whittle, peak, shape, placed, place.cg_left_m, evidence)
-    return replace(located, sideways=told_sideways(rolling, place, located.point))
+    sideways = told_sideways(rolling, place, located.point)
+    return replace(located, sideways=sideways, is_converged=located.is_converged and place.found.is_converged)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -235,7 +238,8 @@ def _shaped(
         found = _sought(whittle, start, peak.packing, of_shape, cg_left_m, OF_SHAPES)
         point = _point(found.x, of_shape, cg_left_m)
         at = answer_at(whittle, point, of_shape, expected, evidence, is_shape_known=False)
-        return Node(found.x, at.cost, found.x + at.shift, float(np.sqrt(at.covariance[-2, -2])))
+        own_std_kg = float(np.sqrt(at.covariance[-2, -2]))
+        return Node(found.x, at.cost, found.x + at.shift, own_std_kg, found.is_converged)
 
     mode_hz = float(np.exp(peak.found.x[DRIFTING.index(INDEX["payload_mode_hz"])]))
     start = float(calibration.parameters[_GYRATION]), peak.found.x
@@ -294,6 +298,7 @@ def _located(
         scores=scores_of(judged, at_peak, found, replace(fitted, parameters=parameters)),
         is_reversed=_is_reversed(whittle, at_peak, misfit, fitted),
         as_known=_point(peak.found.x, calibration, cg_left_m).load,
+        is_converged=peak.found.is_converged if shape is None else shape.is_converged,
         is_ambiguous=bool(np.any(np.diag(peak.rivals) > MOST_RIVALRY * np.diag(rivalled))),
     )
 

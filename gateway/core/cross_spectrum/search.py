@@ -14,11 +14,15 @@ MOST_HALVINGS = 10
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Solution x (k,), its cost and its posterior covariance (k, k) by Laplace's approximation."""
+    """Solution x (k,), its cost and its posterior covariance (k, k) by Laplace's approximation.
+
+    ``is_converged`` is false where the steps ran out, or none lowered a cost that was still falling.
+    """
 
     x: F64
     cost: float
     covariance: F64
+    is_converged: bool
 
 
 def most_probable(
@@ -41,18 +45,21 @@ def most_probable(
     x, damping = start, 1e-3
     best = total(x)
     information = prior_precision
+    is_converged = False
     for _ in range(MOST_STEPS):
         here = curvature(x)
         gradient = here.gradient + prior_precision @ (x - prior_mean)
         information = here.information + prior_precision
         moved = _damped_step(x, gradient, information, damping, total, best)
         if moved is None:
+            is_converged = 0.5 * float(gradient @ np.linalg.solve(information, gradient)) < tolerance
             break
         gain = best - moved[1]
         x, best, damping = moved[0], moved[1], max(moved[2] / 5.0, 1e-6)
         if gain < tolerance:
+            is_converged = True
             break
-    return Found(x, best, np.asarray(np.linalg.inv(information), float))
+    return Found(x, best, np.asarray(np.linalg.inv(information), float), is_converged)
 
 
 def _damped_step(

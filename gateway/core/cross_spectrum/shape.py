@@ -46,6 +46,7 @@ class Node:
     cost: float
     x: F64
     own_std_kg: float
+    is_converged: bool = True
 
     @property
     def improbable(self) -> float:
@@ -59,7 +60,7 @@ class Shaped:
 
     column (2,) is one standard deviation of what the shape leaves open, tails its 2.5 and 97.5 % points in these;
     goods_part (0 to 1) is the part of its variance that is the same for all loads of the vehicle. likeliest is the log
-    s and the peak of the shape that explains the batch best.
+    s and the peak of the shape that explains the batch best; is_converged says whether the search settled there.
     """
 
     log_s: float
@@ -69,6 +70,7 @@ class Shaped:
     tails: tuple[float, float]
     goods_part: float
     likeliest: tuple[float, F64]
+    is_converged: bool
 
 
 def shaped(
@@ -82,7 +84,8 @@ def shaped(
     nodes, founds = _profile(prior, wheelbase_m, start, weighed_as, evidence)
     if len(nodes) == 1:
         x = founds[0].x
-        return Shaped(float(nodes[0]), x, x[-2:], np.zeros(2), NORMAL_TAILS, 0.0, (float(nodes[0]), founds[0].start))
+        likeliest = float(nodes[0]), founds[0].start
+        return Shaped(likeliest[0], x, x[-2:], np.zeros(2), NORMAL_TAILS, 0.0, likeliest, founds[0].is_converged)
     within = (prior.log_s >= nodes[0]) & (prior.log_s <= nodes[-1])
     log_s = prior.log_s[within]
     least = min(found.cost for found in founds)
@@ -103,7 +106,9 @@ def shaped(
     best = min(range(len(nodes)), key=lambda i: founds[i].cost)
     likeliest = float(nodes[best]), founds[best].start
     narrowed = float(weight @ (log_s - mean_log_s) ** 2) / prior.variance
-    return Shaped(mean_log_s, path(mean_log_s), load, column, tails, prior.habit * min(narrowed, 1.0), likeliest)
+    goods_part = prior.habit * min(narrowed, 1.0)
+    is_converged = founds[best].is_converged
+    return Shaped(mean_log_s, path(mean_log_s), load, column, tails, goods_part, likeliest, is_converged)
 
 
 def _profile(

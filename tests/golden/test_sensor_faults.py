@@ -1,0 +1,79 @@
+"""A sample of `python -m benchmarks.accuracy faults`: recorded drives with faulty sensors mislead nobody."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from support.recordings import recordings
+
+from benchmarks.accuracy.faults import Study, faults
+from gateway.cli import springscale
+from gateway.records import Why
+
+NAMES = (
+    "as recorded",
+    "acceleration times",
+    "pitch rate turned over",
+    "pitch rate sent in rad/s for deg/s",
+    "speed frozen",
+    "two devices on one identifier",
+    "frames doubled",
+)
+MOST_OUTSIDE = 0.5  # of a half-width, of either quantity: where an interval fails, it fails by little
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    output = tmp_path_factory.mktemp("vehicle") / "vehicle.json"
+    campaign = recordings() / "known_loads/campaign_roll.toml"
+    arguments = ["calibrate", str(campaign), "--output", str(output), "--estimator", "cross_spectrum"]
+    assert CliRunner().invoke(springscale, arguments, catch_exceptions=False).exit_code == 0
+    return output
+
+
+@pytest.fixture(scope="module")
+def study(calibration: Path, tmp_path_factory: pytest.TempPathFactory) -> Study:
+    kept = tmp_path_factory.mktemp("kept")
+    return Study(recordings() / "mixed/campaign_roll.toml", calibration, runs=(3,), names=NAMES, kept=kept)
+
+
+@pytest.fixture(scope="module")
+def lines(study: Study) -> dict[tuple[str, str], dict[str, Any]]:
+    return {(line["fault"], line["strength"]): line for line in faults(study)["lines"]}
+
+
+def test_every_batch_is_refused_or_held_or_nearly_so(lines: dict[tuple[str, str], dict[str, Any]]) -> None:
+    assert {name for name, _ in lines} == {*NAMES}
+    for line in lines.values():
+        assert line["n_batches"] > 0
+        assert line["n_refused"] + line["n_held"] <= line["n_batches"]
+        assert max(line["payload_furthest"], line["front_share_furthest"]) <= MOST_OUTSIDE, line
+
+
+def test_a_sound_drive_is_weighed(lines: dict[tuple[str, str], dict[str, Any]]) -> None:
+    sound = lines["as recorded", ""]
+    assert sound["n_held"] == sound["n_batches"] == 3
+
+
+@pytest.mark.parametrize(
+    ("fault", "strength", "why"),
+    [
+        ("acceleration times", "1.2", Why.SENSOR_CHANGED),
+        ("pitch rate turned over", "", Why.WRONG_SIGN),
+        ("speed frozen", "", Why.SPEED_FROZEN),
+    ],
+)
+def test_a_fault_is_refused_for_what_it_is(
+    lines: dict[tuple[str, str], dict[str, Any]], fault: str, strength: str, why: Why
+) -> None:
+    line = lines[fault, strength]
+    assert line["n_refused"] == line["n_batches"]
+    assert line["refused_by_reason"] == {str(why): line["n_batches"]}
+
+
+def test_what_was_weighed_before_is_not_weighed_again(
+    study: Study, lines: dict[tuple[str, str], dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("benchmarks.accuracy.faults.estimates_of_logs", None)
+    assert faults(study)["lines"] == list(lines.values())

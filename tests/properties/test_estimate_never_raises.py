@@ -1,0 +1,252 @@
+"""Whatever a batch holds, it ends as an estimate or with a reason: nothing that numbers can do ends the weighing."""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.half_car_road import RATE_HZ, VAN, batch_of, batch_over_road, weighed
+from support.rolling_road import WIDE_VAN, batch_over_two_tracks
+
+from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.known_run import KnownRun
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.change import Rules
+from gateway.core.cross_spectrum import estimator as cross_spectrum
+from gateway.core.cross_spectrum import reach, search
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.likelihood import Curvature
+from gateway.core.estimator import estimate
+from gateway.core.flow import Flow, Identity
+from gateway.core.fusion import fused_epoch
+from gateway.core.settings import BatchSettings
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
+from gateway.records import F64, Batch, Motion, Signal, Why
+
+KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
+KNOWN_ROLLING = ((0.0, 52.0, 0.0), (300.0, 46.0, 0.0))
+GOOD = batch_over_road(200.0, 50.0, seed=3, duration_s=60.0)
+LARGEST_FLOAT32 = 3.4e38  # what a signal of 32 bits can say
+
+
+@pytest.fixture(scope="module")
+def calibration() -> CrossSpectrumCalibration:
+    runs = [
+        KnownRun(i, f"run {i}", *load, tuple(batch_over_road(*load, seed=10 * i + k) for k in range(2)))
+        for i, load in enumerate(KNOWN)
+    ]
+    return calibrate_cross_spectrum(runs, VAN)
+
+
+@pytest.fixture(scope="module")
+def credulous(calibration: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
+    """The same without its gates: whatever moves, however badly it fits, is weighed to the end."""
+    return replace(
+        calibration,
+        acceleration_rms_mps2=1e-300,
+        pitch_rate_rms_radps=1e-300,
+        misfit_limit=math.inf,
+        most_position_score=math.inf,
+        most_noise_score=math.inf,
+    )
+
+
+@pytest.fixture(scope="module")
+def rolling() -> CrossSpectrumCalibration:
+    runs = [
+        KnownRun(i, f"run {i}", *load[:2], (batch_over_two_tracks(*load, seed=50 + i, duration_s=120.0),))
+        for i, load in enumerate(KNOWN_ROLLING)
+    ]
+    return calibrate_cross_spectrum(runs, WIDE_VAN)
+
+
+def rolled(calibration: CrossSpectrumCalibration) -> Estimate:
+    """What a good batch with a roll rate tells."""
+    calibrated = CalibratedVehicle("sha256:ab", WIDE_VAN, (0.0, 0.0), (0.0, 0.0), cross_spectrum=calibration)
+    return estimate(batch_over_two_tracks(200.0, 48.0, 0.0, seed=7, duration_s=120.0), calibrated, "cross_spectrum")
+
+
+def stretches(n: int) -> st.SearchStrategy[list[slice]]:
+    """A few runs of samples."""
+    return st.lists(st.tuples(st.integers(0, n), st.integers(1, 400)), max_size=6).map(
+        lambda runs: [slice(at, at + length) for at, length in runs]
+    )
+
+
+def put(x: F64, where: list[slice], number: float) -> F64:
+    changed = x.copy()
+    for one in where:
+        changed[one] = number
+    return changed
+
+
+def ugly(x: F64) -> st.SearchStrategy[F64]:
+    """Samples (n,) as nobody would wish for: constant, zero, enormous, tiny, in islands, periodic, a ramp, a spike."""
+    n, t = len(x), np.arange(len(x))
+    numbers = st.sampled_from([0.0, 1.0, -1.0, 9.81, 1e-300, 1e100, 1e300, np.nan, np.inf, -np.inf])
+    return st.one_of(
+        st.just(x),
+        numbers.map(lambda c: np.full(n, c)),
+        st.integers(-310, 307).map(lambda power: x * 10.0**power),
+        st.tuples(stretches(n), numbers).map(lambda one: put(x, *one)),
+        st.tuples(st.floats(0.01, 3.14), st.sampled_from([1.0, 1e5])).map(lambda one: one[1] * np.sin(one[0] * t)),
+        st.sampled_from([1.0, 1e150]).map(lambda slope: slope * t),
+        st.floats(1e-3, 10.0).map(lambda step: step * np.round(x / step)),
+    )
+
+
+@st.composite
+def ugly_batches(draw: st.DrawFn) -> Batch:
+    """As no gate would let it through; with a roll rate or without, some shorter than any segment."""
+    n = draw(st.sampled_from([len(GOOD.speed_mps)] * 4 + [0, 1, 100, 700]))
+    acceleration, pitch_rate = GOOD.vertical_acceleration_mps2[:n], GOOD.pitch_rate_radps[:n]
+    sensed = draw(ugly(acceleration)), draw(st.one_of(ugly(pitch_rate), st.just(0.3 * acceleration)))
+    constant = st.sampled_from([0.0, 1e-300, 1e-3, 14.0, 1e3, 1e300, -14.0]).map(lambda v: np.full(n, v))
+    batch = batch_of(*sensed, draw(st.one_of(constant, ugly(GOOD.speed_mps[:n]))))
+    usable = put(np.ones(n), draw(st.one_of(st.just([]), stretches(n))), 0.0) > 0.0
+    gravity_mps2 = draw(st.sampled_from([9.81, 0.0, -9.81, np.nan, 1e300]))
+    rolling = draw(st.sampled_from([None, pitch_rate, np.zeros(n)]))
+    return replace(batch, usable=usable, gravity_mps2=gravity_mps2, roll_rate_radps=rolling)
+
+
+def is_told(found: Estimate) -> bool:
+    """Either finite numbers that can be fused with others, or a reason; and JSON whatever they are."""
+    json.dumps(estimate_to_json(found), allow_nan=False)
+    if found.rejected:
+        return found.posterior is None and math.isnan(found.payload.number)
+    assert fused_epoch(None, found, Rules()) is not None
+    ends = (*found.payload.interval95, *found.front_share.interval95)
+    return all(map(math.isfinite, ends)) and ends[0] < found.payload.number < ends[1]
+
+
+@settings(max_examples=60)
+@given(batch=ugly_batches(), has_gates=st.booleans())
+def test_an_ugly_batch_is_weighed_or_refused(
+    calibration: CrossSpectrumCalibration, credulous: CrossSpectrumCalibration, batch: Batch, has_gates: bool
+) -> None:
+    assert is_told(weighed(batch, calibration if has_gates else credulous))
+
+
+@st.composite
+def ugly_rows(draw: st.DrawFn) -> Motion:
+    """A minute of frames as sensors gone mad send them, within what a signal of 32 bits can say."""
+    columns = (GOOD.vertical_acceleration_mps2 + 9.81, GOOD.pitch_rate_radps, GOOD.speed_mps)
+    signals = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
+    sent = [np.clip(draw(ugly(one)), -LARGEST_FLOAT32, LARGEST_FLOAT32) for one in columns]
+    t_ns = np.arange(len(GOOD.speed_mps)) * round(1e9 / RATE_HZ)
+    return Motion(signals, t_ns, np.column_stack(sent))
+
+
+@settings(max_examples=25)
+@given(rows=ugly_rows())
+def test_ugly_frames_are_weighed_or_refused(calibration: CrossSpectrumCalibration, rows: Motion) -> None:
+    calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 0.0), (0.0, 0.0), cross_spectrum=calibration)
+    flow = Flow(BatchSettings(window_s=60.0), {}, calibrated, "cross_spectrum", Identity())
+    assert all(is_told(found) for found in (*flow.feed(rows), *flow.flush()))
+
+
+def test_a_batch_at_no_speed_is_refused(calibration: CrossSpectrumCalibration) -> None:
+    """The time from axle to axle is infinite, and the search meets numbers that are none."""
+    found = weighed(replace(GOOD, speed_mps=np.zeros_like(GOOD.speed_mps)), calibration)
+    assert found.rejected == (Why.NO_SOLUTION,)
+
+
+def singular(*_: object) -> F64:
+    raise np.linalg.LinAlgError("Singular matrix")
+
+
+def exhausted(*_: object) -> tuple[F64, float]:
+    raise RuntimeError("Maximum number of iterations reached.")
+
+
+def indefinite(matrix: F64) -> F64:
+    """An inverse that rounding has turned over."""
+    return -np.eye(len(matrix))
+
+
+@pytest.mark.parametrize(
+    ("room", "routine", "fails"),
+    [
+        (np.linalg, "inv", singular),
+        (np.linalg, "solve", singular),
+        (np.linalg, "eigh", singular),
+        (np.linalg, "inv", indefinite),
+        (reach, "nnls", exhausted),
+    ],
+    ids=["inv", "solve", "eigh", "an indefinite inverse", "nnls"],
+)
+def test_a_routine_that_fails_refuses_the_batch(
+    calibration: CrossSpectrumCalibration,
+    monkeypatch: pytest.MonkeyPatch,
+    room: object,
+    routine: str,
+    fails: Callable[..., object],
+) -> None:
+    assert weighed(GOOD, calibration).counted
+    monkeypatch.setattr(room, routine, fails)
+    found = weighed(GOOD, calibration)
+    assert found.rejected
+    assert is_told(found)
+    if fails is not indefinite:
+        assert found.rejected == (Why.NO_SOLUTION,)
+
+
+def test_a_search_that_runs_out_of_steps_refuses_the_batch(
+    credulous: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(search, "MOST_STEPS", 1)
+    assert weighed(GOOD, credulous).rejected == (Why.NO_SOLUTION,)
+
+
+def test_a_lag_without_a_fixed_point_refuses_the_batch(
+    rolling: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert rolled(rolling).counted
+    monkeypatch.setattr(cross_spectrum, "MOST_LAG_CHANGE_S", -1.0)  # no change is small enough
+    assert rolled(rolling).rejected == (Why.NO_SOLUTION,)
+
+
+def test_an_answer_that_is_no_number_in_one_place_is_none(rolling: CrossSpectrumCalibration) -> None:
+    """Payload and share are sound, the error of the lateral place is not: weights of wheels would be none."""
+    assert rolled(replace(rolling, model_std=(*rolling.model_std[:2], math.nan))).rejected == (Why.NO_SOLUTION,)
+
+
+def bowl(x: F64) -> float:
+    return float(np.sum(np.cosh(x - 1.0)))
+
+
+def of_bowl(x: F64) -> Curvature:
+    return Curvature(np.sinh(x - 1.0), np.diag(np.cosh(x - 1.0)))
+
+
+def sought(curvature: Callable[[F64], Curvature]) -> search.Found:
+    flat = np.zeros((2, 2))
+    return search.most_probable(np.array([4.0, -3.0]), np.zeros(2), flat, bowl, curvature)
+
+
+def test_a_search_that_settles_says_so() -> None:
+    found = sought(of_bowl)
+    assert found.is_converged
+    np.testing.assert_allclose(found.x, 1.0, atol=0.1)
+
+
+def test_a_search_from_its_answer_has_settled() -> None:
+    """No step is better, and none should be."""
+    found = search.most_probable(np.ones(2), np.zeros(2), np.zeros((2, 2)), bowl, of_bowl)
+    assert found.is_converged
+    np.testing.assert_array_equal(found.x, 1.0)
+
+
+def test_a_search_that_runs_out_of_steps_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "MOST_STEPS", 2)
+    assert not sought(of_bowl).is_converged
+
+
+def test_a_search_that_climbs_says_so() -> None:
+    """A slope that does not belong to the cost: no step along it is better."""
+    assert not sought(lambda x: Curvature(-of_bowl(x).gradient, of_bowl(x).information)).is_converged
