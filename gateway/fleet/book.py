@@ -97,8 +97,7 @@ class SqliteBook:
     def lines(self) -> list[Line]:
         """The fleet, a line per vehicle."""
         with self._lock:
-            found = [self._line(vehicle) for (vehicle,) in self._database.execute(_VEHICLES).fetchall()]
-        return found
+            return [self._line(vehicle) for (vehicle,) in self._database.execute(_VEHICLES).fetchall()]
 
     def close(self) -> None:
         """Done."""
@@ -122,7 +121,9 @@ class SqliteBook:
 
         status = records("SELECT record FROM vehicle WHERE vehicle_id = ?")
         latest = records(_LATEST)
-        return line_of(vehicle, *(some[0] if some else None for some in (status, latest)), records(_STANDING), self._clock_s())
+        return line_of(
+            vehicle, *(some[0] if some else None for some in (status, latest)), records(_STANDING), self._clock_s()
+        )
 
 
 def _row(vehicle: str, kind: str, told: Any) -> tuple[str, tuple[Any, ...]]:
@@ -142,4 +143,11 @@ def _row(vehicle: str, kind: str, told: Any) -> tuple[str, tuple[Any, ...]]:
         raise LookupError(f"{kind} is no kind of record")
     if kind == "alarms":
         line_of(vehicle, None, None, (told,), 0.0)
-    return _ENTRY, (vehicle, told["id"], kind.removesuffix("s"), int(told["revision"]), bool(told.get("is_active")), text)
+    return _ENTRY, (
+        vehicle,
+        told["id"],
+        kind.removesuffix("s"),
+        int(told["revision"]),
+        bool(told.get("is_active")),
+        text,
+    )

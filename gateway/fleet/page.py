@@ -47,7 +47,9 @@ class FleetPage:
     """Serves the application from a thread of its own, so that whoever writes the book is not held up."""
 
     def __init__(self, app: FastAPI, host: str, port: int) -> None:
-        config = uvicorn.Config(app, log_config=None, access_log=False, server_header=False, timeout_graceful_shutdown=1)
+        config = uvicorn.Config(
+            app, log_config=None, access_log=False, server_header=False, timeout_graceful_shutdown=1
+        )
         self._server = uvicorn.Server(config)
         config.host, config.port = host, port
         self._socket = config.bind_socket()  # here, so that a port in use is told at once

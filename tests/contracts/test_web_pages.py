@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from support.web import Client, Gateway
 
+from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES
 from gateway.web import KnownLoad
 from gateway.web.charting import LIBRARY, LIBRARY_URL
 
@@ -46,7 +47,7 @@ def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: 
     assert re.findall(r"(?:src|href)=\"(?!/|#)", page) == []
 
 
-@pytest.mark.parametrize(("path", "tables"), [("/cab", ("common", "cab"))])
+@pytest.mark.parametrize(("path", "tables"), [("/cab", ("common", "cab")), ("/", ("common", "dashboard"))])
 def test_every_word_stands_in_the_table_in_every_language(client: Client, path: str, tables: tuple[str, ...]) -> None:
     """A row per phrase; English and German have the same fields; what a page names has a row."""
     rows: dict[str, tuple[str, str]] = {}
@@ -61,6 +62,14 @@ def test_every_word_stands_in_the_table_in_every_language(client: Client, path: 
     named = re.findall(r'data-say(?:-label)?="(\w+)"', client.get(path).text)
     assert len(named) > 5
     assert set(named) <= set(rows)
+
+
+def test_german_has_every_reason_source_and_remedy(client: Client) -> None:
+    german = client.get("/assets/words/reasons.js").text
+    for names in (EXPLANATIONS, SOURCES, REMEDIES):
+        assert [str(name) for name in names if not re.search(rf"^  {name}: ", german, re.MULTILINE)] == []
+    common = client.get("/assets/words/common.js").text
+    assert [str(name) for name in EXPLANATIONS if f'"reason.{name}"' not in common] == []
 
 
 @pytest.mark.parametrize("path", ["/", "/cab"])

@@ -64,7 +64,9 @@ def test_it_shows_where_the_load_lies(site: str, watched: Watched) -> None:
     page = watched.page
     page.goto(site)
     expect(page.locator("#weights")).to_contain_text("1.71 ± ")  # 270 kg that leave 48.0 % in front: (3)
-    drawing = page.get_by_role("img", name="Van from above. The load's centre is 1.71 m behind the front axle. Front axle")
+    drawing = page.get_by_role(
+        "img", name="Van from above. The load's centre is 1.71 m behind the front axle. Front axle"
+    )
     expect(drawing).to_be_visible()
     front, rear = (float(x) for x in page.evaluate(AXLE_PLACES))
     centre = float(drawing.locator("circle.load").get_attribute("cx"))
@@ -134,6 +136,46 @@ def test_numbers_and_tables_need_no_charts(site: str, watched: Watched) -> None:
     expect(page.locator("#recent tr").nth(1)).to_contain_text("not weighed: too slow, gap")
 
 
+@pytest.mark.parametrize("width", [390, 1800])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width: int, scheme: str) -> None:
+    """Numbers and times as Germans write them, and no word of English outside of the commissioning's card."""
+    made = Watched(browser, locale="de-DE", color_scheme=scheme, viewport={"width": width, "height": 1000})
+    page = made.page
+    page.route("**/plotly-*", lambda route: route.abort())
+    page.goto(site)
+    expect(page.locator("#payload")).to_have_text("270 kg")
+    expect(page.locator("#share")).to_have_text("48,0 %")
+    expect(page.locator("#payload-range")).to_have_text("95 %: 258 bis 282 kg")
+    expect(page.locator("#state-name")).to_have_text("Wiegt")
+    expect(page.locator("#overload")).to_have_text("Hinterachse über der Grenze.")
+    expect(page.locator("#rejected")).to_contain_text(
+        "Zu langsam: zu viel des Abschnitts war langsamer", use_inner_text=False
+    )
+    expect(page.locator("#spectra-of")).to_contain_text("Abschnitt bis 1. Jan. 1970, 00:20")
+    page.evaluate("document.getElementById('commissioning').remove()")
+    for fold in page.locator("button.fold").all():
+        fold.click()
+    for summary in page.locator("summary:visible").all():
+        summary.click()
+    assert ENGLISH.findall(page.locator("body").inner_text()) == []
+    assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert [said for said in made.complaints if "ERR_FAILED" not in said] == []
+    page.close()
+
+
+def test_a_wide_screen_is_used(site: str, browser: Any) -> None:
+    """Three cards beside each other, to the edges, and the first is filled."""
+    made = Watched(browser, viewport={"width": 1800, "height": 1000})
+    made.page.goto(site)
+    expect(made.page.locator("#payload")).to_have_text("270 kg")
+    boxes = [made.page.locator(card).bounding_box() for card in ("#latest", "#place", "#day")]
+    assert len({box["y"] for box in boxes}) == 1
+    assert boxes[-1]["x"] + boxes[-1]["width"] > 1750
+    made.page.close()
+
+
 def test_it_looks_further_back_when_asked(site: str, watched: Watched) -> None:
     page = watched.page
     page.goto(site)
@@ -175,6 +217,7 @@ def test_an_old_estimate_is_said_to_be_old(gateway: Gateway, watched: Watched) -
         gateway.board.close()
 
 
+ENGLISH = re.compile(r"\b(the|and|not|of|load|weighed|batch|unknown|heard|never)\b")
 NEVER_HEARD = STATUS.bus.model_copy(update={"n_frames": 0})
 STATES = {
     State.STARTING: ("Starting", "busy"),
@@ -192,7 +235,9 @@ def test_every_state_has_a_name_and_a_sentence(gateway: Gateway, watched: Watche
     assert set(STATES) == set(State)
     with serving(gateway.app) as server:
         for state, (name, tone) in STATES.items():
-            gateway.status = STATUS.model_copy(update={"state": state, "state_in_words": f"This is {state}.", "bus": NEVER_HEARD})
+            gateway.status = STATUS.model_copy(
+                update={"state": state, "state_in_words": f"This is {state}.", "bus": NEVER_HEARD}
+            )
             watched.page.goto(server.url)
             expect(watched.page.locator("#state")).to_have_text(re.compile(rf"{name}\s+This is {state}\."))
             expect(watched.page.locator("#state")).to_have_attribute("data-tone", tone)

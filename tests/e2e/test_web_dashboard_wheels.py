@@ -80,7 +80,9 @@ def test_the_load_lies_to_scale_to_the_left_which_is_below(site: str, watched: W
     assert across_px / ACROSS == pytest.approx(LEFT_M, abs=0.01)
     expect(page.locator("#weights")).to_contain_text("0.30 ± 0.09 m left of the centre line")
     drawing = page.get_by_role("img", name="m behind the front axle, 0.30 m left of the centre line. Front axle")
-    expect(drawing).to_have_attribute("aria-label", re.compile(r"front left wheel 435 ± \d+ kg.*, front right wheel \d+ ± "))
+    expect(drawing).to_have_attribute(
+        "aria-label", re.compile(r"front left wheel 435 ± \d+\skg.*, front right wheel \d+ ± ")
+    )
 
 
 def test_the_ellipse_is_that_of_the_covariance(site: str, watched: Watched) -> None:

@@ -1,6 +1,7 @@
 """deploy/fleet without containers: a few vehicles, and what breaks. `make fleet-test` does it with fifty."""
 
 import json
+import urllib.request
 from collections.abc import Iterator
 
 import paho.mqtt.client as mqtt
@@ -89,6 +90,15 @@ def test_the_dashboards_queries_run_as_the_role_that_may_only_read(view: FleetVi
     assert told == set(found) - {"Why batches were not weighed"}  # all were
 
 
+def test_the_page_of_the_fleet_shows_every_vehicle_from_postgresql(view: FleetView) -> None:
+    with urllib.request.urlopen(f"{view.subscriber.page}/api/v1/fleet") as answer:
+        lines = {line["vehicle_id"]: line for line in json.load(answer)["items"]}
+    assert set(lines) == {vehicle.id for vehicle in view.vehicles}
+    with view.database.connect() as connection:
+        latest = connection.execute("SELECT vehicle_id, payload_kg, gross_kg FROM latest").fetchall()
+    assert [(lines[name]["payload_kg"], lines[name]["gross_kg"]) for name, *_ in latest] == [row[1:] for row in latest]
+
+
 def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: FleetView) -> None:
     one, another = view.vehicles[:2]
     folder = view.output / "vehicles" / one.id
@@ -103,11 +113,17 @@ def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: Fleet
     client.subscribe("springscale/#", qos=1)
     client.loop_start()
     forged = client.publish(f"springscale/{another.id}/estimates", b"{}", qos=1).mid
+    announced, falsely = (
+        client.publish(f"homeassistant/device/springscale_{name}/config", b"{}", qos=1).mid
+        for name in (one.id, another.id)
+    )
     broken = [client.publish(f"springscale/{one.id}/{branch}", payload, qos=1).mid for branch, payload in UNREADABLE]
-    assert wait_until(lambda: {forged, *broken} <= set(answers))
+    assert wait_until(lambda: {forged, announced, falsely, *broken} <= set(answers))
     client.disconnect()
     client.loop_stop()
     assert (answers[forged], {answers[mid] for mid in broken}, heard) == ("Not authorized", {"Success"}, [])
+    assert answers[falsely] == "Not authorized"
+    assert answers[announced] in ("Success", "No matching subscribers")  # as it is where no Home Assistant listens
     assert wait_until(lambda: view.count("unreadable") == len(UNREADABLE))
     with view.database.connect() as connection:
         rows = connection.execute("DELETE FROM unreadable RETURNING topic, payload").fetchall()

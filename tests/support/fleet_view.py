@@ -95,9 +95,13 @@ class Subscriber:
 
     def __init__(self, folder: Path, port: int, database: Postgres) -> None:
         self._log = folder / "subscriber.log"
+        page_port = free_port()
+        self.page = f"http://127.0.0.1:{page_port}"
         self._environment = {
             **os.environ,
             **database.environment,
+            "FLEET_DATABASE": "postgresql://",
+            "FLEET_PORT": str(page_port),
             "MQTT_HOST": "127.0.0.1",
             "MQTT_PORT": str(port),
             "MQTT_CA": str(folder / "ca.pem"),

@@ -17,7 +17,7 @@ export const COMMON = {
   last_heard: ["What is shown is the last it sent.", "Gezeigt wird, was es zuletzt gesendet hat."],
   asking: ["Asking the gateway.", "Das Gateway wird gefragt."],
 
-  "place.gross": ["whole vehicle", "Gesamtgewicht"],
+  "place.gross": ["whole vehicle", "ganzes Fahrzeug"],
   "place.front_axle": ["front axle", "Vorderachse"],
   "place.rear_axle": ["rear axle", "Hinterachse"],
   "place.front_left": ["front left wheel", "Rad vorn links"],
