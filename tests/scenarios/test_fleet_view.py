@@ -1,7 +1,6 @@
 """deploy/fleet without containers: a few vehicles, and what breaks. `make fleet-test` does it with fifty."""
 
 import json
-import urllib.request
 from collections.abc import Iterator
 
 import paho.mqtt.client as mqtt
@@ -91,8 +90,7 @@ def test_the_dashboards_queries_run_as_the_role_that_may_only_read(view: FleetVi
 
 
 def test_the_page_of_the_fleet_shows_every_vehicle_from_postgresql(view: FleetView) -> None:
-    with urllib.request.urlopen(f"{view.subscriber.page}/api/v1/fleet") as answer:
-        lines = {line["vehicle_id"]: line for line in json.load(answer)["items"]}
+    lines = view.subscriber.lines()
     assert set(lines) == {vehicle.id for vehicle in view.vehicles}
     with view.database.connect() as connection:
         latest = connection.execute("SELECT vehicle_id, payload_kg, gross_kg FROM latest").fetchall()
@@ -187,3 +185,13 @@ def test_who_is_taken_from_the_table_is_refused(view: FleetView) -> None:
     assert told == ["Not authorized"]
     view.vehicles.drive(5)
     assert wait_until(lambda: view.count(f"estimate WHERE vehicle_id <> '{gone.id}'") == view.n_estimates)
+
+
+def test_without_postgresql_a_file_takes_its_place(view: FleetView) -> None:
+    """The last test: what this subscriber acknowledges never reaches PostgreSQL."""
+    view.subscriber.stop()
+    view.subscriber.start(FLEET_DATABASE=str(view.folder / "fleet.sqlite"))
+    view.vehicles.drive(5)
+    ids = {vehicle.id for vehicle in view.vehicles}
+    assert wait_until(lambda: {name for name, line in view.subscriber.lines().items() if line["payload_kg"]} >= ids)
+    assert (view.folder / "fleet.sqlite").exists()
