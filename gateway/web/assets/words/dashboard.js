@@ -189,7 +189,7 @@ export const DASHBOARD = {
   refused: ["Refused", "Abgelehnt"],
   heard: ["heard", "sendet"],
   never_heard: ["never heard", "nie empfangen"],
-  not_sent: ["not sent (optional)", "nicht gesendet (freiwillig)"],
+  not_sent: ["not sent (optional)", "nicht gesendet (optional)"],
   silent_for: ["silent for {duration}", "schweigt seit {duration}"],
   paused: ["paused for {duration}", "ruht seit {duration}"],
   "signal.vertical_acceleration": ["vertical acceleration", "Vertikalbeschleunigung"],
