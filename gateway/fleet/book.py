@@ -108,7 +108,7 @@ class SqliteBook:
         try:
             vehicle, kind = address(self._branch, arrival.topic)
             statement, row = _row(vehicle, kind, json.loads(arrival.payload))
-        except (ValueError, LookupError, TypeError, RecursionError) as fault:
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as fault:
             told = f"{type(fault).__name__}: {fault}"
             row = (self._clock_s(), arrival.topic, told, arrival.payload)
             self._database.execute("INSERT INTO unreadable VALUES (?, ?, ?, ?)", row)

@@ -1,11 +1,10 @@
 """One vehicle of the fleet as a line of a table, whatever database its records come from."""
 
-import math
 from collections.abc import Iterable, Mapping
 from datetime import datetime
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class LineAlarm(BaseModel):
@@ -20,6 +19,8 @@ class LineAlarm(BaseModel):
 class Line(BaseModel):
     """A vehicle by the last batch that was weighed. Unknown is null."""
 
+    model_config = ConfigDict(allow_inf_nan=False)
+
     vehicle_id: str
     vin: str | None
     state: str | None = Field(description="online or offline, as it last reported", examples=["online"])
@@ -29,7 +30,9 @@ class Line(BaseModel):
     payload_std_kg: float | None
     gross_kg: float | None
     gross_limit_kg: float | None
-    used_share: float | None = Field(description="payload of what can be carried up to the gross limit; above 1: over")
+    used_share: float | None = Field(
+        description="payload of what can be carried up to the gross limit; above 1: over; null also: it is too heavy empty"
+    )
     over: list[str] = Field(description="places over their limit", examples=[["rear_axle"]])
     alarms: list[LineAlarm]
 
@@ -67,11 +70,11 @@ def line_of(
 
 
 def _used(payload_kg: float | None, gross_kg: float | None, limit_kg: float | None) -> float | None:
-    """p / (p + F_max - F): the vehicle without this payload may take the rest up to its gross limit."""
+    """p / (p + F_max - F), None where that is not positive: the vehicle without this payload may take the rest up to its gross limit."""
     if payload_kg is None or gross_kg is None or limit_kg is None:
         return None
     capacity_kg = payload_kg + limit_kg - gross_kg
-    return max(0.0, payload_kg / capacity_kg) if capacity_kg > 0.0 else math.inf
+    return max(0.0, payload_kg / capacity_kg) if capacity_kg > 0.0 else None
 
 
 def _alarm(told: Mapping[str, Any]) -> LineAlarm:
