@@ -31,7 +31,7 @@ class Line(BaseModel):
     gross_kg: float | None
     gross_limit_kg: float | None
     used_share: float | None = Field(
-        description="payload of what can be carried up to the gross limit; above 1: over; null also: it is too heavy empty"
+        description="payload of what can be carried up to the gross limit; above 1: over; null also if too heavy empty"
     )
     over: list[str] = Field(description="places over their limit", examples=[["rear_axle"]])
     alarms: list[LineAlarm]
@@ -70,7 +70,7 @@ def line_of(
 
 
 def _used(payload_kg: float | None, gross_kg: float | None, limit_kg: float | None) -> float | None:
-    """p / (p + F_max - F), None where that is not positive: the vehicle without this payload may take the rest up to its gross limit."""
+    """p / (p + F_max - F): without this payload the vehicle may take that much; None where it may take nothing."""
     if payload_kg is None or gross_kg is None or limit_kg is None:
         return None
     capacity_kg = payload_kg + limit_kg - gross_kg

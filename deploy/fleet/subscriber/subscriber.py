@@ -229,7 +229,7 @@ class PostgresBook:
             raise
         self.counts += counts
 
-    def _write(self, database: psycopg.Connection, arrival: Arrival) -> str:
+    def _write(self, database: "psycopg.Connection", arrival: Arrival) -> str:
         try:
             vehicle, branch = address(self._topic, arrival.topic)
             record = json.loads(arrival.payload)
