@@ -41,9 +41,9 @@ PHONE: Final[dict[str, Any]] = {
 
 
 @contextmanager
-def demonstration(speed: str) -> Iterator[str]:
-    """Where the dashboard of a running demonstration is."""
-    command = [*SPRINGSCALE, "demo", "--port", "0", "--speed", speed]
+def demonstration(speed: str, *more: str) -> Iterator[str]:
+    """Where the page of a running demonstration is."""
+    command = [*SPRINGSCALE, "demo", "--port", "0", "--speed", speed, *more]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
         try:
             assert running.stdout is not None
@@ -117,6 +117,15 @@ def take_cab(browser: Browser) -> None:
         save(beside(*taken), "cab.png")
 
 
+def take_fleet(browser: Browser) -> None:
+    """fleet.md's picture: five vans after their first drives."""
+    with demonstration("1", "--fleet", "5") as url:
+        page = browser.new_page(locale="en-GB", timezone_id="UTC", viewport={"width": 1240, "height": 480})
+        page.goto(url)
+        page.wait_for_selector("#vehicles tr:nth-child(5) .bar", timeout=PATIENCE_S * 1000.0)
+        save(page.screenshot(), "fleet.png")
+
+
 def beside(*pictures: bytes) -> bytes:
     """As one picture, from left to right."""
     images = [Image.open(BytesIO(picture)) for picture in pictures]
@@ -155,7 +164,13 @@ def take_report(browser: Browser) -> None:
         save(page.screenshot(), "calibration-report.png")
 
 
-TAKEN: Final = {"dashboard": take_dashboard, "cab": take_cab, "tutorial": take_tutorial, "report": take_report}
+TAKEN: Final = {
+    "dashboard": take_dashboard,
+    "cab": take_cab,
+    "fleet": take_fleet,
+    "tutorial": take_tutorial,
+    "report": take_report,
+}
 
 
 def main() -> None:

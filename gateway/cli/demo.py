@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 import click
 
 from gateway.bus.sink import BusSink, replay_frames
+from gateway.cli.demo_fleet import fleet_demo
 from gateway.cli.options import NumberRange
 from gateway.cli.text.estimate import sentence
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
@@ -40,7 +41,8 @@ VAN: Final = VehicleSection(
 @click.option("--json", "as_json", is_flag=True, help="print estimates as JSON lines")
 @click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="port of the dashboard")
 @click.option("--speed", type=NumberRange(min=1.0), default=30.0, show_default=True, help="times real time")
-def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
+@click.option("--fleet", type=click.IntRange(1, 50), help="so many vans instead of one, on the page of a fleet")
+def demo(once: bool, as_json: bool, port: int, speed: float, fleet: int | None) -> None:
     """A van drives empty, stops, is loaded with 270 kg and drives on; watch the service weigh it.
 
     The first drive goes through at full speed, further ones with other loads follow at the speed asked for.
@@ -55,6 +57,9 @@ def demo(once: bool, as_json: bool, port: int, speed: float) -> None:
             web=WebSection(port=0 if once else port),
             store=StoreSection(directory=Path(folder)),
         )
+        if fleet is not None:
+            fleet_demo(fleet, setup_of(settings), port, speed, once=once)
+            return
         driver = _Driver(speed, is_endless=not once)
         try:
             Gateway(settings, setup_of(settings), on_started=driver.start, known_loads=driver.known_loads).run()

@@ -52,7 +52,7 @@ def alarmed(tmp_path: Path) -> Iterator[Alarmed]:
 def test_what_stands_and_what_stood(alarmed: Alarmed) -> None:
     client = Client(alarmed.app)
     told = client.get(URL).json()
-    assert [one["sentence"] for one in told["active"]] == ["The vehicle weighs 2560 +- 27 kg, 2500 kg are permitted"]
+    assert [one["sentence"] for one in told["active"]] == ["The vehicle weighs 2560 +- 27 kg, limit 2500 kg"]
     assert told["items"] == told["active"]
     alarmed.bench.weigh(of_load(1, 100.0))
     later = client.get(f"{URL}?cursor={told['last_cursor']}").json()

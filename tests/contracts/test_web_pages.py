@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 from support.web import Client, Gateway
 
+from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES
 from gateway.web import KnownLoad
 from gateway.web.charting import LIBRARY, LIBRARY_URL
 
 NAMED = re.compile(r"(?:<link[^>]* href=|src=|from )\"(/[^\"]*)\"")
+ROW = re.compile(r"^  (\S+): \[\s*\"(.*?)\",\s*\"(.*?)\",?\s*\],$", re.MULTILINE)
 TRUTH = (KnownLoad(0, 0.0, 50.0), KnownLoad(900 * 10**9, 270.0, 50.6))
 
 
@@ -43,6 +45,31 @@ def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: 
     assert re.findall(r"<script(?![^>]*\bsrc=)", page) == []
     assert re.findall(r"<style|\sstyle=|\son[a-z]+=", page) == []
     assert re.findall(r"(?:src|href)=\"(?!/|#)", page) == []
+
+
+@pytest.mark.parametrize(("path", "tables"), [("/cab", ("common", "cab")), ("/", ("common", "dashboard"))])
+def test_every_word_stands_in_the_table_in_every_language(client: Client, path: str, tables: tuple[str, ...]) -> None:
+    """A row per phrase; English and German have the same fields; what a page names has a row."""
+    rows: dict[str, tuple[str, str]] = {}
+    for table in tables:
+        text = client.get(f"/assets/words/{table}.js").text
+        found = ROW.findall(text)
+        assert len(found) == len(re.findall(r"^  \S.*: \[", text, re.MULTILINE))
+        rows |= {key.strip('"'): (english, german) for key, english, german in found}
+    for english, german in rows.values():
+        assert set(re.findall(r"{\w+}", english)) == set(re.findall(r"{\w+}", german))
+        assert english.count("|") == german.count("|")
+    named = re.findall(r'data-say(?:-label)?="(\w+)"', client.get(path).text)
+    assert len(named) > 5
+    assert set(named) <= set(rows)
+
+
+def test_german_has_every_reason_source_and_remedy(client: Client) -> None:
+    german = client.get("/assets/words/reasons.js").text
+    for names in (EXPLANATIONS, SOURCES, REMEDIES):
+        assert [str(name) for name in names if not re.search(rf"^  {name}: ", german, re.MULTILINE)] == []
+    common = client.get("/assets/words/common.js").text
+    assert [str(name) for name in EXPLANATIONS if f'"reason.{name}"' not in common] == []
 
 
 @pytest.mark.parametrize("path", ["/", "/cab"])

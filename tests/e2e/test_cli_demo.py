@@ -18,3 +18,17 @@ def test_the_demo_weighs_the_van_before_and_after_loading() -> None:
     assert all(abs(payload - 270.0) < 60.0 for payload in payloads[3:])
     assert [record["epoch_n_batches"] for record in counted] == [1, 2, 3, 1, 2]  # the stop opened a new epoch
     assert counted[2]["epoch_payload_std_kg"] < counted[2]["payload_std_kg"]
+
+
+def test_a_fleet_is_shown_by_one_command() -> None:
+    """Two vans, one of them too heavy: what the page would show."""
+    found = CliRunner().invoke(springscale, ["demo", "--fleet", "2", "--once"], catch_exceptions=False)
+    assert found.exit_code == 0, found.output
+    light, heavy = [json.loads(line) for line in found.stdout.splitlines()]
+    assert (light["vehicle_id"], heavy["vehicle_id"]) == ("van-1", "van-2")
+    assert abs(light["payload_kg"] - 270.0) < 60.0
+    assert abs(heavy["payload_kg"] - 400.0) < 60.0
+    assert light["over"] == light["alarms"] == []
+    assert "gross" in heavy["over"]
+    assert [(alarm["kind"], alarm["where"]) for alarm in heavy["alarms"]] == [("overload", "gross")]
+    assert heavy["used_share"] > 1.0 > light["used_share"] > 0.0

@@ -22,6 +22,7 @@ expect = playwright.expect
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 HURRIED = "{ const set = setInterval; window.setInterval = (draw, ms) => set(draw, ms / 20); }"  # nobody has to wait
 LEAST_NUMBER_PX = 70  # read at arm's length: 70 CSS pixels are about 11 mm on a phone
+ENGLISH = re.compile(r"\b(the|and|not|is|of|load|weighed|limit)\b")
 WAKE_LOCK = """(() => {
   const lock = Object.assign(new EventTarget(), {});
   const request = async (kind) => { window.asked = kind; return lock; };
@@ -48,22 +49,25 @@ def phone(browser: Any) -> Iterator[Watched]:
     made.page.close()
 
 
-def test_at_a_glance_it_says_what_may_still_go_in(gateway: Gateway, phone: Watched) -> None:
+def test_at_a_glance_it_says_what_can_be_loaded_and_the_rest_on_a_tap(gateway: Gateway, phone: Watched) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     load_event(gateway, 300, 240.0)
     page = phone.page
     with serving(gateway.app) as server:
         page.goto(f"{server.url}/cab")
         expect(page.locator("#light")).to_have_text("Go")
-        expect(page.locator("#question")).to_have_text("May still go in")
+        expect(page.locator("#question")).to_have_text("You can still load")
         expect(page.locator("#number")).to_have_text("160 kg")
+        expect(page.locator("#likely")).to_be_hidden()
+        page.locator("#panel").tap()
+        expect(page.locator("#likely")).to_be_visible()
         expect(page.locator("#likely")).to_have_text(
-            "That much surely; most likely 169 kg (95 %: 161 to 178 kg), by the limit of the rear axle."
+            "Safe: 160 kg; best estimate 169 kg (95 %: 161 to 178 kg). Limit: rear axle."
         )
-        expect(page.locator("#rooms")).to_contain_text("Whole vehicle300 kg left")
-        expect(page.locator("#aboard")).to_contain_text("Aboard: 300 kg (95 %: 288 to 312 kg), weighed 0 s ago.")
+        expect(page.locator("#rooms")).to_contain_text("Whole vehicle300 kg spare")
+        expect(page.locator("#aboard")).to_contain_text("On board: 300 kg (95 %: 288 to 312 kg), weighed 0 s ago.")
         expect(page.locator("#last-event")).to_have_text(
-            "Last change, by 00:05: 240 kg loaded (95 %: 226 to 254 kg). 500 kg aboard then."
+            "Last change, by 1 Jan 1970, 00:05: 240 kg loaded (95 %: 226 to 254 kg)."
         )
         assert page.locator("#main").get_attribute("data-is") == "current"
         assert page.locator("#number").evaluate("e => parseFloat(getComputedStyle(e).fontSize)") > LEAST_NUMBER_PX
@@ -98,16 +102,16 @@ def test_by_day_and_by_night_every_word_can_be_read(
         watched.page.close()
 
 
-def test_too_heavy_says_by_how_much_and_what_must_come_out(gateway: Gateway, phone: Watched) -> None:
+def test_too_heavy_says_what_must_come_out_by_the_same_logic(gateway: Gateway, phone: Watched) -> None:
     gateway.publish(loaded(0, 620.0, 50.0))
     with serving(gateway.app) as server:
         phone.page.goto(f"{server.url}/cab")
         expect(phone.page.locator("#light")).to_have_text("Too heavy")
-        expect(phone.page.locator("#about")).to_have_text("Whole vehicle, front axle: 99 % likely too heavy.")
-        expect(phone.page.locator("#question")).to_have_text("Too heavy by")
-        expect(phone.page.locator("#number")).to_have_text("20 kg")
+        expect(phone.page.locator("#about")).to_have_text("Whole vehicle, front axle: 99 % probability of overload.")
+        expect(phone.page.locator("#question")).to_have_text("Take out")
+        expect(phone.page.locator("#number")).to_have_text("35 kg")  # by the lower end, as what can be loaded
         expect(phone.page.locator("#likely")).to_have_text(
-            "By the limit of the whole vehicle. To be sure take out 35 kg."
+            "Overload: best estimate 20 kg (95 %: 8 to 32 kg). Limit: whole vehicle."
         )
         expect(phone.page.locator("#rooms")).to_contain_text("Front axle10 kg too much")
         phone.page.close()
@@ -122,7 +126,7 @@ def test_alarms_that_stand_are_said_in_words(gateway: Gateway, phone: Watched) -
         names = {"imbalance.left_right": "final", "overload.rear_left": "final", "drift.zero": "early"}
         gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=names)})
         expect(phone.page.locator("#alarms")).to_have_text(
-            "Alarm: load too far to one side, rear left too heavy. First sign: drift: zero."
+            "Alarm: load too far to one side, rear left wheel too heavy. First sign: drift: zero."
         )
         phone.page.close()
 
@@ -133,7 +137,7 @@ def test_near_the_limit_nothing_more_is_promised(gateway: Gateway, phone: Watche
         phone.page.goto(f"{server.url}/cab")
         expect(phone.page.locator("#light")).to_have_text("Near the limit")
         expect(phone.page.locator("#number")).to_have_text("0 kg")
-        expect(phone.page.locator("#likely")).to_contain_text("likely 4 kg (95 %: −5 to 13 kg)")
+        expect(phone.page.locator("#likely")).to_contain_text("best estimate 4 kg (95 %: −5 to 13 kg)")
         phone.page.close()
 
 
@@ -161,10 +165,10 @@ def test_standing_it_says_that_it_cannot_see_what_is_loaded_now(gateway: Gateway
     with serving(gateway.app) as server:
         page.goto(f"{server.url}/cab")
         expect(page.locator("#not-seen")).to_have_text(
-            re.compile(r"Standing for 4 min\. Weighed last at 00:05\. What is loaded or unloaded now is not seen\.")
+            "Parked for 4 min. Last weighed at 1 Jan 1970, 00:05. Loading since then is not included."
         )
-        expect(page.locator("#light")).to_have_text("Go, when weighed last")
-        expect(page.locator("#question")).to_have_text("May still go in, when weighed last")
+        expect(page.locator("#light")).to_have_text("Go, when last weighed")
+        expect(page.locator("#question")).to_have_text("You can still load, when last weighed")
         expect(page.locator("#main")).to_have_attribute("data-is", "earlier")
         expect(page.locator("#own-readings")).to_contain_text("Air spring pressure412.4 kPa")
         expect(page.locator("#own-readings")).to_contain_text("Ride height−12 mm, silent for 3 min")
@@ -184,8 +188,8 @@ def test_a_number_of_before_the_machine_was_started_is_old(gateway: Gateway, pho
     with serving(gateway.app) as server:
         phone.page.goto(f"{server.url}/cab")
         expect(phone.page.locator("#bar")).to_contain_text("These numbers are old.")
-        expect(phone.page.locator("#bar")).to_contain_text("Weighed before the gateway was started.")
-        expect(phone.page.locator("#aboard")).to_contain_text("weighed before the gateway was started.")
+        expect(phone.page.locator("#bar")).to_contain_text("Weighed before the gateway started.")
+        expect(phone.page.locator("#aboard")).to_contain_text("weighed before the gateway started.")
         assert phone.complaints == []
 
 
@@ -196,7 +200,7 @@ def test_an_old_number_is_crossed_through_and_said_loudly(gateway: Gateway, phon
         phone.page.goto(f"{server.url}/cab")
         expect(phone.page.get_by_role("alert")).to_have_text("These numbers are old.")
         expect(phone.page.locator("#bar")).to_have_text("These numbers are old. Weighed 3.0 h ago.")
-        expect(phone.page.locator("#light")).to_have_text("Go, when weighed last")
+        expect(phone.page.locator("#light")).to_have_text("Go, when last weighed")
         crossed = phone.page.locator("#number").evaluate("e => getComputedStyle(e).textDecorationLine")
         assert crossed == "line-through"
         phone.page.close()
@@ -215,9 +219,9 @@ def test_a_gateway_that_is_gone_is_said_loudly_and_comes_back(gateway: Gateway, 
         expect(page.locator("#bar")).to_be_hidden()
         page.clock.run_for(48_000)
         expect(page.get_by_role("alert")).to_have_text(
-            "The gateway does not answer. What is shown is the last it said."
+            "The gateway does not answer. What is shown is the last it sent."
         )
-        expect(page.locator("#bar-how-long")).to_have_text("For 60 s now.")
+        expect(page.locator("#bar-how-long")).to_have_text("For 60 s.")
         expect(page.locator("#main")).to_have_attribute("data-is", "old")
         expect(page.locator("#number")).to_have_text("160 kg")
         expect(page.locator("#aboard")).to_contain_text("weighed 60 s ago")
@@ -233,7 +237,7 @@ def test_a_sensor_that_is_silent_is_said(gateway: Gateway, phone: Watched) -> No
     gateway.status = BEFORE.model_copy(update={"state": State.SENSOR_FAULT})
     with serving(gateway.app) as server:
         phone.page.goto(f"{server.url}/cab")
-        expect(phone.page.get_by_role("alert")).to_contain_text("nothing new is weighed")
+        expect(phone.page.get_by_role("alert")).to_contain_text("weighing has stopped")
         expect(phone.page.locator("#aboard")).to_contain_text("Not weighed since: acceleration missing.")
         phone.page.close()
 
@@ -246,12 +250,12 @@ def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path
         page.goto(f"{server.url}/cab")
         expect(page.locator("#light")).to_have_text("Not weighed yet")
         expect(page.locator("#number")).to_have_text("?")
-        expect(page.locator("#likely")).to_have_text("It is weighed after some minutes of driving.")
+        expect(page.locator("#why")).to_have_text("The first weight comes after some minutes of driving.")
         gateway.publish(loaded(0, 300.0, 48.0))
         expect(page.locator("#light")).to_have_text("No limit is known")
         expect(page.locator("#number")).to_have_text("300 kg")
-        expect(page.locator("#question")).to_have_text("Aboard")
-        expect(page.locator("#likely")).to_contain_text("no limit is set ([vehicle] gross_limit_kg")
+        expect(page.locator("#question")).to_have_text("On board")
+        expect(page.locator("#why")).to_contain_text("no limit is set ([vehicle] gross_limit_kg")
         page.close()
 
 
@@ -289,7 +293,7 @@ def test_where_tokens_are_asked_for_it_asks_and_shows_nothing_before(tmp_path: P
         gateway.status = BEFORE
         gateway.publish(loaded(0, 300.0, 48.0))
         page.goto(f"{server.url}/cab")
-        expect(page.get_by_role("alert")).to_have_text("The gateway wants a token.")
+        expect(page.get_by_role("alert")).to_have_text("The gateway needs a token.")
         expect(page.locator("#main")).to_be_hidden()
         page.get_by_label("Token").fill(token)
         page.get_by_label("Token").press("Enter")
@@ -308,3 +312,44 @@ def test_across_it_fits_without_scrolling(gateway: Gateway, browser: Any) -> Non
         assert box["y"] + box["height"] < 390
         assert watched.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         watched.page.close()
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_in_german_on_a_phone_and_on_a_tablet(gateway: Gateway, browser: Any, width: int, scheme: str) -> None:
+    """Numbers as Germans write them; no word of English but names; by keyboard alone."""
+    gateway.publish(loaded(0, 620.0, 50.0))
+    load_event(gateway, 300, 240.0)
+    watched = Watched(browser, locale="de-DE", color_scheme=scheme, viewport={"width": width, "height": 800})
+    page = watched.page
+    with serving(gateway.app) as server:
+        page.goto(f"{server.url}/cab")
+        expect(page.locator("#light")).to_have_text("Zu schwer")
+        expect(page.locator("#question")).to_have_text("Laden Sie aus")
+        assert page.evaluate("document.documentElement.lang") == "de"
+        page.get_by_text("Einzelheiten").focus()
+        page.keyboard.press("Enter")
+        expect(page.locator("#rooms")).to_contain_text("Vorderachse10 kg zu viel")
+        expect(page.locator("#last-event")).to_have_text(
+            "Letzte Änderung, bis 1. Jan. 1970, 00:05: 240 kg geladen (95 %: 226 bis 254 kg)."
+        )
+        assert not ENGLISH.search(page.locator("body").inner_text())
+        assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        panel = page.locator("#panel").bounding_box()
+        assert (panel["x"], panel["width"]) == (0, width)
+        assert watched.complaints == []
+        page.close()
+
+
+def test_a_wheel_that_bears_too_much_asks_for_another_place_not_for_less(tmp_path: Path, phone: Watched) -> None:
+    """More goes in nowhere, but taking something out is not what is asked for."""
+    answer = {"light": "over", "light_about": ["rear_left"], "over_limit_probability": 0.97}
+    with cab_gateway(tmp_path) as gateway, serving(gateway.app) as server:
+        gateway.publish(loaded(0, 300.0, 48.0))
+        phone.page.route("**/api/v1/cab", lambda route: route.fulfill(json={**route.fetch().json(), **answer}))
+        phone.page.goto(f"{server.url}/cab")
+        expect(phone.page.locator("#light")).to_have_text("Move the load")
+        expect(phone.page.locator("#about")).to_have_text("Rear left wheel: 97 % probability of overload.")
+        expect(phone.page.locator("#number")).to_have_text("0 kg")
+        phone.page.close()

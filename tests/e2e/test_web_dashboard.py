@@ -64,13 +64,15 @@ def test_it_shows_where_the_load_lies(site: str, watched: Watched) -> None:
     page = watched.page
     page.goto(site)
     expect(page.locator("#weights")).to_contain_text("1.71 ± ")  # 270 kg that leave 48.0 % in front: (3)
-    drawing = page.get_by_role("img", name="Van from above. The load's centre lies 1.71 m behind the front axle.")
+    drawing = page.get_by_role(
+        "img", name="Van from above. The load's centre is 1.71 m behind the front axle. Front axle"
+    )
     expect(drawing).to_be_visible()
     front, rear = (float(x) for x in page.evaluate(AXLE_PLACES))
     centre = float(drawing.locator("circle.load").get_attribute("cx"))
     assert (centre - front) / (rear - front) == pytest.approx(1.71 / 2.8, abs=0.01)
-    expect(page.locator("#overload")).to_have_text("The rear axle is over its limit.")
-    expect(drawing.locator("text.over")).to_contain_text("865")
+    expect(page.locator("#overload")).to_have_text("Rear axle is over its limit.")
+    expect(drawing.locator("text.over")).to_contain_text(["865", "limit 850"])
 
 
 AXLE_PLACES = "[...document.querySelectorAll('#van line.axle')].map((line) => line.getAttribute('x1'))"
@@ -93,8 +95,10 @@ def test_it_shows_how_bus_sensors_and_calibration_are(site: str, watched: Watche
     expect(rows.nth(0)).to_contain_text("100.2 Hz")
     expect(rows.nth(1).locator(".silent")).to_have_text("silent for 75 s")
     expect(rows.nth(2).locator(".silent")).to_have_text("never heard")
+    expect(rows.nth(3)).to_contain_text("Doornot sent (optional)")
+    expect(rows.nth(3).locator(".silent")).to_have_count(0)
     expect(page.locator("#bus")).to_contain_text("socketcan can0: receiving")
-    expect(page.locator("#bus")).to_contain_text("connected; 31 wait, the oldest for 2.6 h")
+    expect(page.locator("#bus")).to_contain_text("connected; 31 waiting, the oldest for 2.6 h")
     expect(page.locator("#calibrated")).to_contain_text("0 to 420 kg")
 
 
@@ -105,10 +109,10 @@ def test_the_charts_show_estimates_bands_truth_and_model(drawn: Watched) -> None
     ends_kg = [kg + side * Z95 * 6.0 for kg in (2.0, 270.0) for side in (-1.0, 1.0)]
     assert sorted({y for y in band["y"] if y is not None}) == pytest.approx(ends_kg, abs=1e-5)
     assert [y for y in estimate["y"] if y is not None] == [2, 2, 2, 2, 270, 270]
-    assert refused["text"] == ["not weighed: too slow, gap<br>until 01/01/1970, 00:15"]
+    assert refused["text"] == ["not weighed: too slow, gap<br>until 1 Jan 1970, 00:15"]
     expect(page.locator("#payload-chart-words")).to_contain_text("3 of 4 batches weighed; the last 270 kg")
-    expect(page.locator("#history-legend")).to_contain_text("truly aboard")
-    expect(page.locator("#spectra-of")).to_contain_text("Model: the calibrated vehicle with 270 kg aboard")
+    expect(page.locator("#history-legend")).to_contain_text("actual load (simulator)")
+    expect(page.locator("#spectra-of")).to_contain_text("Model: the calibrated vehicle with 270 kg on board")
     measured, model = page.evaluate("document.getElementById('spectra-pitch_rate_radps_rthz').data")
     assert 1.1 <= model["x"][0] < model["x"][-1] <= 14.0
     assert len(measured["y"]) > len(model["y"]) > 50
@@ -130,6 +134,46 @@ def test_numbers_and_tables_need_no_charts(site: str, watched: Watched) -> None:
     page.get_by_text("History as a table").click()
     expect(page.locator("#recent tr").nth(0)).to_contain_text("258 to 282 kg")
     expect(page.locator("#recent tr").nth(1)).to_contain_text("not weighed: too slow, gap")
+
+
+@pytest.mark.parametrize("width", [390, 1800])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width: int, scheme: str) -> None:
+    """Numbers and times as Germans write them, and no word of English outside of the commissioning's card."""
+    made = Watched(browser, locale="de-DE", color_scheme=scheme, viewport={"width": width, "height": 1000})
+    page = made.page
+    page.route("**/plotly-*", lambda route: route.abort())
+    page.goto(site)
+    expect(page.locator("#payload")).to_have_text("270 kg")
+    expect(page.locator("#share")).to_have_text("48,0 %")
+    expect(page.locator("#payload-range")).to_have_text("95 %: 258 bis 282 kg")
+    expect(page.locator("#state-name")).to_have_text("Wiegt")
+    expect(page.locator("#overload")).to_have_text("Hinterachse über der Grenze.")
+    expect(page.locator("#rejected")).to_contain_text(
+        "Zu langsam: zu viel des Abschnitts war langsamer", use_inner_text=False
+    )
+    expect(page.locator("#spectra-of")).to_contain_text("Abschnitt bis 1. Jan. 1970, 00:20")
+    page.evaluate("document.getElementById('commissioning').remove()")
+    for fold in page.locator("button.fold").all():
+        fold.click()
+    for summary in page.locator("summary:visible").all():
+        summary.click()
+    assert ENGLISH.findall(page.locator("body").inner_text()) == []
+    assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert [said for said in made.complaints if "ERR_FAILED" not in said] == []
+    page.close()
+
+
+def test_a_wide_screen_is_used(site: str, browser: Any) -> None:
+    """Three cards beside each other, to the edges, and the first is filled."""
+    made = Watched(browser, viewport={"width": 1800, "height": 1000})
+    made.page.goto(site)
+    expect(made.page.locator("#payload")).to_have_text("270 kg")
+    boxes = [made.page.locator(card).bounding_box() for card in ("#latest", "#place", "#day")]
+    assert len({box["y"] for box in boxes}) == 1
+    assert boxes[-1]["x"] + boxes[-1]["width"] > 1750
+    made.page.close()
 
 
 def test_it_looks_further_back_when_asked(site: str, watched: Watched) -> None:
@@ -173,6 +217,8 @@ def test_an_old_estimate_is_said_to_be_old(gateway: Gateway, watched: Watched) -
         gateway.board.close()
 
 
+ENGLISH = re.compile(r"\b(the|and|not|of|load|weighed|batch|unknown|heard|never)\b")
+NEVER_HEARD = STATUS.bus.model_copy(update={"n_frames": 0})
 STATES = {
     State.STARTING: ("Starting", "busy"),
     State.WAITING_FOR_BUS: ("Bus silent", "warn"),
@@ -189,13 +235,28 @@ def test_every_state_has_a_name_and_a_sentence(gateway: Gateway, watched: Watche
     assert set(STATES) == set(State)
     with serving(gateway.app) as server:
         for state, (name, tone) in STATES.items():
-            gateway.status = STATUS.model_copy(update={"state": state, "state_in_words": f"This is {state}."})
+            gateway.status = STATUS.model_copy(
+                update={"state": state, "state_in_words": f"This is {state}.", "bus": NEVER_HEARD}
+            )
             watched.page.goto(server.url)
             expect(watched.page.locator("#state")).to_have_text(re.compile(rf"{name}\s+This is {state}\."))
             expect(watched.page.locator("#state")).to_have_attribute("data-tone", tone)
         gateway.status = STATUS.model_copy(update={"calibration_id": None})
         watched.page.goto(server.url)
         expect(watched.page.locator("#state-name")).to_have_text("No calibration")
+        gateway.board.close()
+
+
+def test_between_drives_a_silent_bus_alarms_nobody(gateway: Gateway, watched: Watched) -> None:
+    gateway.publish(make_estimate(0))
+    gateway.status = STATUS.model_copy(update={"state": State.WAITING_FOR_BUS})
+    page = watched.page
+    with serving(gateway.app) as server:
+        page.goto(server.url)
+        expect(page.locator("#state")).to_have_text(re.compile("Bus silent\\s+The vehicle is asleep."))
+        expect(page.locator("#state")).to_have_attribute("data-tone", "calm")
+        expect(page.locator("#signals tr").nth(1)).to_contain_text("paused for 75 s")
+        expect(page.locator("#signals .silent")).to_have_count(0)
         gateway.board.close()
 
 
@@ -227,7 +288,7 @@ def test_it_asks_for_a_token_where_one_is_needed(tmp_path: Path, watched: Watche
         gateway.publish(make_estimate(0))
         page = watched.page
         page.goto(server.url)
-        expect(page.locator("#state")).to_contain_text("The gateway wants a token.")
+        expect(page.locator("#state")).to_contain_text("The gateway needs a token.")
         page.get_by_label("Token", exact=True).fill(tokens.create("dispatcher", Scope.READ))
         page.keyboard.press("Enter")
         expect(page.locator("#payload")).to_have_text("100 kg")
@@ -236,7 +297,7 @@ def test_it_asks_for_a_token_where_one_is_needed(tmp_path: Path, watched: Watche
         assert not any("spr_" in address for address in watched.addresses)
         page.get_by_text("History as a table").click()
         with page.expect_download() as download:
-            page.get_by_text("All of it for a spreadsheet (CSV)").click()
+            page.get_by_text("Download all as CSV").click()
         assert "payload_kg" in Path(download.value.path()).read_text()
         gateway.board.close()
 

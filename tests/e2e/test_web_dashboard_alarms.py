@@ -46,28 +46,27 @@ def test_an_alarm_comes_by_the_stream_and_is_acknowledged_by_keyboard(bench: Ala
         expect(page.locator("#alarms")).to_be_hidden()
         bench.weigh(of_load(0, OVER))
         alarm = page.locator("#alarms-open li")
-        expect(alarm).to_contain_text("Early warning: The vehicle weighs 2560 ± 27 kg, 2500 kg are permitted.")
-        button = page.get_by_role("button", name="I have seen it: The vehicle weighs 2560")
+        expect(alarm).to_contain_text("Early warning: Whole vehicle: 2,560 ± 27 kg, limit 2,500 kg.")
+        button = page.get_by_role("button", name="Acknowledge: Whole vehicle: 2,560")
         button.focus()
         bench.weigh(of_load(1, OVER, n_batches=2))
-        expect(alarm).to_contain_text("Confirmed: The vehicle weighs 2560")
+        expect(alarm).to_contain_text("Confirmed: Whole vehicle: 2,560")
         expect(button).to_be_focused()
         assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
         page.keyboard.press("Enter")
-        expect(page.get_by_role("dialog", name="You have seen it?")).to_be_visible()
+        expect(page.get_by_role("dialog", name="Acknowledge this alarm?")).to_be_visible()
         expect(page.get_by_label("What is done about it")).to_be_focused()
         assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
         page.get_by_label("What is done about it").fill("two pallets come off")
         page.keyboard.press("Enter")
         expect(page.get_by_role("dialog")).to_be_hidden()
-        expect(alarm).to_contain_text("seen by local")
+        expect(alarm).to_contain_text("acknowledged by local")
         expect(alarm).to_contain_text("(two pallets come off)")
         expect(alarm.get_by_role("button")).to_have_count(0)
-        expect(page.locator("#alarms-said")).to_have_text("Noted: you have seen it.")
+        expect(page.locator("#alarms-said")).to_have_text("Acknowledged.")
         bench.weigh(of_load(2, 100.0))
-        expect(page.locator("#alarms-none")).to_have_text("None stands.")
-        page.get_by_text("Earlier alarms").click()
-        expect(page.locator("#alarms-entries li")).to_contain_text("The vehicle weighs 2560")
+        expect(page.locator("#alarms")).to_be_hidden()  # what ended leaves the top
+        expect(page.locator("#alarms-entries li")).to_contain_text("Ended: Whole vehicle: 2,560")
         assert [said for said in watched.complaints if "ERR_FAILED" not in said] == []
         bench.board.close()
 
@@ -78,14 +77,16 @@ def test_one_that_ended_unseen_is_still_there_until_somebody_has_seen_it(bench: 
     page = watched.page
     with serving(app_of(bench)) as server:
         page.goto(server.url)
-        expect(page.locator("#alarms-open li")).to_have_count(1)  # the earlier one of the two can no more be seen
-        expect(page.locator("#alarms-open li")).to_contain_text("Over: The vehicle weighs 2560")
-        page.get_by_role("button", name="I have seen it").click()
+        expect(page.locator("#alarms-entries li")).to_have_count(2)
+        expect(page.locator("#alarms")).to_be_hidden()
+        expect(page.locator("#alarms-unseen")).to_have_text("1 not acknowledged")  # the earlier one no more can be
+        page.get_by_role("button", name="Acknowledge:").click()
         page.get_by_role("button", name="Not yet").click()
-        expect(page.locator("#alarms-open li")).to_have_count(1)
-        page.get_by_role("button", name="I have seen it").click()
-        page.get_by_role("button", name="Yes, I have").click()
-        expect(page.locator("#alarms-none")).to_have_text("None stands.")
+        expect(page.locator("#alarms-unseen")).to_have_text("1 not acknowledged")
+        page.get_by_role("button", name="Acknowledge:").click()
+        page.get_by_role("button", name="Acknowledge", exact=True).click()
+        expect(page.locator("#alarms-unseen")).to_be_hidden()
+        expect(page.locator("#alarms-past-title")).to_be_focused()
         bench.board.close()
 
 
@@ -97,12 +98,12 @@ def test_it_wants_a_token_that_may_operate(tmp_path: Path, bench: AlarmBench, wa
         page.goto(server.url)
         page.get_by_label("Token", exact=True).fill(reader)
         page.keyboard.press("Enter")
-        page.get_by_role("button", name="I have seen it").click()
-        page.get_by_role("button", name="Yes, I have").click()
+        page.get_by_role("button", name="Acknowledge:").click()
+        page.get_by_role("button", name="Acknowledge", exact=True).click()
         expect(page.locator("#alarm-refusal")).to_contain_text("scope operate")
         page.get_by_label("Acknowledger's token").fill(operator)
-        page.get_by_role("button", name="Yes, I have").click()
-        expect(page.locator("#alarms-open li")).to_contain_text("seen by yard")
+        page.get_by_role("button", name="Acknowledge", exact=True).click()
+        expect(page.locator("#alarms-open li")).to_contain_text("acknowledged by yard")
         expect(page.get_by_label("Acknowledger's token")).to_have_value("")
         bench.board.close()
 
@@ -111,6 +112,6 @@ def test_it_says_how_the_webhook_is(bench: AlarmBench, watched: Watched) -> None
     with serving(app_of(bench)) as server:
         watched.page.goto(server.url)
         bus = watched.page.locator("#bus")
-        expect(bus).to_contain_text("does not: https://fleet.example:443 answered 500; 3 wait, the oldest for 2.0 h")
-        expect(bus).to_contain_text("Letters it refused")
+        expect(bus).to_contain_text("fails: https://fleet.example:443 answered 500; 3 waiting, the oldest for 2.0 h")
+        expect(bus).to_contain_text("Messages it refused")
         bench.board.close()

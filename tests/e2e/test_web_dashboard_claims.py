@@ -116,7 +116,7 @@ def test_a_phone_shows_the_load_and_folds_the_rest(site: str, browser: Any) -> N
     expect(page.locator("#payload-chart[data-drawn]")).to_be_visible()
     assert page.evaluate("document.documentElement.scrollHeight / innerHeight") < MOST_SCREENS_ON_A_PHONE
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["viewport"]["width"]
-    fold = page.get_by_role("button", name="What the springs say")
+    fold = page.get_by_role("button", name="Spectra of the suspension")
     expect(fold).to_have_attribute("aria-expanded", "false")
     expect(page.locator("#spectra-charts")).to_be_hidden()
     fold.click()

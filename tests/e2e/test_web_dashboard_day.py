@@ -1,7 +1,9 @@
 """The day on the dashboard: a timeline of load over stops, the same in words, kept up to date by the stream."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
@@ -48,7 +50,7 @@ def test_a_day_is_drawn_and_told_in_words(told: Told, watched: Watched) -> None:
         expect(page.locator("#day-words")).to_contain_text("4 trips, 12.0 km")
         expect(page.locator("#day-words")).to_contain_text("2 changes of load: 500 kg loaded, 180 kg unloaded")
         expect(page.locator("#day-entries li")).to_have_count(6)
-        expect(page.locator("#day-entries")).to_contain_text("kg loaded. 500 kg aboard then.")
+        expect(page.locator("#day-entries")).to_contain_text("kg loaded.")
         expect(page.locator("#day-chart rect")).to_have_count(4)
         expect(page.locator("#day-chart .day-change")).to_have_text(["+500", "−180"])
         told.of(DAY[-1])  # comes by the stream
@@ -65,3 +67,35 @@ def test_before_the_first_trip_it_says_so(told: Told, watched: Watched) -> None:
         expect(watched.page.locator("#day-words")).to_have_text("No trip yet.")
         expect(watched.page.locator("#day-figure")).to_be_hidden()
         watched.page.close()
+
+
+def test_a_busy_day_shows_ten_newest_first_and_no_label_over_another(told: Told, browser: Any) -> None:
+    loads = [500.0 if n % 2 else 0.0 for n in range(12)]
+    told.of(*day(*loads))
+    for width in (390, 1240):
+        watched = Watched(browser, viewport={"width": width, "height": 900})
+        page = watched.page
+        page.route("**/plotly-*", lambda route: route.abort())
+        with serving(told.gateway.app) as server:
+            page.goto(server.url)
+            if width < 640:
+                page.get_by_role("button", name="The day").click()
+            expect(page.locator("#day-entries > li")).to_have_count(10)
+            expect(page.locator("#day-more-title")).to_have_text(re.compile(r"^\d+ earlier entries$"))
+            expect(page.locator("#day-earlier > li").first).to_be_hidden()
+            page.locator("#day-more-title").click()
+            expect(page.locator("#day-earlier > li").first).to_be_visible()
+            times = page.evaluate("[...document.querySelectorAll('.timeline time')].map((one) => one.dateTime)")
+            assert times == sorted(times, reverse=True)
+            boxes = [one.bounding_box() for one in page.locator("#day-chart text").all()]
+            assert len(boxes) > 4
+            assert not any(overlap(one, other) for n, one in enumerate(boxes) for other in boxes[:n])
+            assert all(page.locator("#day-chart").bounding_box()["x"] <= box["x"] for box in boxes)
+            page.close()
+
+
+def overlap(one: dict[str, float], other: dict[str, float]) -> bool:
+    return (
+        one["x"] < other["x"] + other["width"] and other["x"] < one["x"] + one["width"]
+        and one["y"] < other["y"] + other["height"] and other["y"] < one["y"] + one["height"]
+    )  # fmt: skip

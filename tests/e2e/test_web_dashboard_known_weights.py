@@ -42,7 +42,7 @@ def test_empty_now_is_stated_and_taken_back_after_a_question(
     with serving(gateway.app) as server:
         page.goto(server.url)
         expect(page.locator("#weights-in-use")).to_have_text(NONE)
-        expect(page.locator("#weights-offer")).to_contain_text("would be of the load that was weighed as 12 ± ")
+        expect(page.locator("#weights-offer")).to_contain_text("possible for the load weighed as 12 ± ")
         page.locator("#weights-empty").focus()
         page.keyboard.press("Enter")
         expect(page.get_by_role("dialog", name="The vehicle is empty now?")).to_be_visible()
@@ -88,10 +88,12 @@ def test_a_ticket_that_contradicts_is_shown_with_both_numbers_and_confirmed(
         expect(page.locator("#weights-said")).to_have_text("Kept.")
         held = page.locator("#weights-held li")
         expect(held).to_contain_text("delivery note: 400 ± 4 kg known, 276 ± ")
-        expect(held).to_contain_text("nobody has confirmed it yet")
+        expect(held).to_contain_text("waits for a confirmation")
         expect(page.locator("#weights-in-use")).to_have_text(NONE)
         page.get_by_role("button", name="Confirm: delivery note").click()
-        expect(page.get_by_role("dialog", name="Is it truly 400 ± 4")).to_contain_text("The load was weighed as 276 ± ")
+        expect(page.get_by_role("dialog", name="Is it really 400 ± 4")).to_contain_text(
+            "The load was weighed as 276 ± "
+        )
         page.get_by_role("button", name="The known weight is right").click()
         expect(page.locator("#weights-in-use")).to_have_text("1; without them estimates were −124 kg off")
         expect(held).to_have_count(0)

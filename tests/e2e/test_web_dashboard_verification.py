@@ -65,9 +65,9 @@ def test_a_known_load_is_judged_after_a_question(gateway: Gateway, desk: Verific
         dialog.get_by_label("Remark, kept with it").fill("yard")
         page.keyboard.press("Enter")
         expect(page.get_by_role("dialog")).to_be_hidden()
-        expect(page.locator("#verified-last")).to_contain_text("by local: passed; 100 kg aboard was weighed +12")
-        expect(page.locator("#verified-last")).to_contain_text("112 kg aboard was weighed 0")
-        expect(page.locator("#verified-due")).to_contain_text("on 21/10/2026")
+        expect(page.locator("#verified-last")).to_contain_text("by local: passed; 100 kg on board was weighed +12")
+        expect(page.locator("#verified-last")).to_contain_text("112 kg on board was weighed 0")
+        expect(page.locator("#verified-due")).to_contain_text("on 21 Oct")
         page.get_by_text("Records").click()
         with page.expect_download() as download:
             page.get_by_role("button", name="Save the page of").click()

@@ -89,6 +89,14 @@ def test_the_dashboards_queries_run_as_the_role_that_may_only_read(view: FleetVi
     assert told == set(found) - {"Why batches were not weighed"}  # all were
 
 
+def test_the_page_of_the_fleet_shows_every_vehicle_from_postgresql(view: FleetView) -> None:
+    lines = view.subscriber.lines()
+    assert set(lines) == {vehicle.id for vehicle in view.vehicles}
+    with view.database.connect() as connection:
+        latest = connection.execute("SELECT vehicle_id, payload_kg, gross_kg FROM latest").fetchall()
+    assert [(lines[name]["payload_kg"], lines[name]["gross_kg"]) for name, *_ in latest] == [row[1:] for row in latest]
+
+
 def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: FleetView) -> None:
     one, another = view.vehicles[:2]
     folder = view.output / "vehicles" / one.id
@@ -103,11 +111,17 @@ def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: Fleet
     client.subscribe("springscale/#", qos=1)
     client.loop_start()
     forged = client.publish(f"springscale/{another.id}/estimates", b"{}", qos=1).mid
+    announced, falsely = (
+        client.publish(f"homeassistant/device/springscale_{name}/config", b"{}", qos=1).mid
+        for name in (one.id, another.id)
+    )
     broken = [client.publish(f"springscale/{one.id}/{branch}", payload, qos=1).mid for branch, payload in UNREADABLE]
-    assert wait_until(lambda: {forged, *broken} <= set(answers))
+    assert wait_until(lambda: {forged, announced, falsely, *broken} <= set(answers))
     client.disconnect()
     client.loop_stop()
     assert (answers[forged], {answers[mid] for mid in broken}, heard) == ("Not authorized", {"Success"}, [])
+    assert answers[falsely] == "Not authorized"
+    assert answers[announced] in ("Success", "No matching subscribers")  # as it is where no Home Assistant listens
     assert wait_until(lambda: view.count("unreadable") == len(UNREADABLE))
     with view.database.connect() as connection:
         rows = connection.execute("DELETE FROM unreadable RETURNING topic, payload").fetchall()
@@ -171,3 +185,13 @@ def test_who_is_taken_from_the_table_is_refused(view: FleetView) -> None:
     assert told == ["Not authorized"]
     view.vehicles.drive(5)
     assert wait_until(lambda: view.count(f"estimate WHERE vehicle_id <> '{gone.id}'") == view.n_estimates)
+
+
+def test_without_postgresql_a_file_takes_its_place(view: FleetView) -> None:
+    """The last test: what this subscriber acknowledges never reaches PostgreSQL."""
+    view.subscriber.stop()
+    view.subscriber.start(FLEET_DATABASE=str(view.folder / "fleet.sqlite"))
+    view.vehicles.drive(5)
+    ids = {vehicle.id for vehicle in view.vehicles}
+    assert wait_until(lambda: {name for name, line in view.subscriber.lines().items() if line["payload_kg"]} >= ids)
+    assert (view.folder / "fleet.sqlite").exists()

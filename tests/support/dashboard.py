@@ -31,6 +31,7 @@ STATUS = Status(
         SignalHealth(signal="vertical_acceleration", rate_hz=100.2, last_age_s=0.0, rejected_share=0.01),
         SignalHealth(signal="pitch_rate", rate_hz=100.0, last_age_s=75.0, rejected_share=0.0),
         SignalHealth(signal="speed"),
+        SignalHealth(signal="door"),
     ),
     store=StoreStatus(),
     uplink=UplinkStatus(broker="fleet.example:8883", is_connected=True, n_waiting=31, waiting_age_s=9300.0),
@@ -72,7 +73,7 @@ class Watched:
     """A page, what it loaded from where, and what its console said."""
 
     def __init__(self, browser: Any, **options: Any) -> None:
-        self.page = browser.new_page(locale="en-GB", timezone_id="UTC", **options)
+        self.page = browser.new_page(**{"locale": "en-GB", "timezone_id": "UTC", **options})
         self.page.set_default_timeout(1000 * PATIENCE_S)
         self.addresses: list[str] = []
         self.complaints: list[str] = []

@@ -2,13 +2,17 @@
 
 import contextlib
 import csv
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from support.broker import MOSQUITTO
 from support.patience import PATIENCE_S, wait_until
@@ -95,9 +99,13 @@ class Subscriber:
 
     def __init__(self, folder: Path, port: int, database: Postgres) -> None:
         self._log = folder / "subscriber.log"
+        page_port = free_port()
+        self.page = f"http://127.0.0.1:{page_port}"
         self._environment = {
             **os.environ,
             **database.environment,
+            "FLEET_DATABASE": "postgresql://",
+            "FLEET_PORT": str(page_port),
             "MQTT_HOST": "127.0.0.1",
             "MQTT_PORT": str(port),
             "MQTT_CA": str(folder / "ca.pem"),
@@ -105,11 +113,20 @@ class Subscriber:
         }
         self._process: subprocess.Popen[bytes] | None = None
 
-    def start(self) -> None:
+    def start(self, **other: str) -> None:
+        """With ``other`` settings than PostgreSQL's where some are given."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                [sys.executable, FLEET / "subscriber/subscriber.py"], stderr=log, env=self._environment
+                [sys.executable, FLEET / "subscriber/subscriber.py"], stderr=log, env={**self._environment, **other}
             )
+
+    def lines(self) -> dict[str, dict[str, Any]]:
+        """The fleet as its page has it; empty while it does not answer."""
+        try:
+            with urllib.request.urlopen(f"{self.page}/api/v1/fleet") as answer:
+                return {line["vehicle_id"]: line for line in json.load(answer)["items"]}
+        except urllib.error.URLError:
+            return {}
 
     def kill(self) -> None:
         if self._process is not None:

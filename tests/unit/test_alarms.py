@@ -263,8 +263,8 @@ def test_an_alarm_that_never_stood_is_none() -> None:
 def test_words_say_what_is_the_matter_how_sure_and_what_became_of_it() -> None:
     watch = watching()
     (alarm,) = watch.weigh(of_load(0, LIMIT_KG + 60.0), VAN)
-    assert sentence(alarm) == "The vehicle weighs 2560 +- 27 kg, 2500 kg are permitted"
+    assert sentence(alarm) == "The vehicle weighs 2560 +- 27 kg, limit 2500 kg"
     (alarm,) = watch.weigh(of_load(1, LIMIT_KG + 60.0, n_batches=2), VAN)
     assert sentence(alarm).endswith(" (confirmed)")
     (alarm,) = watch.weigh(of_load(2, 100.0), VAN)
-    assert sentence(alarm) == "The vehicle weighs 2560 +- 22 kg, 2500 kg are permitted (over)"
+    assert sentence(alarm) == "The vehicle weighs 2560 +- 22 kg, limit 2500 kg (ended)"

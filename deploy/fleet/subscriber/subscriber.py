@@ -1,31 +1,43 @@
-"""From the fleet's broker into PostgreSQL: every record once, acknowledged to the broker when it is on disk.
+"""From the fleet's broker into a database: every record once, acknowledged to the broker when it is on disk; and the
+page of the fleet, /fleet.
 
-    subscriber.py            # settings from the environment, see Settings; the database by libpq's PGHOST, PGUSER, ...
+    subscriber.py            # settings from the environment, see Settings
+
+The database is a file of SQLite, or PostgreSQL where FLEET_DATABASE begins with postgresql: (postgresql:// alone leaves
+the rest to libpq's PGHOST, PGUSER, ...). Only Grafana's dashboards need PostgreSQL.
 
 The broker keeps what comes while this is away (a session without end), and hands out again what was not acknowledged;
-the primary keys of schema.sql make one row of it. Where the database is away, nothing is acknowledged.
+primary keys make one row of it. Where the database is away, nothing is acknowledged.
 """
 
 import json
 import os
 import queue
 import signal
+import sqlite3
 import ssl
 import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import paho.mqtt.client as mqtt
-import psycopg
 from paho.mqtt.enums import CallbackAPIVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
-from psycopg.types.json import Jsonb
+
+from gateway.fleet import FleetPage, Line, SqliteBook, address, fleet_app, line_of
+
+AWAY: tuple[type[Exception], ...] = (sqlite3.OperationalError,)  # the database, for now
+if os.environ.get("FLEET_DATABASE", "").startswith("postgresql:"):
+    import psycopg
+    from psycopg.types.json import Jsonb
+
+    AWAY = (psycopg.OperationalError,)
 
 NEVER: Final = 0xFFFFFFFF  # MQTT 5, 3.1.2.11.2: a session that does not expire
 UNDER_WAY: Final = 2000  # messages the broker hands out before one of them is acknowledged
@@ -66,6 +78,18 @@ SET (state, reason, vin, version, calibration_id, since) = (
 WHERE (excluded.state, excluded.reason, excluded.version, excluded.calibration_id)
     IS DISTINCT FROM (vehicle.state, vehicle.reason, vehicle.version, vehicle.calibration_id)
 """
+LINES: Final = """
+SELECT vehicle.vehicle_id, jsonb_build_object('state', vehicle.state, 'vin', vehicle.vin), latest.record, coalesce(
+    (
+        SELECT jsonb_agg(entry.record ORDER BY entry.id)
+        FROM entry
+        WHERE entry.vehicle_id = vehicle.vehicle_id AND kind = 'alarm' AND (entry.record->>'is_active')::boolean
+    ), '[]'
+)
+FROM vehicle
+LEFT JOIN latest USING (vehicle_id)
+ORDER BY vehicle.vehicle_id
+"""
 UNREADABLE: Final = "INSERT INTO unreadable (topic, fault, payload) VALUES (%s, %s, %s)"
 STATEMENTS: Final = {"estimates": ESTIMATE, "events": ENTRY, "trips": ENTRY, "alarms": ENTRY, "status": STATUS}
 
@@ -73,7 +97,8 @@ STATEMENTS: Final = {"estimates": ESTIMATE, "events": ENTRY, "trips": ENTRY, "al
 @dataclass(frozen=True)
 class Settings:
     """From the environment: MQTT_HOST, MQTT_PORT, MQTT_CA (absent: the system's authorities), MQTT_USERNAME,
-    MQTT_PASSWORD_FILE, MQTT_TOPIC (the branch of all vehicles, + where each has its name)."""
+    MQTT_PASSWORD_FILE, MQTT_TOPIC (the branch of all vehicles, + where each has its name); FLEET_DATABASE (see above),
+    FLEET_HOST and FLEET_PORT (of the page, which asks nobody for a token: keep a proxy that does before it)."""
 
     host: str
     port: int
@@ -81,6 +106,9 @@ class Settings:
     username: str
     password_file: Path
     topic: str
+    database: str
+    page_host: str
+    page_port: int
 
     @classmethod
     def of(cls, environment: Mapping[str, str]) -> "Settings":
@@ -91,6 +119,9 @@ class Settings:
             environment.get("MQTT_USERNAME", "fleet-subscriber"),
             Path(environment["MQTT_PASSWORD_FILE"]),
             environment.get("MQTT_TOPIC", "springscale/+"),
+            environment.get("FLEET_DATABASE", "fleet.sqlite"),
+            environment.get("FLEET_HOST", "127.0.0.1"),
+            int(environment.get("FLEET_PORT", "8080")),
         )
 
 
@@ -160,18 +191,34 @@ class Link:
         self._arrivals.put(Arrival(self._connection, message.mid, message.topic, bytes(message.payload)))
 
 
-class Book:
+class Book(Protocol):
     """The database. A message that it cannot take is written down as such, so that the rest goes on."""
 
-    def __init__(self, topic: str) -> None:
-        self._levels = topic.split("/")
+    counts: Counter[str]
+
+    def write(self, arrivals: Sequence[Arrival]) -> None: ...
+    def lines(self) -> list[Line]: ...
+
+
+class PostgresBook:
+    """In PostgreSQL, by schema.sql."""
+
+    def __init__(self, database: str, topic: str) -> None:
+        self._where = database
+        self._topic = topic
         self._database: psycopg.Connection | None = None
         self.counts: Counter[str] = Counter()
 
-    def write(self, arrivals: list[Arrival]) -> None:
+    def lines(self) -> list[Line]:
+        """The fleet, a line per vehicle; over a connection of its own, from any thread."""
+        with psycopg.connect(self._where, connect_timeout=10) as database:
+            rows = database.execute(LINES).fetchall()
+        return [line_of(*row, time.time()) for row in rows]
+
+    def write(self, arrivals: Sequence[Arrival]) -> None:
         """All of them, or none. Raises psycopg.OperationalError where the database is away."""
         if self._database is None or self._database.closed:
-            self._database = psycopg.connect(connect_timeout=10)
+            self._database = psycopg.connect(self._where, connect_timeout=10)
         counts: Counter[str] = Counter()
         try:
             with self._database.transaction():
@@ -182,9 +229,9 @@ class Book:
             raise
         self.counts += counts
 
-    def _write(self, database: psycopg.Connection, arrival: Arrival) -> str:
+    def _write(self, database: "psycopg.Connection", arrival: Arrival) -> str:
         try:
-            vehicle, branch = self._address(arrival.topic)
+            vehicle, branch = address(self._topic, arrival.topic)
             record = json.loads(arrival.payload)
             fields = {"vehicle": vehicle, "record": Jsonb(record), "kind": branch.removesuffix("s")}
             with database.transaction():  # a savepoint: what fails takes nothing with it
@@ -195,11 +242,6 @@ class Book:
             tell("unreadable", topic=arrival.topic, fault=told)
             return "unreadable"
         return branch if written else "known already"
-
-    def _address(self, topic: str) -> tuple[str, str]:
-        """Whose it is and what; the name is the broker's, which lets a vehicle write below its own alone."""
-        levels = topic.split("/")
-        return levels[self._levels.index("+")], levels[len(self._levels)]
 
 
 def tell(event: str, **fields: Any) -> None:
@@ -215,6 +257,13 @@ def pauses() -> Iterator[float]:
         pause_s = min(2.0 * pause_s, 30.0)
 
 
+def book_of(settings: Settings) -> Book:
+    """The database that FLEET_DATABASE names."""
+    if settings.database.startswith("postgresql:"):
+        return PostgresBook(settings.database, settings.topic)
+    return SqliteBook(Path(settings.database), settings.topic)
+
+
 def serve(link: Link, book: Book, stopping: threading.Event) -> None:
     """Write what comes, then acknowledge it, until told to stop."""
     waiting: list[Arrival] = []
@@ -224,7 +273,7 @@ def serve(link: Link, book: Book, stopping: threading.Event) -> None:
         try:
             if waiting:
                 book.write(waiting)
-        except psycopg.OperationalError as fault:
+        except AWAY as fault:
             tell("database away", fault=str(fault).strip(), waiting=len(waiting))
             stopping.wait(next(pause))
             continue
@@ -241,12 +290,15 @@ def main() -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.set())
     settings = Settings.of(os.environ)
-    link, book = Link(settings), Book(settings.topic)
+    link, book = Link(settings), book_of(settings)
+    page = FleetPage(fleet_app(book.lines), settings.page_host, settings.page_port)
+    page.start()
     link.start()
     try:
         serve(link, book, stopping)
     finally:
         link.stop()
+        page.stop()
         tell("written", **book.counts)
 
 

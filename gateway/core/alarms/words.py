@@ -8,7 +8,7 @@ from gateway.estimate import Z95
 
 _PLACES: Final = {"gross": "The vehicle", "front_axle": "The front axle", "rear_axle": "The rear axle"}
 _BALANCES: Final = {"left_right": "one side", "front_rear": "one axle"}
-_ENDS: Final = {AlarmState.EARLY: "", AlarmState.FINAL: " (confirmed)", AlarmState.CLEARED: " (over)"}
+_ENDS: Final = {AlarmState.EARLY: "", AlarmState.FINAL: " (confirmed)", AlarmState.CLEARED: " (ended)"}
 
 
 def sentence(alarm: Alarm) -> str:
@@ -20,9 +20,9 @@ def _said(alarm: Alarm, figure: Figure) -> str:
     cause, where = alarm.cause, alarm.cause.where or ""
     if cause.kind is AlarmKind.OVERLOAD:
         subject = _PLACES.get(where, f"The wheel at the {where.replace('_', ' ')}")
-        return f"{subject} weighs {_give_or_take(figure, 'kg')}, {figure.limit:.0f} kg are permitted"
+        return f"{subject} weighs {_give_or_take(figure, 'kg')}, limit {figure.limit:.0f} kg"
     if cause.kind is AlarmKind.IMBALANCE:
-        return f"{_BALANCES[where].capitalize()} bears {_give_or_take(figure, '%')}, {figure.limit:.0f} % are the most"
+        return f"{_BALANCES[where].capitalize()} bears {_give_or_take(figure, '%')}, limit {figure.limit:.0f} %"
     if cause.kind is AlarmKind.NO_ESTIMATE:
         return f"{figure.found:.0f} minutes were driven without an estimate: {_detail(figure) or 'no reason is known'}"
     if cause.kind is AlarmKind.DRIFT:

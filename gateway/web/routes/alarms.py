@@ -59,7 +59,7 @@ class Alarm(BaseModel):
     is_active: bool
     t_start: str = Field(json_schema_extra={"format": "date-time"})
     t_end: str | None = Field(description="null: it stands")
-    sentence: str = Field(examples=["The vehicle weighs 2561 +- 28 kg, 2500 kg are permitted (confirmed)"])
+    sentence: str = Field(examples=["The vehicle weighs 2561 +- 28 kg, limit 2500 kg (confirmed)"])
     steps: list[AlarmStep] = Field(description="what became of it, oldest first")
     acknowledged: AlarmSeen | None
 

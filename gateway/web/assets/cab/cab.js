@@ -1,15 +1,16 @@
 // The cab page: asks one small question every few seconds and shows the answer, its age, and what it does not know.
 
 import { stayAwake } from "/assets/cab/wake-lock.js";
-import { aboard, about, alarmText, eventText, lightText, notSeen, ownReading, question, roomText, stood } from "/assets/cab/sentences.js";
+import { aboard, about, alarm, alarmText, eventText, lightText, notSeen, ownReading, phrase, question, roomText, stood } from "/assets/cab/sentences.js";
 import { Refused, ask, setToken } from "/assets/dashboard/gateway.js";
 import { element, made, pair, say, write } from "/assets/dashboard/page.js";
-import { duration, number } from "/assets/dashboard/words.js";
+import { number } from "/assets/dashboard/words.js";
+import { fill } from "/assets/language.js";
 
 const ASK_EVERY_MS = 5000;
 const ANSWER_WITHIN_MS = 4000;
 const GONE_AFTER_S = 15;
-const LONG = 5; // characters: more want a smaller type
+const UNIT = 1.5; // characters that the small unit is as wide as
 
 const opened = now();
 let cab = null;
@@ -38,16 +39,6 @@ async function askNow() {
   draw();
 }
 
-/** What must be said before anything else, and what of it grows from second to second: a screen reader need not. */
-function alarm(silentS) {
-  if (isRefused) return ["The gateway wants a token.", ""];
-  if (silentS > GONE_AFTER_S) return [`The gateway does not answer.${cab ? " What is shown is the last it said." : ""}`, `For ${duration(silentS)} now.`];
-  if (cab === null) return ["", ""];
-  if (cab.is_stale) return ["These numbers are old.", cab.age_s === null ? "Weighed before the gateway was started." : `Weighed ${duration(cab.age_s + silentS)} ago.`];
-  if (cab.state === "sensor_fault" || cab.state === "reader_fault") return ["A sensor or the bus is not heard: nothing new is weighed.", ""];
-  return ["", ""];
-}
-
 /** Two texts in a place, or none of it where both are empty. */
 function sayBoth(id, [first, one], [second, other]) {
   write(first, one);
@@ -63,13 +54,13 @@ function validity(silentS) {
 
 function writeNumber(kg) {
   const text = kg === null ? "?" : number(kg, 0);
-  element("number").replaceChildren(text, kg === null ? "" : made("small", "\u00a0kg"));
-  element("number").classList.toggle("long", text.length > LONG);
+  element("number").replaceChildren(text, kg === null ? "" : made("small", `\u00a0${phrase("kg")}`));
+  element("number").style.setProperty("--n-chars", text.length + UNIT);
 }
 
 function draw() {
   const silentS = secondsSince(heard ?? opened);
-  const [alarmed, howLong] = alarm(silentS);
+  const [alarmed, howLong] = alarm(cab, { isRefused, isGone: silentS > GONE_AFTER_S, silentS });
   sayBoth("bar", ["bar-what", alarmed], ["bar-how-long", howLong]);
   element("token").hidden = !isRefused;
   element("main").hidden = isRefused;
@@ -84,7 +75,9 @@ function draw() {
   write("about", about(cab));
   write("question", asked);
   writeNumber(kg);
-  write("likely", likely);
+  const isAnswered = cab.room.length > 0;
+  say("why", isAnswered ? "" : likely); // why there is no answer is no detail
+  write("likely", isAnswered ? likely : "");
   element("rooms").replaceChildren(...cab.room.map((room) => pair(...roomText(room))));
   say("alarms", alarmText(cab));
   write("aboard", aboard(cab, cab.age_s === null ? null : cab.age_s + silentS));
@@ -99,13 +92,19 @@ element("token").addEventListener("submit", (event) => {
   askNow();
 });
 
+element("panel").addEventListener("click", () => {
+  element("details").open = !element("details").open; // the whole panel is easier to hit than one word
+});
+
 document.addEventListener("visibilitychange", () => {
   if (document.visibilityState !== "visible") return;
   draw(); // how old it is shows before the answer comes
   askNow();
 });
 
+fill(phrase);
+document.title = phrase("title");
 askNow();
 setInterval(askNow, ASK_EVERY_MS);
 setInterval(draw, 1000);
-stayAwake((text) => write("awake", text));
+stayAwake((how) => write("awake", phrase(how)));

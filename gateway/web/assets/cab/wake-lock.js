@@ -1,10 +1,10 @@
 // Keeps the screen on where the browser lets a page do so, and says where it does not.
 
-const TIME_OUT = "set the phone's own screen time-out to never";
-const HELD = "The screen stays on.";
-const INSECURE = `The phone may switch its screen off: browsers keep it on over HTTPS only. Till then ${TIME_OUT}.`;
-const UNKNOWN = `The phone may switch its screen off: this browser cannot keep it on, so ${TIME_OUT}.`;
-const REFUSED = "The phone may switch its screen off: it refused to keep it on, to save its battery perhaps. Touch the page to ask again.";
+// Names of rows in /assets/words/cab.js
+const HELD = "awake";
+const INSECURE = "awake_insecure";
+const UNKNOWN = "awake_unknown";
+const REFUSED = "awake_refused";
 
 /** Asks at once, whenever the page is looked at again, and at a touch; `tell` hears how it went. */
 export function stayAwake(tell) {

@@ -1,12 +1,12 @@
-// Alarms: what stands and what ended unseen, each with a button for who has seen it; the rest folded below.
+// Alarms: those that stand come first on the page, each with a button to acknowledge it; those that ended stand below.
 
 import { ALARMS, change, hasToken } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { clock } from "/assets/dashboard/words.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { capital, clock, number, reasons, span, withStd, words } from "/assets/dashboard/words.js";
 
-const STATES = { early: "Early warning", final: "Confirmed", cleared: "Over" };
-const ORDER = ["final", "early", "cleared"];
+const ORDER = ["final", "early"];
 
 /** Alarms of an answer, newest first, each once. */
 export const alarmsOf = ({ active, items }) => [...new Map([...items, ...active].map((alarm) => [alarm.id, alarm])).values()];
@@ -16,46 +16,56 @@ const about = (alarm) => `${alarm.kind} ${alarm.where ?? ""}`;
 /** Only the last of its kind and place can be acknowledged; its beginning tells which. */
 const isLast = (alarm, alarms) => alarms.every((other) => about(other) !== about(alarm) || other.t_start <= alarm.t_start);
 
-const isOpen = (alarm, alarms) => alarm.is_active || (alarm.acknowledged === null && isLast(alarm, alarms));
+const isUnseen = (alarm, alarms) => alarm.acknowledged === null && isLast(alarm, alarms);
 
 const seen = ({ acknowledged }) =>
-  acknowledged ? `; seen by ${acknowledged.by} ${clock(acknowledged.at)}${acknowledged.note ? ` (${acknowledged.note})` : ""}` : "";
+  acknowledged ? `${phrase("alarm_seen", { by: acknowledged.by, time: clock(acknowledged.at) })}${acknowledged.note ? ` (${acknowledged.note})` : ""}` : "";
 
-const when = (alarm) => (alarm.t_end ? `${clock(alarm.t_start)} to ${clock(alarm.t_end)}` : `Since ${clock(alarm.t_start)}`);
+const when = (alarm) => (alarm.t_end ? span(alarm.t_start, alarm.t_end) : phrase("alarm_since", { time: clock(alarm.t_start) }));
 
-/** The state stands before it, so the sentence need not say it again. */
-const plain = (alarm) => alarm.sentence.replace(/ \((confirmed|over)\)$/, "").replace("+-", "±");
+/** What is the matter, from the last step before it ended. */
+function plain({ kind, where, steps }) {
+  const { found, std, limit, unit, detail } = steps.filter((step) => step.state !== "cleared").at(-1);
+  const measured = () => ({ found: withStd(found, std, 0, unit), limit: withStd(limit, null, 0, unit) });
+  const why = detail && reasons(detail.split(", "));
+  if (kind === "overload") return phrase("over_limit", { place: capital(phrase(`place.${where}`)), ...measured() });
+  if (kind === "imbalance") return phrase(`uneven_${where}`, measured());
+  if (kind === "no_estimate") return phrase("no_estimate", { minutes: number(found, 0), why: why || phrase("no_reason") });
+  if (kind === "drift") return phrase("drifts", { what: capital(phrase.named("trend", where)), detail });
+  return `${phrase(where === "silent" ? "fault_silent" : "fault_refused")}${why ? `: ${why}` : ""}`;
+}
 
-function item(alarm) {
-  const parts = [made("strong", STATES[alarm.state]), made("span", `: ${plain(alarm)}. `), made("span", `${when(alarm)}${seen(alarm)} `)];
-  if (alarm.acknowledged === null) parts.push(button(alarm));
-  const built = made("li", parts, alarm.state === "final" ? "alarm" : alarm.state === "early" ? "warning" : "");
+const sentence = (alarm) => `${phrase(`alarm_${alarm.state}`)}: ${plain(alarm)}.`;
+
+function item(alarm, canBeSeen) {
+  const parts = [made("strong", phrase(`alarm_${alarm.state}`)), made("span", `: ${plain(alarm)}. `), made("span", `${when(alarm)}${seen(alarm)} `)];
+  if (canBeSeen) parts.push(button(alarm));
+  const built = made("li", parts, alarm.is_active ? (alarm.state === "final" ? "alarm" : "warning") : "");
   built.dataset.id = alarm.id;
   return built;
 }
 
 function button(alarm) {
-  const built = made("button", "I have seen it …");
+  const built = made("button", `${phrase("acknowledge")} …`);
   built.type = "button";
-  built.setAttribute("aria-label", `I have seen it: ${plain(alarm)}`);
+  built.setAttribute("aria-label", `${phrase("acknowledge")}: ${plain(alarm)}`);
   built.addEventListener("click", () => open(alarm));
   return built;
 }
 
-const past = (alarm) => made("li", `${when(alarm)}: ${plain(alarm)}${seen(alarm)}`);
-
 show(({ alarms }) => {
   if (alarms === null) return;
-  const open_ = alarms.filter((alarm) => isOpen(alarm, alarms));
-  open_.sort((a, b) => ORDER.indexOf(a.state) - ORDER.indexOf(b.state));
-  const rest = alarms.filter((alarm) => !open_.includes(alarm));
-  const focused = document.activeElement?.closest("#alarms-open li")?.dataset.id;
-  element("alarms").hidden = alarms.length === 0;
-  write("alarms-none", open_.length ? "" : "None stands.");
-  element("alarms-open").replaceChildren(...open_.map(item));
-  element("alarms-past").hidden = rest.length === 0;
-  element("alarms-entries").replaceChildren(...rest.map(past));
-  if (focused) document.querySelector(`#alarms-open li[data-id="${focused}"] button`)?.focus(); // news must not lose the place
+  const items = (some) => some.map((alarm) => item(alarm, isUnseen(alarm, alarms)));
+  const standing = alarms.filter((alarm) => alarm.is_active).sort((a, b) => ORDER.indexOf(a.state) - ORDER.indexOf(b.state));
+  const ended = alarms.filter((alarm) => !alarm.is_active);
+  const nUnseen = ended.filter((alarm) => isUnseen(alarm, alarms)).length;
+  const focused = document.activeElement?.closest("li[data-id]")?.dataset.id;
+  element("alarms").hidden = standing.length === 0;
+  element("alarms-open").replaceChildren(...items(standing));
+  element("alarms-past").hidden = ended.length === 0;
+  write("alarms-unseen", nUnseen ? phrase("alarms_unseen", { n: nUnseen }) : "");
+  element("alarms-entries").replaceChildren(...items(ended));
+  if (focused) document.querySelector(`li[data-id="${focused}"] button`)?.focus(); // news must not lose the place
 }, "alarms");
 
 let chosen = null;
@@ -63,7 +73,7 @@ let chosen = null;
 function open(alarm) {
   chosen = alarm;
   element("alarm-form").reset();
-  write("alarm-sentence", `${STATES[alarm.state]}: ${plain(alarm)}.`);
+  write("alarm-sentence", sentence(alarm));
   element("alarm-token").hidden = !hasToken();
   say("alarm-refusal", "");
   element("alarm-dialog").showModal();
@@ -78,8 +88,8 @@ async function confirm(event) {
     const told = await change("POST", path, element("alarm-token-text").value.trim(), note ? { note } : {}, ALARMS);
     element("alarm-dialog").close();
     learn({ alarms: alarmsOf(told) });
-    write("alarms-said", "Noted: you have seen it.");
-    element("alarms-title").focus();
+    write("alarms-said", phrase("alarm_noted"));
+    element(chosen.is_active ? "alarms-title" : "alarms-past-title").focus();
   } catch (error) {
     say("alarm-refusal", error.message);
   } finally {

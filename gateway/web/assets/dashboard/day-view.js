@@ -1,40 +1,37 @@
-// The last day: what was loaded and unloaded where, and the trips between; as a timeline, and in words.
+// The last day: what was loaded and unloaded where, and the trips between; as bars over time, and as a list in words.
 
-import { show } from "/assets/dashboard/known.js";
+import { known, show } from "/assets/dashboard/known.js";
 import { element, made, write } from "/assets/dashboard/page.js";
-import { figure, number, withStd } from "/assets/dashboard/words.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { clock, figure, number, span, withStd } from "/assets/dashboard/words.js";
 
 const DAY_MS = 24 * 3600 * 1000;
-const WIDTH = 1000;
-const HEIGHT = 170;
-const FLOOR = 140; // of the bars
-const CEILING = 24;
+const N_SHOWN = 10;
+const HEIGHT = 130;
+const FLOOR = 108; // of the bars
+const CEILING = 20;
 const LEAST_WIDTH = 3;
+const LETTER_PX = 9; // of a label: as wide as its widest digit
 const SURE = 0.99;
 const SVG = "http://www.w3.org/2000/svg";
 
 const at = (iso) => new Date(iso).getTime();
 
-const hour = (iso) => new Date(iso).toLocaleTimeString(undefined, { hour: "2-digit", minute: "2-digit" });
-
-const span = (entry) => `${hour(entry.t_start)} to ${hour(entry.t_end)}`;
-
-const place = (where) => (where ? ` at ${where.latitude_deg}, ${where.longitude_deg}` : "");
-
 function eventText(event) {
-  const done = event.change_kg >= 0 ? "loaded" : "unloaded";
-  const sure = event.probability >= SURE ? "" : `, ${number(100 * event.probability, 0)} % sure that anything was`;
-  const stops = event.stops.length > 1 ? `, at one of ${event.stops.length} stops or at several` : "";
-  const change = withStd(Math.abs(event.change_kg), event.change_std_kg, 0, "kg");
-  return `${span(event)}: ${change} ${done}${place(event.place)}${stops}${sure}. ${figure(event.after.payload_kg, 0, "kg")} aboard then.`;
+  const place = event.place ? phrase("day_place", { latitude: event.place.latitude_deg, longitude: event.place.longitude_deg }) : "";
+  const stops = event.stops.length > 1 ? phrase("day_stops", { n: event.stops.length }) : "";
+  const sure = event.probability >= SURE ? "" : phrase("day_sure", { percent: number(100 * event.probability, 0) });
+  const kg = withStd(Math.abs(event.change_kg), event.change_std_kg, 0, "kg");
+  return phrase(event.change_kg >= 0 ? "day_loaded" : "day_unloaded", { kg, place, stops, sure });
 }
 
 function tripText(trip) {
-  const load = trip.payload_kg == null ? "with an unknown load" : `with ${withStd(trip.payload_kg, trip.payload_std_kg, 0, "kg")}`;
-  const over = trip.overloaded_share ? `, ${number(100 * trip.overloaded_share, 0)} % of the way overloaded` : "";
-  const going = trip.is_over ? "" : ", still going";
-  return `${span(trip)}: drove ${figure(trip.distance_m / 1000, 1, "km")} ${load}${over}${going}.`;
+  const over = trip.overloaded_share ? phrase("trip_over", { percent: number(100 * trip.overloaded_share, 0) }) : "";
+  const said = { km: figure(trip.distance_m / 1000, 1, "km"), kg: withStd(trip.payload_kg, trip.payload_std_kg, 0, "kg"), over, going: trip.is_over ? "" : phrase("trip_going") };
+  return phrase(trip.payload_kg == null ? "trip_unknown" : "trip_known", said);
 }
+
+const isTrip = (entry) => "distance_m" in entry;
 
 /** Those of the last day before the newest, oldest first; what was withdrawn is gone. */
 function lastDay(events, trips) {
@@ -43,19 +40,17 @@ function lastDay(events, trips) {
   return told.filter((entry) => newest - at(entry.t_end) < DAY_MS).sort((a, b) => at(a.t_end) - at(b.t_end));
 }
 
-const isTrip = (entry) => "distance_m" in entry;
-
 function summary(entries) {
-  const trips = entries.filter(isTrip);
-  const sum = (name) => trips.reduce((total, trip) => total + (trip[name] ?? 0), 0);
-  const count = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
-  const events = entries.filter((entry) => !isTrip(entry));
-  const loaded = events.filter((event) => event.change_kg > 0).reduce((total, event) => total + event.change_kg, 0);
-  const unloaded = events.filter((event) => event.change_kg < 0).reduce((total, event) => total - event.change_kg, 0);
-  return (
-    `${count(trips.length, "trip")}, ${figure(sum("distance_m") / 1000, 1, "km")}, ${number(sum("carried_tkm"), 1)} tonne-kilometres; ` +
-    `${count(events.length, "change")} of load: ${figure(loaded, 0, "kg")} loaded, ${figure(unloaded, 0, "kg")} unloaded.`
-  );
+  const trips = entries.filter(isTrip), events = entries.filter((entry) => !isTrip(entry));
+  const sum = (some, name) => some.reduce((total, one) => total + (one[name] ?? 0), 0);
+  return phrase("day_sum", {
+    trips: phrase("n_trips", { n: trips.length }),
+    km: figure(sum(trips, "distance_m") / 1000, 1, "km"),
+    tkm: number(sum(trips, "carried_tkm"), 1),
+    changes: phrase("n_changes", { n: events.length }),
+    loaded: figure(sum(events.filter((event) => event.change_kg > 0), "change_kg"), 0, "kg"),
+    unloaded: figure(-sum(events.filter((event) => event.change_kg < 0), "change_kg"), 0, "kg"),
+  });
 }
 
 function drawn(name, attributes, text = "") {
@@ -72,35 +67,69 @@ function tripBar(trip, x, y) {
   return drawn("rect", { class: `day-${kind}`, x: left, y: top, width: Math.max(right - left, LEAST_WIDTH), height: FLOOR - top });
 }
 
-function eventMark(event, x, y) {
-  const middle = Math.min(Math.max((x(event.t_start) + x(event.t_end)) / 2, 30), WIDTH - 30);
-  const top = y(Math.max(event.before.payload_kg, event.after.payload_kg)) - 6;
-  const sign = event.change_kg >= 0 ? "+" : "−";
-  return drawn("text", { class: "day-change", x: middle, y: Math.max(top, 14) }, `${sign}${number(Math.abs(event.change_kg), 0)}`);
+/** Puts labels where they overlap none put before them, and leaves out what has no room; the list below says all. */
+function labels(wanted, width) {
+  const taken = [];
+  return wanted.filter((label) => {
+    const half = (label.text.length * LETTER_PX) / 2;
+    label.x = Math.min(Math.max(label.x, half), width - half);
+    const isFree = taken.every((other) => Math.abs(other.x - label.x) > other.half + half || Math.abs(other.y - label.y) > 14);
+    if (isFree) taken.push({ ...label, half });
+    return isFree;
+  }).map(({ text, x, y, kind }) => drawn("text", { class: kind, x, y }, text));
 }
 
-function timeline(entries) {
+function changeLabel(event, x, y) {
+  const top = y(Math.max(event.before.payload_kg, event.after.payload_kg)) - 6;
+  const text = `${event.change_kg >= 0 ? "+" : "−"}${number(Math.abs(event.change_kg), 0)}`;
+  return { text, kind: "day-change", x: (x(event.t_start) + x(event.t_end)) / 2, y: Math.max(top, 12), size: Math.abs(event.change_kg) };
+}
+
+/** Bars of load over time, to scale with the pixels there are. */
+function timeline(entries, width) {
   const [first, last] = [Math.min(...entries.map((entry) => at(entry.t_start))), Math.max(...entries.map((entry) => at(entry.t_end)))];
   const loads = entries.flatMap((entry) => (isTrip(entry) ? [entry.payload_kg ?? 0] : [entry.before.payload_kg, entry.after.payload_kg]));
   const most = Math.max(...loads, 1);
-  const x = (iso) => (WIDTH * (at(iso) - first)) / Math.max(last - first, 1);
+  const x = (iso) => (width * (at(iso) - first)) / Math.max(last - first, 1);
   const y = (kg) => FLOOR - ((FLOOR - CEILING) * Math.max(kg, 0)) / most;
-  const picture = drawn("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, "aria-hidden": "true" });
-  picture.append(drawn("line", { class: "day-floor", x1: 0, x2: WIDTH, y1: FLOOR, y2: FLOOR }));
-  for (const entry of entries) picture.append(isTrip(entry) ? tripBar(entry, x, y) : eventMark(entry, x, y));
-  picture.append(drawn("text", { class: "day-hour", x: 0, y: HEIGHT - 8 }, hour(new Date(first))));
-  picture.append(drawn("text", { class: "day-hour day-end", x: WIDTH, y: HEIGHT - 8 }, hour(new Date(last))));
+  const picture = drawn("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, width, height: HEIGHT, "aria-hidden": "true" });
+  picture.append(drawn("line", { class: "day-floor", x1: 0, x2: width, y1: FLOOR, y2: FLOOR }));
+  picture.append(...entries.filter(isTrip).map((trip) => tripBar(trip, x, y)));
+  const changes = entries.filter((entry) => !isTrip(entry)).map((event) => changeLabel(event, x, y)).sort((a, b) => b.size - a.size);
+  const ends = [[first, 0], [last, width]].map(([ms, where]) => ({ text: clock(ms), kind: "day-hour", x: where, y: HEIGHT - 6 }));
+  picture.append(...labels([...ends, ...changes], width));
   return picture;
+}
+
+function item(entry) {
+  const kind = isTrip(entry) ? "trip" : entry.change_kg >= 0 ? "loaded" : "unloaded";
+  const time = made("time", span(entry.t_start, entry.t_end));
+  time.dateTime = entry.t_start;
+  return made("li", [time, made("span", `${isTrip(entry) ? tripText(entry) : eventText(entry)}.`)], kind);
+}
+
+function entries() {
+  const { events, trips } = known;
+  return events === null || trips === null || !(events.length + trips.length) ? [] : lastDay(events, trips);
+}
+
+function drawChart() {
+  const told = entries(), width = element("day-chart").clientWidth;
+  if (told.length && width) element("day-chart").replaceChildren(timeline(told, width));
 }
 
 show(({ events, trips }) => {
   if (events === null || trips === null) return;
-  const entries = events.length + trips.length ? lastDay(events, trips) : [];
-  element("day-figure").hidden = entries.length === 0;
-  write("day-words", entries.length ? summary(entries) : "No trip yet.");
-  if (!entries.length) return;
-  element("day-chart").replaceChildren(timeline(entries));
-  element("day-entries").replaceChildren(
-    ...entries.map((entry) => made("li", isTrip(entry) ? tripText(entry) : eventText(entry), isTrip(entry) ? "soft" : "")),
-  );
+  const told = entries();
+  element("day-figure").hidden = told.length === 0;
+  write("day-words", told.length ? summary(told) : phrase("no_trip"));
+  if (!told.length) return;
+  drawChart();
+  const items = told.reverse().map(item); // newest first
+  element("day-entries").replaceChildren(...items.slice(0, N_SHOWN));
+  element("day-more").hidden = items.length <= N_SHOWN;
+  element("day-earlier").replaceChildren(...items.slice(N_SHOWN));
+  write("day-more-title", phrase("list_more", { n: items.length - N_SHOWN }));
 }, "events", "trips");
+
+new ResizeObserver(drawChart).observe(element("day-chart"));

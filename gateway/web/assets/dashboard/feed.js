@@ -4,6 +4,7 @@ import { follow } from "/assets/dashboard/event-stream.js";
 import { alarmsOf } from "/assets/dashboard/alarm-view.js";
 import { ALARMS, COMMISSIONING, KNOWN_WEIGHTS, Refused, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
 import { known, learn } from "/assets/dashboard/known.js";
+import { explained } from "/assets/dashboard/phrases.js";
 
 const ASK_EVERY_MS = 5000;
 const GATHER_MS = 50;
@@ -58,12 +59,7 @@ async function askVerifications() {
 
 async function askOnce() {
   const [vehicle, reasons] = await Promise.all([load("/api/v1/vehicle"), load("/api/v1/reasons")]);
-  learn({
-    vehicle,
-    reasons: new Map(reasons.items.map((told) => [told.reason, told])),
-    sources: new Map(reasons.sources.map((told) => [told.source, told.words])),
-    remedies: new Map(reasons.remedies.map((told) => [told.remedy, told.advice])),
-  });
+  learn({ vehicle, ...explained(reasons) });
 }
 
 async function askTruth() {

@@ -3,7 +3,8 @@
 import { known, show } from "/assets/dashboard/known.js";
 import { element, made, row, write } from "/assets/dashboard/page.js";
 import { colour, plot } from "/assets/dashboard/plot.js";
-import { between, clock, figure, kmh, withStd, words } from "/assets/dashboard/words.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { between, clock, figure, kmh, reasons, withStd } from "/assets/dashboard/words.js";
 
 const HOUR_MS = 3600e3;
 const QUANTITIES = {
@@ -38,7 +39,7 @@ function band(batches, quantity, name, opacity) {
 function values(batches, quantity) {
   const x = [], y = [], text = [];
   for (const batch of batches) {
-    const said = `${figure(batch[quantity.value], quantity.digits, quantity.unit)}<br>95 %: ${between(batch[quantity.interval], quantity.digits, quantity.unit)}<br>until ${clock(batch.t_end)}`;
+    const said = `${figure(batch[quantity.value], quantity.digits, quantity.unit)}<br>${phrase("interval", { between: between(batch[quantity.interval], quantity.digits, quantity.unit) })}<br>${phrase("until", { time: clock(batch.t_end) })}`;
     x.push(local(batch.t_start), local(batch.t_end), null);
     y.push(batch[quantity.value], batch[quantity.value], null);
     text.push(said, said, "");
@@ -52,7 +53,7 @@ function refusals(batches) {
     x: batches.map((batch) => local(batch.t_end)),
     y: batches.map(() => 0.03),
     yaxis: "y2",
-    text: batches.map((batch) => `not weighed: ${batch.rejected.map(words).join(", ")}<br>until ${clock(batch.t_end)}`),
+    text: batches.map((batch) => `${phrase("not_weighed_for", { reasons: reasons(batch.rejected) })}<br>${phrase("until", { time: clock(batch.t_end) })}`),
     type: "scatter",
     mode: "markers",
     marker: { symbol: "x", size: 8, color: colour("refused") },
@@ -64,7 +65,7 @@ function truthLine(truth, quantity, until) {
   const shown = truth.filter((load) => load.t_start < until && load[quantity.value] != null);
   const x = shown.map((load) => local(load.t_start)), y = shown.map((load) => load[quantity.value]);
   if (shown.length) { x.push(local(until)); y.push(y.at(-1)); }
-  return { x, y, type: "scatter", mode: "lines", line: { shape: "hv", color: colour("truth"), width: 5 }, opacity: 0.75, hovertemplate: `truly %{y:.${quantity.digits}f} ${quantity.unit}<extra></extra>` };
+  return { x, y, type: "scatter", mode: "lines", line: { shape: "hv", color: colour("truth"), width: 5 }, opacity: 0.75, text: y.map((kg) => phrase("actually", { x: figure(kg, quantity.digits, quantity.unit) })), hovertemplate: "%{text}<extra></extra>" };
 }
 
 function traces(batches, quantity) {
@@ -82,9 +83,12 @@ function traces(batches, quantity) {
 
 function inWords(batches, quantity) {
   const weighed = batches.filter((batch) => batch[quantity.interval] != null);
-  if (!weighed.length) return "No batch weighed in this time.";
+  if (!weighed.length) return phrase("none_weighed");
   const last = weighed.at(-1);
-  return `${weighed.length} of ${batches.length} batches weighed; the last ${figure(last[quantity.value], quantity.digits, quantity.unit)}, 95 % interval ${between(last[quantity.interval], quantity.digits, quantity.unit)}, until ${clock(last.t_end)}. The table below holds all.`;
+  return phrase("chart_words", {
+    weighed: weighed.length, all: batches.length, value: figure(last[quantity.value], quantity.digits, quantity.unit),
+    interval: between(last[quantity.interval], quantity.digits, quantity.unit), time: clock(last.t_end),
+  });
 }
 
 function range(batches) {
@@ -98,7 +102,7 @@ const floor = { overlaying: "y", range: [0, 1], visible: false, fixedrange: true
 function drawCharts() {
   const batches = shownBatches(known);
   element("history").classList.toggle("empty", !batches.length);
-  if (known.batches !== null) write("history-none", "No batch yet.");
+  if (known.batches !== null) write("history-none", phrase("no_batch"));
   if (!batches.length) return;
   for (const [name, quantity] of Object.entries(QUANTITIES)) {
     const isTold = !quantity.isRare || batches.some((batch) => batch[quantity.interval] != null);
@@ -127,7 +131,7 @@ function drawTable({ batches }) {
       isRejected ? "–" : between(batch.front_share_interval95_pct, 1, "%"),
       ...(isSideTold ? [isRejected ? "–" : withStd(batch.cg_left_m, batch.cg_left_std_m, 3, "m")] : []),
       kmh(batch.mean_speed_mps),
-      isRejected ? `not weighed: ${batch.rejected.map(words).join(", ")}` : "weighed",
+      isRejected ? phrase("not_weighed_for", { reasons: reasons(batch.rejected) }) : phrase("weighed"),
     ], isRejected ? "rejected" : "");
   });
   element("recent").replaceChildren(...rows);
@@ -135,10 +139,10 @@ function drawTable({ batches }) {
 
 function drawLegend({ truth }) {
   element("history-legend").replaceChildren(
-    made("li", "estimate", "estimate"),
-    made("li", "its 95 % interval", "estimate band-key"),
-    ...(truth.length ? [made("li", "truly aboard", "truth")] : []),
-    made("li", "not weighed", "refused"),
+    made("li", phrase("estimate"), "estimate"),
+    made("li", phrase("its_interval"), "estimate band-key"),
+    ...(truth.length ? [made("li", phrase("truth"), "truth")] : []),
+    made("li", phrase("not_weighed"), "refused"),
   );
 }
 

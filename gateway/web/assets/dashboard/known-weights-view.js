@@ -3,45 +3,46 @@
 import { KNOWN_WEIGHTS, change, hasToken } from "/assets/dashboard/gateway.js";
 import { known, learn, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { capital, clock, signed, withStd, words } from "/assets/dashboard/words.js";
-
-const COUNTS = "It counts from the next batch on.";
-const STATES = { in_use: "in use", held: "held: nobody has confirmed it yet", other_calibration: "of another calibration" };
+import { phrase } from "/assets/dashboard/phrases.js";
+import { clock, signed, span as spanOf, withStd } from "/assets/dashboard/words.js";
 
 const payload = (one) => withStd(one.payload_kg, one.payload_std_kg, 0, "kg");
 
 const estimated = (one) => withStd(one.estimated_payload_kg, one.estimated_payload_std_kg, 0, "kg");
 
-const span = (load) => `from ${clock(load.t_start)} to ${clock(load.t_end)}`;
+const span = (load) => spanOf(load.t_start, load.t_end);
 
 function inUse({ n_teaching, mean_error_kg, error_std_kg }) {
-  if (n_teaching === 0) return "none: weighed by the calibration alone";
-  const scatter = error_std_kg === null ? "" : `, scatter ${withStd(error_std_kg, null, 0, "kg")}`;
-  return `${n_teaching}; without them estimates were ${signed(mean_error_kg, 0, "kg")} off${scatter}`;
+  if (n_teaching === 0) return phrase("weights_none");
+  const scatter = error_std_kg === null ? "" : phrase("scatter", { kg: withStd(error_std_kg, null, 0, "kg") });
+  return phrase("weights_some", { n: n_teaching, error: signed(mean_error_kg, 0, "kg"), scatter });
 }
 
 function offered({ is_possible, detail, load }) {
-  return is_possible ? `would be of the load that was weighed as ${payload(load)}, ${span(load)}` : `not possible: ${detail}`;
+  return is_possible ? phrase("offer", { kg: payload(load), span: span(load) }) : phrase("no_offer", { detail });
 }
 
 function stateText(one) {
-  if (one.state !== "ended") return STATES[one.state];
-  return `${one.ended.why === "withdrawn" ? "taken back" : "all taken back"} ${clock(one.ended.at)} by ${one.ended.by}`;
+  if (one.state !== "ended") return phrase(`held.${one.state}`);
+  return phrase(one.ended.why === "withdrawn" ? "taken_back" : "all_taken_back", { time: clock(one.ended.at), by: one.ended.by });
 }
 
 function button(text, one, name) {
-  const pressed = made("button", text);
+  const pressed = made("button", `${text} …`);
   pressed.type = "button";
-  pressed.setAttribute("aria-label", `${text.replace(" …", "")}: ${words(one.kind)} of ${clock(one.t_start)}`);
+  pressed.setAttribute("aria-label", phrase("button_of", { button: text, kind: phrase.named("kind", one.kind), time: clock(one.t_start) }));
   pressed.addEventListener("click", () => open(name, one));
   return pressed;
 }
 
 function entry(one) {
-  const said = `${clock(one.t_start)}, ${words(one.kind)}: ${payload(one)} known, ${estimated(one)} estimated without it; by ${one.by}${one.note ? ` (${one.note})` : ""}; ${stateText(one)} `;
+  const said = phrase("weight_entry", {
+    time: clock(one.t_start), kind: phrase.named("kind", one.kind), known: payload(one), estimated: estimated(one), by: one.by,
+    note: one.note ? ` (${one.note})` : "", state: stateText(one),
+  });
   const parts = [made("span", said)];
-  if (one.state === "held") parts.push(button("Confirm …", one, "confirm"), made("span", " "));
-  if (one.ended === null) parts.push(button("Take back …", one, "back"));
+  if (one.state === "held") parts.push(button(phrase("confirm_weight"), one, "confirm"), made("span", " "));
+  if (one.ended === null) parts.push(button(phrase("take_back"), one, "back"));
   return made("li", parts, one.state === "held" ? "warning" : "");
 }
 
@@ -61,25 +62,25 @@ show(({ knownWeights }) => {
 /** What can be asked for: the question, what would come of it, and how the gateway is asked. */
 const CHOICES = {
   empty: {
-    question: () => "The vehicle is empty now?",
-    effect: () => `It was weighed as ${payload(known.knownWeights.offer.load)}. Every later estimate takes into account what it truly carries: nothing.`,
-    confirm: "It is empty",
+    question: () => phrase("empty_question"),
+    effect: () => phrase("empty_effect", { kg: payload(known.knownWeights.offer.load) }),
+    confirm: phrase("empty_confirm"),
     ask: (token, note) => change("POST", KNOWN_WEIGHTS, token, { kind: "empty", ...note }, KNOWN_WEIGHTS),
-    done: `Kept. ${COUNTS}`,
+    done: phrase("empty_done"),
   },
   confirm: {
-    question: (one) => `Is it truly ${payload(one)}?`,
-    effect: (one) => `The load was weighed as ${estimated(one)}: one of these numbers is wrong. Confirmed, the known weight moves every later estimate.`,
-    confirm: "The known weight is right",
+    question: (one) => phrase("held_question", { kg: payload(one) }),
+    effect: (one) => phrase("held_effect", { kg: estimated(one) }),
+    confirm: phrase("held_confirm"),
     ask: (token, note, one) => change("POST", `${KNOWN_WEIGHTS}/${one.id}/confirm`, token, undefined, KNOWN_WEIGHTS),
-    done: `Confirmed. ${COUNTS}`,
+    done: phrase("held_done"),
   },
   back: {
-    question: (one) => `Take back the known weight of ${payload(one)}?`,
-    effect: () => "From the next batch on all numbers are as if it had never been stated.",
-    confirm: "Take it back",
+    question: (one) => phrase("back_question", { kg: payload(one) }),
+    effect: () => phrase("back_effect"),
+    confirm: phrase("back_confirm"),
     ask: (token, note, one) => change("DELETE", `${KNOWN_WEIGHTS}/${one.id}`, token, undefined, KNOWN_WEIGHTS),
-    done: "Taken back.",
+    done: phrase("back_done"),
   },
 };
 
@@ -93,7 +94,7 @@ function open(name, one = null) {
   write("weights-confirm", chosen.confirm);
   element("weights-claim").hidden = name !== "empty";
   element("weights-claimed").disabled = name !== "empty"; // what is hidden must not be required
-  if (name === "empty") write("weights-claim-text", `The vehicle is empty, and was so while it was weighed, ${span(known.knownWeights.offer.load)}.`);
+  if (name === "empty") write("weights-claim-text", phrase("empty_claim", { span: span(known.knownWeights.offer.load) }));
   element("weights-token").hidden = !hasToken();
   say("weights-refusal", "");
   element("weights-dialog").showModal();
@@ -106,7 +107,7 @@ async function confirm(event) {
     const note = element("weights-note").value;
     learn({ knownWeights: await chosen.ask(element("weights-token-text").value.trim(), note ? { note } : {}, subject) });
     element("weights-dialog").close();
-    write("weights-said", capital(chosen.done));
+    write("weights-said", chosen.done);
   } catch (error) {
     say("weights-refusal", error.message);
   } finally {

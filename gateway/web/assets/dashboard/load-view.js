@@ -2,24 +2,25 @@
 
 import { ageNow, known, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { Z95, ago, between, capital, clock, figure, kmh, withStd, words } from "/assets/dashboard/words.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd, words } from "/assets/dashboard/words.js";
 
-const interval = (bounds, digits, unit) => (bounds == null ? "" : `95 %: ${between(bounds, digits, unit)}`);
+const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 
 /** What became of the last batch, where none was weighed yet, and what to do about it. */
 function noneYet(refusal, reasons) {
-  if (refusal == null) return "No estimate yet.";
+  if (refusal == null) return phrase("none_yet");
   const advice = refusal.rejected.map((reason) => reasons.get(reason)?.advice).filter(Boolean).map((text) => `${text.replaceAll("`", "")}.`);
-  const todo = advice.length ? ` What to do: ${advice.join(" ")}` : "";
-  return `No estimate yet. The last batch could not be weighed: ${refusal.rejected.map(words).join(", ")}.${todo}`;
+  const todo = advice.length ? phrase("to_do", { advice: advice.join(" ") }) : "";
+  return phrase("none_because", { reasons: named(refusal.rejected) }) + todo;
 }
 
 function notes(latest, reasons) {
   const said = [];
-  if (latest.is_stale) said.push("This estimate is old: the load may have changed since.");
-  if (latest.provisional) said.push("Early value: the batch under way is not complete yet.");
+  if (latest.is_stale) said.push(phrase("note_old"));
+  if (latest.provisional) said.push(phrase("note_early"));
   if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons));
-  else if (latest.rejected.length) said.push(`No estimate: ${latest.rejected.map(words).join(", ")}.`);
+  else if (latest.rejected.length) said.push(phrase("note_none", { reasons: named(latest.rejected) }));
   return said.join(" ");
 }
 
@@ -37,7 +38,7 @@ function gauge(id, value, bounds, seen, unit) {
   };
   return place.replaceChildren(
     bar("track", seen), bar("band", bounds), bar("mark", [value, value]),
-    made("span", `calibrated: ${between(seen, 0, unit)}`, "scale"),
+    made("span", phrase("calibrated_range", { between: between(seen, 0, unit) }), "scale"),
   );
 }
 
@@ -48,21 +49,21 @@ function writeNumber(id, value, digits, unit) {
 
 function epoch(latest) {
   const n = latest.epoch_n_batches;
-  if (!(n > 1)) return n === 1 ? "one batch" : "unknown";
-  return `${withStd(latest.epoch_payload_kg, latest.epoch_payload_std_kg, 0, "kg")} over ${n} batches`;
+  if (!(n > 1)) return n === 1 ? phrase("one_batch") : UNKNOWN;
+  return phrase("epoch_of", { n, weight: withStd(latest.epoch_payload_kg, latest.epoch_payload_std_kg, 0, "kg") });
 }
 
 function showAge() {
   const age = ageNow();
-  write("age", age == null ? "unknown" : ago(age));
+  write("age", age == null ? UNKNOWN : ago(age));
 }
 
 let announcedId = null;
 
 function announce(latest) {
   if (latest.id === announcedId || latest.payload_kg == null) return;
-  const share = latest.front_share_pct == null ? "" : `, ${figure(latest.front_share_pct, 1, "%")} on the front axle`;
-  write("announcement", `Payload ${figure(latest.payload_kg, 0, "kg")}${share}.`);
+  const said = { kg: figure(latest.payload_kg, 0, "kg"), share: figure(latest.front_share_pct, 1, "%") };
+  write("announcement", phrase(latest.front_share_pct == null ? "announced" : "announced_share", said));
   announcedId = latest.id;
 }
 
@@ -72,11 +73,14 @@ show(({ latest, sources, remedies }) => {
   element("budget").hidden = lines.length === 0;
   if (lines.length === 0) return;
   const half = (std) => figure(Z95 * std, 0, "kg");
-  write("budget-why", `Why ± ${half(latest.payload_std_kg)}?`);
+  write("budget-why", phrase("why", { kg: half(latest.payload_std_kg) }));
   element("budget-lines").replaceChildren(...lines.filter((line) => line.payload_kg > 0).map((line) => {
     const advice = line.remedy && remedies.get(line.remedy);
-    const remedy = advice ? `. ${capital(advice)}: ± ${half(latest.payload_std_kg)} becomes ± ${half(line.payload_with_remedy_kg)}.` : ".";
-    return made("li", `${capital(sources.get(line.source) ?? words(line.source))}: ± ${half(line.payload_kg)}${remedy}`);
+    const source = capital(sources.get(line.source) ?? words(line.source));
+    const said = { source, kg: half(line.payload_kg), advice: advice && capital(advice), now: half(latest.payload_std_kg), then: half(line.payload_with_remedy_kg) };
+    const built = made("li", phrase(advice ? "budget_remedy" : "budget_line", said));
+    built.style.setProperty("--part", `${(100 * line.payload_kg) / latest.payload_std_kg}%`);
+    return built;
   }));
 }, "latest", "sources", "remedies");
 
@@ -89,7 +93,7 @@ show(({ latest, vehicle, reasons, isReachable }) => {
   writeNumber("share", latest.front_share_pct, 1, "%");
   write("share-range", interval(latest.front_share_interval95_pct, 1, "%"));
   gauge("share-gauge", latest.front_share_pct, latest.front_share_interval95_pct, seen?.front_share_seen_pct, "%");
-  write("age-at", latest.t_end ? `(batch until ${clock(latest.t_end)})` : "");
+  write("age-at", latest.t_end ? phrase("age_at", { time: clock(latest.t_end) }) : "");
   write("epoch", epoch(latest));
   write("speed", kmh(latest.mean_speed_mps));
   element("conditioned").hidden = latest.raw_payload_kg == null;
@@ -101,4 +105,5 @@ show(({ latest, vehicle, reasons, isReachable }) => {
   announce(latest);
 }, "latest", "vehicle", "reasons", "isReachable");
 
+element("budget").open = matchMedia("(min-width: 56rem)").matches; // where there is room for it
 setInterval(() => known.latest && showAge(), 1000);

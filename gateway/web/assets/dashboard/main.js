@@ -1,5 +1,7 @@
 // The dashboard: views first, then what fills them.
 
+import "/assets/dashboard/phrases.js"; // first: the others find its words in the page
+import "/assets/dashboard/theme-button.js";
 import "/assets/dashboard/fold.js";
 import "/assets/dashboard/state-view.js";
 import "/assets/dashboard/alarm-view.js";

@@ -3,13 +3,14 @@
 import { show } from "/assets/dashboard/known.js";
 import { element, made, row, write } from "/assets/dashboard/page.js";
 import { colour, plot } from "/assets/dashboard/plot.js";
-import { clock, figure, number, words } from "/assets/dashboard/words.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { clock, figure, number, reasons } from "/assets/dashboard/words.js";
 
 const PANELS = [
-  { name: "vertical_acceleration_mps2_rthz", title: "Vertical acceleration [m/s²/√Hz], log scale", bands: "acceleration_bands" },
-  { name: "pitch_rate_radps_rthz", title: "Pitch rate [rad/s/√Hz], log scale", bands: "pitch_rate_bands" },
-  { name: "coherence", title: "Coherence of the two", range: [0, 1.05] },
-  { name: "phase_rad", title: "Phase of pitch rate against acceleration [rad]", range: [-Math.PI, Math.PI] },
+  { name: "vertical_acceleration_mps2_rthz", title: phrase("spectra_acceleration"), bands: "acceleration_bands" },
+  { name: "pitch_rate_radps_rthz", title: phrase("spectra_pitch"), bands: "pitch_rate_bands" },
+  { name: "coherence", title: phrase("spectra_coherence"), range: [0, 1.05] },
+  { name: "phase_rad", title: phrase("spectra_phase"), range: [-Math.PI, Math.PI] },
 ];
 
 const TICKS = [0.00001, 0.00003, 0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10]; // evenly apart on a log scale
@@ -19,7 +20,7 @@ function panel({ name, title }) {
   const place = made("div", "", "chart");
   place.id = `spectra-${name}`;
   place.setAttribute("role", "img");
-  place.setAttribute("aria-label", `${title}. The table below holds the numbers.`);
+  place.setAttribute("aria-label", phrase("spectra_chart", { title }));
   return made("figure", [made("figcaption", title), place]);
 }
 
@@ -51,7 +52,7 @@ function bandShapes(bands) {
     line: { width: 0 },
     fillcolor: colour("soft", 0.45),
     label: {
-      text: n === 0 ? "over" : "under",
+      text: phrase(n === 0 ? "band_over" : "band_under"),
       textposition: band.centre_hz < RESONANCE_BELOW_HZ ? "bottom left" : "top left",
       font: { size: 10, color: colour("soft") },
       textangle: 0,
@@ -72,14 +73,12 @@ function drawPanels(told) {
 }
 
 function caption(told) {
-  const batch = `Batch until ${clock(told.t_end)}`;
-  if (told.model) return `${batch}. Model: the calibrated vehicle with ${figure(told.payload_kg, 0, "kg")} aboard and ${figure(told.front_share_pct, 1, "%")} on its front axle.`;
-  if (told.rejected.length) return `${batch}, not weighed: ${told.rejected.map(words).join(", ")}. Without an answer there is no model.`;
-  return `${batch}. This estimator has no model of the spectra.`;
+  const said = { time: clock(told.t_end), kg: figure(told.payload_kg, 0, "kg"), share: figure(told.front_share_pct, 1, "%"), reasons: reasons(told.rejected) };
+  return phrase(told.model ? "spectra_model" : told.rejected.length ? "spectra_refused" : "spectra_none", said);
 }
 
 function drawTable(told) {
-  const kinds = told.model ? ["measured", "model"] : ["measured"];
+  const kinds = (told.model ? ["measured", "model"] : ["measured"]).map((kind) => phrase(kind));
   const head = PANELS.flatMap(({ title }) => kinds.map((kind) => `${title}, ${kind}`));
   const cells = ["Hz", ...head].map((text) => {
     const cell = made("th", text);
@@ -100,14 +99,14 @@ function drawTable(told) {
 
 function drawLegend(told) {
   element("spectra-legend").replaceChildren(
-    made("li", "measured", "estimate"),
-    ...(told.model ? [made("li", "fitted model", "model")] : []),
-    ...(told.acceleration_bands || told.pitch_rate_bands ? [made("li", "bands of the ratio index: over, under", "index-band band-key")] : []),
+    made("li", phrase("measured"), "estimate"),
+    ...(told.model ? [made("li", phrase("fitted"), "model")] : []),
+    ...(told.acceleration_bands || told.pitch_rate_bands ? [made("li", phrase("bands"), "index-band band-key")] : []),
   );
 }
 
 show(({ spectra: told }) => {
-  if (told !== null && told.id === null) write("spectra-of", "No batch yet.");
+  if (told !== null && told.id === null) write("spectra-of", phrase("no_batch"));
   if (!told?.spectra) return;
   if (!element("spectra-charts").children.length) element("spectra-charts").append(...PANELS.map(panel));
   write("spectra-of", caption(told));

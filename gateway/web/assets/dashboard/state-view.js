@@ -2,41 +2,58 @@
 
 import { show } from "/assets/dashboard/known.js";
 import { element, write } from "/assets/dashboard/page.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { isAsleep, silentSignals } from "/assets/dashboard/sleep.js";
+import { language } from "/assets/language.js";
 
-const NAMES = {
-  starting: ["Starting", "busy"],
-  waiting_for_bus: ["Bus silent", "warn"],
-  sensor_fault: ["Sensor fault", "bad"],
-  waiting_for_speed: ["Waiting for speed", "busy"],
-  collecting: ["First batch under way", "busy"],
-  estimating: ["Estimating", "good"],
-  stale: ["Stale", "warn"],
-  reader_fault: ["Bus fault", "bad"],
+const TONES = {
+  starting: "busy", waiting_for_bus: "warn", sensor_fault: "bad", waiting_for_speed: "busy", collecting: "busy",
+  estimating: "good", stale: "warn", reader_fault: "bad",
 };
 
-function told({ status, isReachable, isRefused }) {
-  if (isRefused) return ["Locked", "warn", "The gateway wants a token."];
-  if (isReachable === false) return ["Offline", "bad", "The gateway does not answer. What is shown is the last it said."];
-  if (status === null) return ["Loading", "busy", "Asking the gateway."];
-  const [name, tone] = NAMES[status.state] ?? [status.state, "warn"];
-  if (status.calibration_id === null && tone !== "bad") return ["No calibration", "warn", status.state_in_words];
-  return [name, tone, status.state_in_words];
+/** What is wrong beside the state. */
+function beside({ store, uplink, warnings }) {
+  const said = [];
+  if (store.state !== "ok") said.push(phrase("memory_only", { reason: store.reason }));
+  if (uplink && !uplink.is_connected && uplink.last_fault) said.push(phrase("broker_away", { fault: uplink.last_fault }));
+  return [...said, ...warnings].join(" ");
+}
+
+/** The gateway's own sentence knows more details than can be said anew in another language. */
+function sentence(status) {
+  if (language === "en") return status.state_in_words;
+  const said = [phrase(`sentence.${status.state}`)];
+  if (status.state === "sensor_fault") said.push(phrase("silent_signals", { signals: silentSignals(status).join(", ") }));
+  if (status.state === "reader_fault" && status.bus.last_fault) said.push(phrase("last_fault", { fault: status.bus.last_fault }));
+  if (status.calibration_id === null) said.push(phrase("spectra_only"));
+  return [...said, beside(status)].join(" ");
+}
+
+function told(known) {
+  const { status, isReachable, isRefused } = known;
+  if (isRefused) return [phrase("locked"), "warn", phrase("wants_token")];
+  if (isReachable === false) return [phrase("offline"), "bad", `${phrase("gone")} ${phrase("last_heard")}`];
+  if (status === null) return [phrase("loading"), "busy", phrase("asking")];
+  const tone = TONES[status.state] ?? "warn";
+  if (status.calibration_id === null && tone !== "bad") return [phrase("no_calibration"), "warn", sentence(status)];
+  if (isAsleep(known)) return [phrase("asleep"), "calm", `${phrase("asleep_since")} ${beside(status)}`];
+  return [phrase.named("state", status.state), tone, sentence(status)];
 }
 
 show((known) => {
-  const [name, tone, sentence] = told(known);
+  const [name, tone, sentence_] = told(known);
   element("state").dataset.tone = tone;
   write("state-name", name);
-  write("state-sentence", sentence);
+  write("state-sentence", sentence_.trim());
   element("token").hidden = !known.isRefused;
   element("cards").hidden = known.status === null; // nothing is claimed that nobody told
   if (known.status) {
     write("vehicle", known.status.vehicle_id ?? "");
-    write("version", `version ${known.status.version}`);
+    write("version", phrase("version", { version: known.status.version }));
   }
-}, "status", "isReachable", "isRefused");
+}, "status", "latest", "isReachable", "isRefused");
 
 show(({ isLive }) => {
-  write("link", isLive ? "live" : "not connected: trying again");
+  write("link", phrase(isLive ? "live" : "not_live"));
   element("link").className = isLive ? "live" : "lost";
 }, "isLive");

@@ -11,21 +11,13 @@
     else root.dataset.theme = chosen();
   };
   const tell = () => document.dispatchEvent(new Event("themechange"));
+  const choose = (choice) => {
+    localStorage.setItem(KEPT, choice);
+    apply();
+    tell();
+  };
 
   apply();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", tell);
-  document.addEventListener("DOMContentLoaded", () => {
-    const button = document.getElementById("theme");
-    const name = () => { 
-      button.lastElementChild.textContent = ` ${chosen()}`;
-      button.setAttribute("aria-label", `Theme: ${chosen()}`);
-    };
-    name();
-    button.addEventListener("click", () => {
-      localStorage.setItem(KEPT, CHOICES[(CHOICES.indexOf(chosen()) + 1) % CHOICES.length]);
-      apply();
-      name();
-      tell();
-    });
-  });
+  globalThis.springscaleTheme = { CHOICES, chosen, choose };
 }

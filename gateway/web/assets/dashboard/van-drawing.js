@@ -1,12 +1,14 @@
 // The van from above, front to the left: what each axle and wheel bears, and where the load's centre of gravity lies.
 // To scale along by the wheelbase and across by the track width.
 
-import { figure, number, withStd } from "/assets/dashboard/words.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { capital, figure, number, withStd } from "/assets/dashboard/words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const FRONT_X = 96, REAR_X = 290, MIDDLE_Y = 96, HALF_TRACK = 58;
 const LARGEST_RADIUS = 30, LARGEST_REACH = 200;
 const Z95 = 1.96, Z95_OF_TWO = 2.448; // 95 % of one normal number, and of two: the root of chi-squared of two, 5.991
+const AXLES = ["front_axle", "rear_axle"];
 const WHEELS = [
   ["front_left", FRONT_X, 1], // the vehicle's left is below
   ["front_right", FRONT_X, -1],
@@ -28,13 +30,15 @@ function wheel([place, x, side], weights) {
   return shape("rect", { class: `wheel ${overOf(weights?.[place])}`, x: x - 17, y: y - 7, width: 34, height: 14, rx: 4 });
 }
 
-/** Beside the wheel, towards the other axle; nothing where nobody knows. */
+/** Beside the wheel, towards the other axle: what it carries, and its limit below; nothing where nobody knows. */
 function wheelLabel([place, x, side], weights) {
   const weight = weights?.[place];
   if (weight?.kg == null) return [];
   const inwards = x === FRONT_X ? 1 : -1;
   const where = { x: x + inwards * 23, y: MIDDLE_Y + side * HALF_TRACK + (side > 0 ? 5 : 3) };
-  return [shape("text", { class: `on-wheel ${inwards > 0 ? "from" : "to"} ${overOf(weight)}`, ...where }, figure(weight.kg, 0, "kg"))];
+  const anchor = `${inwards > 0 ? "from" : "to"} ${overOf(weight)}`;
+  const limit = weight.limit_kg == null ? [] : [shape("text", { class: `small ${anchor}`, ...where, y: where.y - side * 14 }, limitText(weight))];
+  return [shape("text", { class: `on-wheel ${anchor}`, ...where }, withStd(weight.kg, weight.std_kg, 0, "kg")), ...limit];
 }
 
 function body(weights) {
@@ -46,10 +50,13 @@ function body(weights) {
   ];
 }
 
-function axleLabel(x, name, weight) {
+const limitText = (weight) => phrase("of_limit", { kg: figure(weight.limit_kg, 0, "kg") });
+
+function axleLabel(x, place, weight) {
   return [
-    shape("text", { class: "small", x, y: 22 }, name),
+    shape("text", { class: "small", x, y: 22 }, phrase(`place.${place}`)),
     shape("text", { class: overOf(weight), x, y: 182 }, withStd(weight?.kg, weight?.std_kg, 0, "kg")),
+    ...(weight?.limit_kg == null ? [] : [shape("text", { class: `small ${overOf(weight)}`, x, y: 198 }, limitText(weight))]),
   ];
 }
 
@@ -96,24 +103,24 @@ function sensor(figures, scale) {
   const x = FRONT_X + figures.sensor_position_m * scale.along, y = MIDDLE_Y + figures.sensor_offset_left_m * scale.across;
   return [
     shape("path", { class: "sensor", d: `M${x} ${y - 7} l7 7 l-7 7 l-7 -7 Z` }),
-    shape("text", { class: "small", x, y: y - 11 }, "sensor"),
+    shape("text", { class: "small", x, y: y - 11 }, phrase("sensor")),
   ];
 }
 
 /** "0.12 m left of the centre line"; nothing where nobody knows. */
 export function aside(place, told) {
   if (place?.left_m == null) return "";
-  return `${told(Math.abs(place.left_m), place.left_std_m)} ${place.left_m < 0 ? "right" : "left"} of the centre line`;
+  return phrase(place.left_m < 0 ? "right_of" : "left_of", { metres: told(Math.abs(place.left_m), place.left_std_m) });
 }
 
+/** The drawing for who cannot see it: all that it shows. */
 function inWords(weights) {
   const place = weights?.load;
-  if (!place) return "Van from above. No payload that is surely there.";
   const across = aside(place, (metres) => `${number(metres, 2)} m`);
-  const wheels = WHEELS.filter(([name]) => weights[name]?.kg != null)
-    .map(([name]) => `${name.replace("_", " ")} ${number(weights[name].kg, 0)} kg`);
-  const borne = wheels.length ? ` The wheels bear: ${wheels.join(", ")}.` : "";
-  return `Van from above. The load's centre lies ${number(place.position_m, 2)} m behind the front axle${across && `, ${across}`}.${borne}`;
+  const where = place && `${phrase("behind_front", { metres: `${number(place.position_m, 2)} m` })}${across && `, ${across}`}`;
+  const borne = [...AXLES, ...WHEELS.map(([name]) => name)].filter((name) => weights?.[name]?.kg != null)
+    .map((name) => `${phrase(`place.${name}`)} ${withStd(weights[name].kg, weights[name].std_kg, 0, "kg")}${weights[name].limit_kg == null ? "" : phrase("limit", { kg: figure(weights[name].limit_kg, 0, "kg") })}`);
+  return `${phrase(place ? "van_load" : "van_empty", { where })}${borne.length ? phrase("van_bears", { places: capital(borne.join(", ")) }) : ""}`;
 }
 
 /** Pixels per metre along and across; across as along where nobody told the track width. */
@@ -126,13 +133,13 @@ function scaleOf(figures) {
 export function drawVan(vehicle, weights, place, payloadKg) {
   const scale = scaleOf(vehicle.figures);
   const fullKg = Math.max(vehicle.calibration?.payload_seen_kg[1] ?? 0, 1);
-  const drawing = shape("svg", { viewBox: "20 8 352 184", role: "img", "aria-label": inWords(weights) });
+  const drawing = shape("svg", { viewBox: "20 8 352 200", role: "img", "aria-label": inWords(weights) });
   drawing.append(
     ...body(weights),
     ...load(place, payloadKg, fullKg, scale),
     ...sensor(vehicle.figures, scale),
-    ...axleLabel(FRONT_X, "front axle", weights?.front_axle),
-    ...axleLabel(REAR_X, "rear axle", weights?.rear_axle),
+    ...axleLabel(FRONT_X, "front_axle", weights?.front_axle),
+    ...axleLabel(REAR_X, "rear_axle", weights?.rear_axle),
     ...WHEELS.flatMap((one) => wheelLabel(one, weights)),
   );
   return drawing;

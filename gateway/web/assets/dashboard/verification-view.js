@@ -3,23 +3,27 @@
 import { KNOWN_WEIGHTS, VERIFICATIONS, ask, change, hasToken } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { capital, clock, number, signed, words } from "/assets/dashboard/words.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { capital, clock, figure, signed } from "/assets/dashboard/words.js";
 
 const FIELDS = { gross: ["gross_kg"], axles: ["front_axle_kg", "rear_axle_kg"], payload: ["payload_kg", "position_m"] };
 const OPTIONAL = new Set(["position_m"]);
 
-const loadText = (load) => `${number(load.known_payload_kg, 0)} kg aboard was weighed ${signed(load.error_kg, 0, "kg")} off, ${signed(load.error_pct, 1, "%")} of the gross weight`;
+const loadText = (load) => phrase("record_load", { kg: figure(load.known_payload_kg, 0, "kg"), error: signed(load.error_kg, 0, "kg"), percent: signed(load.error_pct, 1, "%") });
 
-const recordText = (record) => `${clock(record.at)} by ${record.by}: ${record.verdict}; ${record.loads.map(loadText).join("; ")}${record.note ? ` (${record.note})` : ""}`;
+const recordText = (record) => phrase("record", {
+  time: clock(record.at), by: record.by, verdict: phrase.named("verdict", record.verdict),
+  loads: record.loads.map(loadText).join("; "), note: record.note ? ` (${record.note})` : "",
+});
 
 function due({ due_at, is_due }) {
-  if (due_at === null) return "whenever you like: no interval is set";
-  return is_due ? "now" : `on ${clock(due_at)}`;
+  if (due_at === null) return phrase("due_any");
+  return is_due ? phrase("due_now") : phrase("due_at", { time: clock(due_at) });
 }
 
 function trendText({ name, unit, change, interval99, is_drifting }) {
-  const course = change === null ? "too short a time to tell" : `${signed(change, 1, unit)} (${signed(interval99[0], 1, unit)} to ${signed(interval99[1], 1, unit)})`;
-  return `${capital(words(name))}: ${course}${is_drifting ? ", it drifts" : ""}`;
+  const course = change === null ? phrase("trend_short") : phrase("trend_course", { change: signed(change, 1, unit), low: signed(interval99[0], 1, unit), high: signed(interval99[1], 1, unit) });
+  return phrase(is_drifting ? "trend_drifts" : "trend_line", { name: capital(phrase.named("trend", name)), course });
 }
 
 /** A link cannot carry the token; a question can. The page opens on its own, to be printed. */
@@ -33,9 +37,9 @@ async function print(record) {
 }
 
 function entry(record) {
-  const button = made("button", "Save the page");
+  const button = made("button", phrase("save_page"));
   button.type = "button";
-  button.setAttribute("aria-label", `Save the page of ${clock(record.at)}`);
+  button.setAttribute("aria-label", phrase("save_page_of", { time: clock(record.at) }));
   button.addEventListener("click", () => print(record).catch((error) => write("known-said", error.message)));
   return made("li", [made("span", `${recordText(record)} `), button]);
 }
@@ -44,7 +48,7 @@ show(({ verifications }) => {
   if (verifications === null) return;
   const [last] = verifications.history;
   write("verified-due", due(verifications.due));
-  write("verified-last", last ? recordText(last) : "never");
+  write("verified-last", last ? recordText(last) : phrase("never"));
   element("known-add").disabled = false;
   element("verified-history").hidden = !last;
   element("verified-entries").replaceChildren(...verifications.history.map(entry));
@@ -58,20 +62,20 @@ show(({ trend }) => {
 /** What a known load can be good for: how the dialog says it, and how the gateway is told. */
 const PURPOSES = {
   verify: {
-    effect: "It is held against what was weighed of it, and a record is kept. Nothing is learned from it.",
-    confirm: "Judge and keep",
+    effect: phrase("verify_effect"),
+    confirm: phrase("verify_confirm"),
     path: VERIFICATIONS,
     part: "verifications",
     claim: (loads) => ({ loads }),
-    done: "The record is kept.",
+    done: phrase("verify_done"),
   },
   teach: {
-    effect: "Every later estimate takes it into account, until it is taken back. One that contradicts its estimate waits for a confirmation.",
-    confirm: "State it",
+    effect: phrase("teach_effect"),
+    confirm: phrase("teach_confirm"),
     path: KNOWN_WEIGHTS,
     part: "knownWeights",
     claim: ([weight]) => ({ kind: element("known-kind").value, weight }),
-    done: "Kept.",
+    done: phrase("teach_done"),
   },
 };
 
@@ -101,7 +105,7 @@ function typed() {
 }
 
 function list() {
-  write("known-listed", listed.length === 0 ? "" : `${listed.length} more in this record.`);
+  write("known-listed", listed.length === 0 ? "" : phrase("listed", { n: listed.length }));
 }
 
 function open(name) {

@@ -1,18 +1,23 @@
-// Numbers, times and names for people.
+// Numbers, times and names for people, as their language writes them.
 
-export const UNKNOWN = "unknown";
+import { locale, speaker } from "/assets/language.js";
+import { COMMON } from "/assets/words/common.js";
+
+const common = speaker(COMMON);
+
+export const UNKNOWN = common("unknown");
 export const Z95 = 1.96; // standard deviations to either side of the middle 95 %
 const GLUE = "\u00a0"; // a number and its unit stay on one line
 
 export function number(x, digits) {
   const shown = Number(x.toFixed(digits)) || 0; // never a negative nought
-  return shown.toLocaleString(undefined, { minimumFractionDigits: digits, maximumFractionDigits: digits }).replace("-", "−");
+  return shown.toLocaleString(locale, { minimumFractionDigits: digits, maximumFractionDigits: digits }).replace("-", "−");
 }
 
 export const figure = (x, digits, unit) => (x == null ? UNKNOWN : `${number(x, digits)}${GLUE}${unit}`);
 
 export const between = (bounds, digits, unit) =>
-  bounds == null ? "" : `${number(bounds[0], digits)} to ${number(bounds[1], digits)}${GLUE}${unit}`;
+  bounds == null ? "" : `${common("between", { low: number(bounds[0], digits), high: number(bounds[1], digits) })}${GLUE}${unit}`;
 
 export const withStd = (x, std, digits, unit) =>
   x == null ? UNKNOWN : `${number(x, digits)}${std == null ? "" : ` ± ${number(Z95 * std, digits)}`}${GLUE}${unit}`;
@@ -23,19 +28,39 @@ export const signed = (x, digits, unit) => plus(x, digits) + figure(x, digits, u
 
 export const kmh = (mps) => figure(mps == null ? null : mps * 3.6, 0, "km/h");
 
-export const clock = (iso) => new Date(iso).toLocaleString(undefined, { dateStyle: "short", timeStyle: "short" });
+const TIME = { hour: "2-digit", minute: "2-digit" };
+const DAY = { day: "numeric", month: "short", ...TIME };
+const YEAR = { year: "numeric", ...DAY };
+
+/** Days are named where they are not today, years where they are not this one: one way of writing times on all pages. */
+function format(...instants) {
+  const now = new Date();
+  if (instants.every((one) => one.toDateString() === now.toDateString())) return new Intl.DateTimeFormat(locale, TIME);
+  return new Intl.DateTimeFormat(locale, instants.every((one) => one.getFullYear() === now.getFullYear()) ? DAY : YEAR);
+}
+
+export const clock = (iso) => format(new Date(iso)).format(new Date(iso));
+
+/** From one instant to another, as "09:05 – 09:35". */
+export function span(from, to) {
+  const [start, end] = [new Date(from), new Date(to)];
+  return format(start, end).formatRange(start, end);
+}
 
 export const words = (name) => name.replaceAll("_", " ");
+
+export const reasons = (names) => names.map((name) => common.named("reason", name)).join(", ");
 
 export function capital(text) {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 export function duration(seconds) {
-  if (seconds < 90) return `${Math.round(seconds)} s`;
-  if (seconds < 5400) return `${Math.round(seconds / 60)} min`;
-  if (seconds < 172800) return `${number(seconds / 3600, 1)} h`;
-  return `${Math.round(seconds / 86400)} days`;
+  if (seconds < 90) return common("seconds", { x: Math.round(seconds) });
+  if (seconds < 5400) return common("minutes", { x: Math.round(seconds / 60) });
+  if (seconds < 172800) return common("hours", { x: number(seconds / 3600, 1) });
+  const x = Math.round(seconds / 86400);
+  return common("days", { x, n: x });
 }
 
-export const ago = (seconds) => (seconds == null ? "never" : `${duration(seconds)} ago`);
+export const ago = (seconds) => (seconds == null ? common("never") : common("ago", { duration: duration(seconds) }));

@@ -1,0 +1,10 @@
+"""A fleet at its desk: what vehicles sent to the broker, kept in one file, and a page with a line per vehicle.
+
+The subscriber (deploy/fleet) and `springscale demo --fleet` use it; nothing of it runs in a vehicle.
+"""
+
+from gateway.fleet.book import Message, SqliteBook, address
+from gateway.fleet.lines import Line, line_of
+from gateway.fleet.page import FleetPage, fleet_app
+
+__all__ = ["FleetPage", "Line", "Message", "SqliteBook", "address", "fleet_app", "line_of"]

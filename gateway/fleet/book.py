@@ -1,0 +1,153 @@
+"""The fleet's records in one SQLite file: every record once, the last revision of what changes."""
+
+import json
+import sqlite3
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from gateway.fleet.lines import Line, line_of
+
+_SCHEMA: Final = """
+CREATE TABLE IF NOT EXISTS vehicle (vehicle_id TEXT PRIMARY KEY, record TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS estimate (
+    vehicle_id TEXT, id TEXT, t_end TEXT NOT NULL, is_weighed INTEGER NOT NULL, record TEXT NOT NULL,
+    PRIMARY KEY (vehicle_id, id)
+);
+CREATE INDEX IF NOT EXISTS estimate_of_vehicle ON estimate (vehicle_id, is_weighed, t_end);
+CREATE TABLE IF NOT EXISTS entry (
+    vehicle_id TEXT, id TEXT, kind TEXT NOT NULL, revision INTEGER NOT NULL, is_active INTEGER NOT NULL,
+    record TEXT NOT NULL, PRIMARY KEY (vehicle_id, id)
+);
+CREATE INDEX IF NOT EXISTS entry_that_stands ON entry (vehicle_id, kind, is_active);
+CREATE TABLE IF NOT EXISTS unreadable (received REAL NOT NULL, topic TEXT NOT NULL, fault TEXT NOT NULL, payload BLOB);
+"""
+_ESTIMATE: Final = "INSERT INTO estimate VALUES (?, ?, ?, ?, ?) ON CONFLICT DO NOTHING"
+_ENTRY: Final = """
+INSERT INTO entry VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (vehicle_id, id) DO UPDATE
+SET (revision, is_active, record) = (excluded.revision, excluded.is_active, excluded.record)
+WHERE excluded.revision > entry.revision
+"""
+_STATUS: Final = """
+INSERT INTO vehicle VALUES (?, ?) ON CONFLICT (vehicle_id) DO UPDATE
+SET record = json_patch(vehicle.record, excluded.record) WHERE excluded.record <> vehicle.record
+"""  # a death says less than a birth: what it leaves out stays
+_VEHICLES: Final = """
+SELECT vehicle_id FROM vehicle UNION SELECT DISTINCT vehicle_id FROM estimate ORDER BY vehicle_id
+"""
+_LATEST: Final = "SELECT record FROM estimate WHERE vehicle_id = ? AND is_weighed = 1 ORDER BY t_end DESC LIMIT 1"
+_STANDING: Final = "SELECT record FROM entry WHERE vehicle_id = ? AND kind = 'alarm' AND is_active = 1 ORDER BY id"
+
+
+class Arrived(Protocol):
+    """A message of the broker."""
+
+    @property
+    def topic(self) -> str: ...
+    @property
+    def payload(self) -> bytes: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One that needs no broker."""
+
+    topic: str
+    payload: bytes
+
+
+def address(branch: str, topic: str) -> tuple[str, str]:
+    """Whose record it is, and of which kind: ``branch`` has a + where each vehicle has its name.
+
+    The name is the broker's, which lets a vehicle write below its own alone. Raises LookupError.
+    """
+    at, levels = branch.split("/").index("+"), topic.split("/")
+    return levels[at], levels[at + 1]
+
+
+class SqliteBook:
+    """May be used from any thread. A message that cannot be understood is kept as such, so that the rest goes on."""
+
+    def __init__(self, path: Path, branch: str, clock_s: Callable[[], float] = time.time) -> None:
+        """Opens or makes the file. Raises sqlite3.Error."""
+        self._branch = branch
+        self._clock_s = clock_s
+        self._lock = threading.Lock()
+        self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+        self._database.executescript(f"PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; {_SCHEMA}")
+        self.counts: Counter[str] = Counter()
+
+    def write(self, arrivals: Sequence[Arrived]) -> None:
+        """All of them, or none: on disk when this returns. Raises sqlite3.OperationalError, as for a full disk."""
+        with self._lock:
+            self._database.execute("BEGIN IMMEDIATE")
+            try:
+                counts = Counter(self._write(arrival) for arrival in arrivals)
+                self._database.execute("COMMIT")
+            except BaseException:
+                self._database.execute("ROLLBACK")
+                raise
+            self.counts += counts
+
+    def lines(self) -> list[Line]:
+        """The fleet, a line per vehicle."""
+        with self._lock:
+            return [self._line(vehicle) for (vehicle,) in self._database.execute(_VEHICLES).fetchall()]
+
+    def close(self) -> None:
+        """Done."""
+        with self._lock:
+            self._database.close()
+
+    def _write(self, arrival: Arrived) -> str:
+        try:
+            vehicle, kind = address(self._branch, arrival.topic)
+            statement, row = _row(vehicle, kind, json.loads(arrival.payload))
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as fault:
+            told = f"{type(fault).__name__}: {fault}"
+            row = (self._clock_s(), arrival.topic, told, arrival.payload)
+            self._database.execute("INSERT INTO unreadable VALUES (?, ?, ?, ?)", row)
+            return "unreadable"
+        return kind if self._database.execute(statement, row).rowcount else "known already"
+
+    def _line(self, vehicle: str) -> Line:
+        def records(statement: str) -> list[Any]:
+            return [json.loads(text) for (text,) in self._database.execute(statement, (vehicle,)).fetchall()]
+
+        status = records("SELECT record FROM vehicle WHERE vehicle_id = ?")
+        latest = records(_LATEST)
+        return line_of(
+            vehicle, *(some[0] if some else None for some in (status, latest)), records(_STANDING), self._clock_s()
+        )
+
+
+def _row(vehicle: str, kind: str, told: Any) -> tuple[str, tuple[Any, ...]]:
+    """The statement and its values; what a line needs is looked at here, so that no page stumbles over it later."""
+    if not isinstance(told, dict):
+        raise TypeError("no JSON object")
+    text = json.dumps(told)
+    if kind == "status":
+        str.encode(told["state"])
+        return _STATUS, (vehicle, text)
+    str.encode(told["id"])
+    if kind == "estimates":
+        line_of(vehicle, None, told, (), 0.0)
+        datetime.fromisoformat(told["t_end"])
+        return _ESTIMATE, (vehicle, told["id"], told["t_end"], not list(told["rejected"]), text)
+    if kind not in ("events", "trips", "alarms"):
+        raise LookupError(f"{kind} is no kind of record")
+    if kind == "alarms":
+        line_of(vehicle, None, None, (told,), 0.0)
+    return _ENTRY, (
+        vehicle,
+        told["id"],
+        kind.removesuffix("s"),
+        int(told["revision"]),
+        bool(told.get("is_active")),
+        text,
+    )

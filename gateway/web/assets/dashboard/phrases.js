@@ -1,0 +1,24 @@
+// The dashboard's words in the reader's language; loading this writes those that stand in the page itself.
+
+import { fill, language, speaker } from "/assets/language.js";
+import { COMMON } from "/assets/words/common.js";
+import { DASHBOARD } from "/assets/words/dashboard.js";
+import { REASONS_DE, REMEDIES_DE, SOURCES_DE } from "/assets/words/reasons.js";
+
+export const phrase = speaker(COMMON, DASHBOARD);
+
+/** What the gateway says in English of reasons, sources and remedies, by name, in the reader's language. */
+export function explained({ items, sources, remedies }) {
+  const isGerman = language === "de";
+  const inGerman = (told) => {
+    const [happened, advice] = (isGerman && REASONS_DE[told.reason]) || [told.happened, told.advice];
+    return { ...told, happened, advice };
+  };
+  return {
+    reasons: new Map(items.map((told) => [told.reason, inGerman(told)])),
+    sources: new Map(sources.map((told) => [told.source, (isGerman && SOURCES_DE[told.source]) || told.words])),
+    remedies: new Map(remedies.map((told) => [told.remedy, (isGerman && REMEDIES_DE[told.remedy]) || told.advice])),
+  };
+}
+
+fill(phrase);

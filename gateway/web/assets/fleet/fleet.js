@@ -1,0 +1,82 @@
+// The fleet: asks every few seconds, shows a line per vehicle, alarmed ones first; the search keeps what matches.
+
+import { element, made, write } from "/assets/dashboard/page.js";
+import { UNKNOWN, ago, capital, clock, figure, withStd, words } from "/assets/dashboard/words.js";
+import { fill, speaker } from "/assets/language.js";
+import { COMMON } from "/assets/words/common.js";
+import { FLEET } from "/assets/words/fleet.js";
+
+const ASK_EVERY_MS = 5000;
+const OLD_AFTER_S = 24 * 3600;
+const phrase = speaker(COMMON, FLEET);
+
+let vehicles = null;
+
+const placeName = (place) => phrase.named("place", place);
+
+function alarmName({ kind, where, state }) {
+  const name =
+    kind === "overload" ? phrase("alarm.overload", { place: placeName(where) })
+    : kind === "drift" ? phrase("alarm.drift", { where: words(where ?? "") })
+    : phrase.named("alarm", where ? `${kind}.${where}` : kind);
+  return capital(state === "early" ? phrase("early", { name }) : name);
+}
+
+function loadCell(one) {
+  const bar = made("div", [made("span")], "bar");
+  bar.setAttribute("aria-hidden", "true"); // the number says it
+  bar.style.setProperty("--used", `${Math.min(100, 100 * (one.used_share ?? 0))}%`);
+  const weight = made("span", withStd(one.payload_kg, one.payload_std_kg, 0, "kg"), "weight");
+  return made("td", one.used_share === null ? [weight] : [weight, bar], "load");
+}
+
+function alarmItem(alarm) {
+  return made("li", [made("span", alarmName(alarm), "alarmed"), made("small", phrase("since", { time: clock(alarm.t_start) }))]);
+}
+
+function line(one) {
+  const head = made("th", [one.vehicle_id]);
+  head.scope = "row";
+  const beside = [one.vin, one.state === "offline" ? phrase("offline") : ""].filter(Boolean).join(", ");
+  if (beside) head.append(made("small", beside));
+  const gross = made("td", one.gross_limit_kg === null ? figure(one.gross_kg, 0, "kg") : phrase("of_limit", { kg: figure(one.gross_kg, 0, "kg"), limit: figure(one.gross_limit_kg, 0, "kg") }));
+  if (one.over.length) gross.append(made("small", phrase("over", { places: one.over.map(placeName).join(", ") }), "alarmed"));
+  const age = made("td", one.age_s === null ? UNKNOWN : ago(one.age_s), one.age_s > OLD_AFTER_S ? "aged" : "");
+  const alarms = made("td", [made("ul", one.alarms.map(alarmItem))]);
+  return made("tr", [head, loadCell(one), gross, age, alarms], one.over.length ? "over" : "");
+}
+
+const urgency = (one) => 2 * one.alarms.length + one.over.length;
+
+function draw() {
+  if (vehicles === null) return;
+  const sought = element("search").value.trim().toLowerCase();
+  const shown = vehicles.filter((one) => `${one.vehicle_id} ${one.vin ?? ""} ${one.alarms.map(alarmName).join(" ")}`.toLowerCase().includes(sought));
+  shown.sort((a, b) => urgency(b) - urgency(a) || a.vehicle_id.localeCompare(b.vehicle_id, undefined, { numeric: true }));
+  const count = (is) => vehicles.filter(is).length;
+  const said = { n: vehicles.length, over: count((one) => one.over.length), alarmed: count((one) => one.alarms.length) };
+  const found = shown.length < vehicles.length ? `; ${phrase("found", { shown: shown.length, n: vehicles.length })}` : "";
+  write("said", vehicles.length ? `${phrase("summary", said)}${found}.` : phrase("no_vehicle"));
+  element("said").className = "";
+  element("fleet").hidden = vehicles.length === 0;
+  element("vehicles").replaceChildren(...shown.map(line));
+}
+
+async function askNow() {
+  try {
+    const response = await fetch("/api/v1/fleet", { cache: "no-store" });
+    if (!response.ok) throw new Error(`status ${response.status}`);
+    vehicles = (await response.json()).items;
+    draw();
+  } catch (error) {
+    console.info(error.message);
+    write("said", phrase("gone"));
+    element("said").className = "gone";
+  }
+}
+
+fill(phrase);
+document.title = phrase("title");
+element("search").addEventListener("input", draw);
+askNow();
+setInterval(askNow, ASK_EVERY_MS);

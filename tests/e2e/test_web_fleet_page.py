@@ -1,0 +1,98 @@
+"""The fleet's page in a browser: a line per vehicle, alarmed ones first, found by a word, kept up to date."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
+from unit.test_fleet_book import alarm, estimate, message
+
+from gateway.fleet import FleetPage, SqliteBook, fleet_app
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
+expect = playwright.expect
+
+NOW_S = 1_800_000_000.0
+HURRIED = "{ const set = setInterval; window.setInterval = (draw, ms) => set(draw, ms / 20); }"  # nobody has to wait
+ENGLISH = re.compile(r"\b(the|and|of|vehicle|limit|ago|search)\b", re.IGNORECASE)
+
+
+@pytest.fixture
+def book(tmp_path: Path) -> Iterator[SqliteBook]:
+    opened = SqliteBook(tmp_path / "fleet.sqlite", "springscale/+", lambda: NOW_S)
+    opened.write([
+        message("van-1", "status", state="online", vin="WVWZZZ1KZAW000001"),
+        estimate("van-1", 55, 200.0), estimate("van-2", 40, 620.0), alarm("van-2", 1, is_active=True),
+        message("van-10", "status", state="offline"),
+    ])  # fmt: skip
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def url(book: SqliteBook) -> Iterator[str]:
+    page = FleetPage(fleet_app(book.lines), "127.0.0.1", 0)
+    page.start()
+    yield f"http://127.0.0.1:{page.port}"
+    page.stop()
+
+
+def test_those_with_alarms_come_first_and_a_word_finds_one_by_keyboard(
+    url: str, book: SqliteBook, browser: Any
+) -> None:
+    watched = Watched(browser)
+    page = watched.page
+    page.add_init_script(HURRIED)
+    page.goto(url)  # leads to /fleet
+    rows = page.locator("#vehicles tr")
+    expect(page.locator("#said")).to_have_text("3 vehicles, 1 over a limit, 1 with an alarm.")
+    expect(rows).to_have_text([
+        re.compile(r"van-2620 ± 18\skg2,120\skg of 2,000\skgover the limit: whole vehicle20 min agoWhole vehicle too"),
+        re.compile(r"van-1WVWZZZ1KZAW000001200 ± 18\skg1,700\skg of 2,000\skg5 min ago"),
+        re.compile(r"van-10offlineunknownunknownunknown"),
+    ])  # fmt: skip
+    bars = page.locator(".bar span")
+    widths = [
+        bars.nth(n).bounding_box()["width"] / page.locator(".bar").nth(n).bounding_box()["width"] for n in range(2)
+    ]
+    assert widths == pytest.approx([1.0, 0.4], abs=0.01)
+    page.keyboard.press("Tab")
+    page.keyboard.type("kzaw")
+    expect(rows).to_have_count(1)
+    expect(page.locator("#said")).to_contain_text("1 of 3 shown")
+    book.write([alarm("van-1", 1, is_active=True)])
+    expect(rows.locator("li")).to_contain_text("Whole vehicle too heavy")
+    assert page.evaluate("document.activeElement.id") == "search"
+    assert {address.split("/")[2] for address in watched.addresses} == {url.split("/")[2]}
+    assert watched.complaints == []
+    page.close()
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_in_german_on_a_phone_and_on_a_desk(url: str, browser: Any, width: int, scheme: str) -> None:
+    watched = Watched(browser, locale="de-DE", color_scheme=scheme, viewport={"width": width, "height": 800})
+    page = watched.page
+    page.goto(f"{url}/fleet")
+    expect(page.locator("#said")).to_have_text("3 Fahrzeuge, 1 über einer Grenze, 1 mit Alarm.")
+    expect(page.locator("#vehicles tr").first).to_contain_text("2.120\u00a0kg von 2.000\u00a0kg")
+    assert not ENGLISH.search(page.locator("body").inner_text())
+    assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert watched.complaints == []
+    page.close()
+
+
+def test_a_service_that_is_gone_is_said(browser: Any, book: SqliteBook) -> None:
+    served = FleetPage(fleet_app(book.lines), "127.0.0.1", 0)
+    served.start()
+    watched = Watched(browser)
+    watched.page.add_init_script(HURRIED)
+    watched.page.goto(f"http://127.0.0.1:{served.port}/fleet")
+    expect(watched.page.locator("#vehicles tr")).to_have_count(3)
+    served.stop()
+    expect(watched.page.locator("#said")).to_have_text(re.compile("does not answer"))
+    expect(watched.page.locator("#vehicles tr")).to_have_count(3)
+    watched.page.close()

@@ -1,0 +1,135 @@
+"""The fleet's book in SQLite: every record once, the newest shown, nothing held up by what cannot be read."""
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.fleet import Message, SqliteBook, line_of
+
+NOW_S = 1_800_000_000.0
+UNREADABLE = (
+    ("van-1/estimates", b"no JSON \0"),
+    ("van-1/estimates", b"[]"),
+    ("van-1/estimates", b"{}"),
+    ("van-1/estimates", b'{"id": "a", "t_start": "soon", "t_end": "soon", "rejected": []}'),
+    ("van-1/estimates", b'{"id": "a", "t_end": "2027-01-15T07:55:00Z", "rejected": [], "weights": 7}'),
+    ("van-1/estimates", b'{"id": "a", "t_end": "2027-01-15T07:55:00Z", "rejected": [], "payload_kg": 1e999}'),
+    ("van-1/estimates", b'{"id": "a", "t_end": "2027-01-15T07:55:00Z", "rejected": [], "payload_kg": NaN}'),
+    ("van-1/alarms", b'{"id": "a", "revision": "one"}'),
+    ("van-1/status", b"{}"),
+    ("van-1/elsewhere", b"{}"),
+    ("van-1", b"{}"),
+    ("van-1/trips", b"[" * 100_000),
+)
+
+
+@pytest.fixture
+def book(tmp_path: Path) -> Iterator[SqliteBook]:
+    opened = SqliteBook(tmp_path / "fleet.sqlite", "springscale/+", lambda: NOW_S)
+    yield opened
+    opened.close()
+
+
+def message(vehicle: str, branch: str, **told: Any) -> Message:
+    return Message(f"springscale/{vehicle}/{branch}", json.dumps(told).encode())
+
+
+def estimate(vehicle: str, minute: int, payload_kg: float, *rejected: str, limit_kg: float = 2000.0) -> Message:
+    gross = {
+        "kg": 1500.0 + payload_kg,
+        "std_kg": 9.0,
+        "limit_kg": limit_kg,
+        "is_over_limit": payload_kg > limit_kg - 1500.0,
+    }
+    told: dict[str, Any] = {"payload_kg": payload_kg, "payload_std_kg": 9.0, "weights": {"gross": gross}}
+    answer = told if not rejected else {"payload_kg": None}
+    return message(
+        vehicle,
+        "estimates",
+        id=f"e-{minute}",
+        t_end=f"2027-01-15T07:{minute:02}:00Z",
+        rejected=list(rejected),
+        **answer,
+    )
+
+
+def alarm(vehicle: str, revision: int, *, is_active: bool) -> Message:
+    told = {
+        "kind": "overload",
+        "where": "gross",
+        "state": "final" if is_active else "cleared",
+        "t_start": "2027-01-15T07:50:00Z",
+    }
+    return message(vehicle, "alarms", id="alarm-1", revision=revision, is_active=is_active, **told)
+
+
+def test_a_line_is_of_the_newest_answer_however_late_an_older_one_comes(book: SqliteBook) -> None:
+    book.write([estimate("van-1", 55, 200.0), estimate("van-1", 50, 100.0), estimate("van-1", 58, 0.0, "too_slow")])
+    (line,) = book.lines()
+    assert (line.vehicle_id, line.payload_kg, line.gross_kg, line.over) == ("van-1", 200.0, 1700.0, [])
+    assert line.used_share == pytest.approx(200.0 / 500.0)
+    assert line.age_s == 300.0
+
+
+def test_what_comes_twice_is_one_row_and_the_highest_revision_stays(book: SqliteBook, tmp_path: Path) -> None:
+    book.write([estimate("van-1", 55, 600.0), alarm("van-1", 2, is_active=True)] * 2)
+    book.write([alarm("van-1", 1, is_active=False), estimate("van-1", 55, 1.0)])
+    (line,) = book.lines()
+    assert (line.payload_kg, line.over, [one.state for one in line.alarms]) == (600.0, ["gross"], ["final"])
+    assert line.used_share == pytest.approx(600.0 / 500.0)
+    book.write([alarm("van-1", 3, is_active=False)])
+    assert book.lines()[0].alarms == []
+    with sqlite3.connect(tmp_path / "fleet.sqlite") as looked:
+        assert looked.execute("SELECT count(*) FROM estimate").fetchone() == (1,)
+
+
+def test_a_death_leaves_what_the_birth_told(book: SqliteBook) -> None:
+    book.write([message("van-1", "status", state="online", vin="WVW1"), message("van-1", "status", state="offline")])
+    (line,) = book.lines()
+    assert (line.state, line.vin, line.payload_kg, line.age_s, line.used_share) == ("offline", "WVW1", None, None, None)
+
+
+def test_what_cannot_be_read_is_kept_and_holds_up_nothing(book: SqliteBook, tmp_path: Path) -> None:
+    book.write(
+        [*(Message(f"springscale/{topic}", payload) for topic, payload in UNREADABLE), estimate("van-2", 1, 5.0)]
+    )
+    assert book.counts == {"unreadable": len(UNREADABLE), "estimates": 1}
+    assert [line.vehicle_id for line in book.lines()] == ["van-2"]
+    with sqlite3.connect(tmp_path / "fleet.sqlite") as looked:
+        kept = looked.execute("SELECT payload FROM unreadable").fetchall()
+    assert kept == [(payload,) for _, payload in UNREADABLE]
+
+
+def test_it_is_there_after_a_restart(book: SqliteBook, tmp_path: Path) -> None:
+    book.write([estimate("van-1", 55, 200.0)])
+    again = SqliteBook(tmp_path / "fleet.sqlite", "springscale/+", lambda: NOW_S)
+    assert again.lines() == book.lines()
+    again.close()
+
+
+@given(
+    st.permutations(
+        [estimate("van-1", n, 10.0 * n) for n in range(4)] + [alarm("van-1", n, is_active=n < 3) for n in range(4)]
+    )
+)
+def test_order_of_arrival_leaves_no_trace(arrivals: list[Message]) -> None:
+    book = SqliteBook(Path(":memory:"), "springscale/+", lambda: NOW_S)
+    book.write(arrivals)
+    (line,) = book.lines()
+    book.close()
+    assert (line.payload_kg, line.alarms) == (30.0, [])
+
+
+def test_a_vehicle_that_is_too_heavy_empty_has_no_share_of_its_room() -> None:
+    told = {
+        "t_end": "2027-01-15T07:55:00Z",
+        "payload_kg": 100.0,
+        "weights": {"gross": {"kg": 2200.0, "limit_kg": 2000.0}},
+    }
+    assert line_of("van", None, told, (), NOW_S).used_share is None
