@@ -8,8 +8,8 @@ from importlib.resources import files
 
 import numpy as np
 import pandas as pd
+import springscale
 
-import gateway
 from gateway.workbench.demo_drive import demo_drive
 
 measured = demo_drive().recording  # 15 minutes empty, a stop to load 270 kg, 10 minutes loaded
@@ -17,10 +17,10 @@ t_s = measured.imu_t_ns / 1e9
 speed_mps = np.interp(t_s, measured.gps_t_ns / 1e9, measured.gps_speed_mps)  # one row of every array an instant
 
 # %% The vehicle's calibration file, as `springscale calibrate` writes it. Here that of the simulated van.
-calibration = gateway.load_calibration(str(files("gateway") / "demo" / "paper_van.json"))
+calibration = springscale.load_calibration(str(files("gateway") / "demo" / "paper_van.json"))
 
 # %% One estimate for every five minutes, rejected ones included with their reasons.
-estimates = gateway.estimate_arrays(
+estimates = springscale.estimate_arrays(
     t_s,
     vertical_acceleration_mps2=measured.accel_mps2[:, 2],
     pitch_rate_radps=measured.gyro_radps[:, 1],
@@ -30,6 +30,6 @@ estimates = gateway.estimate_arrays(
 )
 
 # %% A table.
-table = pd.DataFrame(map(gateway.table_row, estimates))
+table = pd.DataFrame(map(springscale.table_row, estimates))
 table["t_end"] = pd.to_datetime(table["t_end"])
 print(table[["t_end", "payload_kg", "payload_std_kg", "front_share_pct", "rejected"]].to_string(index=False))

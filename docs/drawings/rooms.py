@@ -14,7 +14,15 @@ MODULES: Final = ("setup", "config")  # single files that are drawn like rooms; 
 SHARED: Final = frozenset({"estimate_json", "files", "stated"})  # folders that are small and shared like those
 WIDTH: Final = 840
 MIDDLES: Final = {
-    **{"cli": 420.0, "service": 220.0, "reports": 430.0, "fleet": 660.0, "archive": 390.0, "offline": 570.0, "workbench": 750.0},
+    **{
+        "cli": 420.0,
+        "service": 220.0,
+        "reports": 430.0,
+        "fleet": 660.0,
+        "archive": 390.0,
+        "offline": 570.0,
+        "workbench": 750.0,
+    },
     **{"store": 85.0, "uplink": 223.0, "web": 361.0, "calibration": 515.0, "bus": 680.0},
     **{"setup": 390.0, "config": 240.0, "core": 400.0, "sim": 750.0},
 }

@@ -1,6 +1,10 @@
 """springscale estimate: logs to estimates, by the same pipeline as the service."""
 
+import csv
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import partial
+from io import StringIO
 from pathlib import Path
 
 import click
@@ -12,7 +16,8 @@ from gateway.cli.text.estimate import sentence
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.estimate_json import estimate_to_json
+from gateway.estimate import Estimate
+from gateway.estimate_json import COLUMNS, estimate_to_json, table_row
 from gateway.offline import estimates_of_logs
 from gateway.records import json_line
 from gateway.setup import Setup, load_setup, setup_of
@@ -30,6 +35,7 @@ from gateway.setup import Setup, load_setup, setup_of
 @one_estimator
 @window
 @as_json
+@click.option("--csv", "as_csv", is_flag=True, help="a table: one row a batch, the columns of the history's CSV")
 def estimate(
     logs: tuple[Path, ...],
     config_path: Path | None,
@@ -40,23 +46,55 @@ def estimate(
     estimator: str | None,
     window_s: float | None,
     as_json: bool,
+    as_csv: bool,
 ) -> None:
     """One line per batch of every LOG, rejected ones included with their reasons.
 
-    With several logs each line says of which it is: in front of the line, or as "log" in its JSON.
+    With several logs each line says of which it is: in front of the line, as "log" in its JSON, or in a first column.
     """
+    if as_json and as_csv:
+        raise click.UsageError("give --json or --csv, not both")
     if known_weights is not None and no_known_weights:
         raise click.UsageError("give --known-weights FILE or --no-known-weights, not both")
     setup, settings, state = prepared(config_path, signals, calibration, estimator, window_s)
     if not no_known_weights:
         setup = with_known_weights(setup, known_weights, state)
-    for log in logs:
-        for weighed in estimates_of_logs([log], setup, settings, on_read=_tell):
-            record = estimate_to_json(weighed)
-            if len(logs) == 1:
-                click.echo(json_line(record) if as_json else sentence(record))
-            else:
-                click.echo(json_line({"log": str(log), **record}) if as_json else f"{log}: {sentence(record)}")
+    lines = partial(_csv, has_logs=len(logs) > 1) if as_csv else _json_lines if as_json else _sentences
+    found = (
+        (log if len(logs) > 1 else None, weighed)
+        for log in logs
+        for weighed in estimates_of_logs([log], setup, settings, on_read=_tell)
+    )
+    for line in lines(found):
+        click.echo(line)
+
+
+Found = Iterable[tuple[Path | None, Estimate]]  # the log, where there are several
+
+
+def _sentences(found: Found) -> Iterator[str]:
+    for log, weighed in found:
+        text = sentence(estimate_to_json(weighed))
+        yield text if log is None else f"{log}: {text}"
+
+
+def _json_lines(found: Found) -> Iterator[str]:
+    for log, weighed in found:
+        record = estimate_to_json(weighed)
+        yield json_line(record if log is None else {"log": str(log), **record})
+
+
+def _csv(found: Found, *, has_logs: bool) -> Iterator[str]:
+    """The head line first; each row at once, so that a long log shows its estimates as they come."""
+    text = StringIO()
+    table = csv.DictWriter(text, ("log", *COLUMNS) if has_logs else COLUMNS, lineterminator="")
+    table.writeheader()
+    yield text.getvalue()
+    for log, weighed in found:
+        text.seek(0)
+        text.truncate()
+        table.writerow(table_row(weighed) | ({"log": str(log)} if has_logs else {}))
+        yield text.getvalue()
 
 
 def _tell(report: LogReport) -> None:

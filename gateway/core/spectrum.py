@@ -31,7 +31,7 @@ def segment_transforms(x: F64, starts: I64, n_segment: int, rate_hz: float) -> C
     (Welch 1967): summed over frequencies times their spacing it is the variance (Parseval). m is
     n_segment // 2 + 1; frequencies come from :func:`frequencies_hz`.
     """
-    segments = np.lib.stride_tricks.sliding_window_view(x, n_segment)[starts]
+    segments = x[starts[:, None] + np.arange(n_segment)]
     taper = np.hanning(n_segment + 1)[:-1]
     transforms = np.fft.rfft(_detrended(segments) * taper, axis=1)
     one_sided = np.full(transforms.shape[1], 2.0)

@@ -119,11 +119,11 @@ class SqliteBook:
         def records(statement: str) -> list[Any]:
             return [json.loads(text) for (text,) in self._database.execute(statement, (vehicle,)).fetchall()]
 
-        status = records("SELECT record FROM vehicle WHERE vehicle_id = ?")
-        latest = records(_LATEST)
-        return line_of(
-            vehicle, *(some[0] if some else None for some in (status, latest)), records(_STANDING), self._clock_s()
-        )
+        def only(statement: str) -> Any:
+            return next(iter(records(statement)), None)
+
+        status = only("SELECT record FROM vehicle WHERE vehicle_id = ?")
+        return line_of(vehicle, status, only(_LATEST), records(_STANDING), self._clock_s())
 
 
 def _row(vehicle: str, kind: str, told: Any) -> tuple[str, tuple[Any, ...]]:

@@ -26,6 +26,11 @@ def test_segments_lie_wholly_in_the_mask_and_fill_every_run(usable: Bool, n_segm
     assert set(run_starts[np.array(fitting, int) > 0]) <= set(starts)
 
 
+def test_a_signal_shorter_than_a_segment_has_no_spectrum() -> None:
+    none = segment_starts(np.ones(30, bool), 32, 16)
+    assert segment_transforms(np.zeros(30), none, 32, RATE_HZ).shape == (0, 17)
+
+
 @settings(max_examples=30, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), n_segment=st.integers(8, 257), scale=st.floats(1e-3, 1e3))
 def test_parseval(seed: int, n_segment: int, scale: float) -> None:

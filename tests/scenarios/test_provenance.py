@@ -1,5 +1,6 @@
 """Where a number comes from: the log of every line, and a calibration's id from its drives, not from file names."""
 
+import csv
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +11,7 @@ from support.known_load_logs import SIGNALS, write_known_loads
 
 from gateway.calibration.file import load_calibration
 from gateway.cli import springscale
+from gateway.estimate_json import COLUMNS
 
 WINDOW = ("--window-s", "100")
 
@@ -56,3 +58,18 @@ def test_every_line_of_several_logs_says_of_which_it_is(campaign: Path) -> None:
     assert [{key: part for key, part in record.items() if key != "log"} for record in together] == alone
     lines = run("estimate", *logs, *asked).stdout.splitlines()
     assert [line.split(": ")[0] for line in lines] == [record["log"] for record in together]
+
+
+def test_a_table_has_a_row_a_batch_and_the_columns_of_the_history(campaign: Path) -> None:
+    logs = [str(campaign.parent / name) for name in ("01.log", "02.log")]
+    asked = ("--signals", SIGNALS, *WINDOW)
+    records = [json.loads(line) for line in run("estimate", *logs, *asked, "--json").stdout.splitlines()]
+    rows = list(csv.DictReader(run("estimate", *logs, *asked, "--csv").stdout.splitlines()))
+    assert list(rows[0]) == ["log", *COLUMNS]
+    assert [row["log"] for row in rows] == [record["log"] for record in records]
+    assert [row["payload_kg"] for row in rows] == [str(record["payload_kg"] or "") for record in records]
+    (head, *_) = run("estimate", logs[0], *asked, "--csv").stdout.splitlines()
+    assert head == ",".join(COLUMNS)
+    both = CliRunner().invoke(springscale, ["estimate", *logs, *asked, "--csv", "--json"])
+    assert both.exit_code == 2
+    assert "not both" in both.output

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import springscale
 from support.drives import T0_NS, drive, steady
 from support.patience import PATIENCE_S
 
@@ -41,6 +42,12 @@ def test_importing_it_imports_nothing_of_weight() -> None:
         [sys.executable, "-c", command], capture_output=True, text=True, timeout=PATIENCE_S, check=True
     ).stdout
     assert said.strip() == "['gateway']"
+
+
+def test_springscale_is_the_same_package_under_the_name_that_users_know() -> None:
+    assert springscale.load_calibration is gateway.load_calibration
+    assert set(springscale.__all__) == set(gateway.__all__)
+    assert set(dir(springscale)) == set(dir(gateway))
 
 
 def test_every_public_name_is_there_and_told_in_the_page() -> None:

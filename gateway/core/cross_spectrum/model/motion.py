@@ -88,8 +88,10 @@ class _Suspension:
     """Springs, and beside them dampers on their elastic mounts: ``rate``, and its slopes by damper and mount."""
 
     def __init__(self, spring: F64, damper: F64, mount: F64, omega: F64) -> None:
-        self._turn, self._mount, self._damped = 1j * omega, mount, 1j * omega * damper
-        self._yields = 1.0 / (1.0 + self._damped / mount)
+        self._mount = mount
+        self._turn: C128 = np.multiply(1j, omega)
+        self._damped: C128 = self._turn * damper
+        self._yields: C128 = 1.0 / (1.0 + self._damped / mount)
         self.rate = spring + self._damped * self._yields
 
     @property
@@ -99,8 +101,8 @@ class _Suspension:
 
     @property
     def by_mount(self) -> C128:
-        slope: C128 = (self._damped * self._yields / self._mount) ** 2
-        return slope
+        root: C128 = self._damped * self._yields / self._mount
+        return root * root
 
 
 class _Axles:
@@ -236,7 +238,8 @@ class Motion:
         d_ff, d_rr, d_fr = stiffness[0, 0] - inertia[0], stiffness[0, 1] - inertia[1], -inertia[2]
         if len(inertia) == 3:
             per_determinant = 1.0 / (d_ff * d_rr - d_fr**2)
-            return np.stack([d_rr, -d_fr, -d_fr, d_ff]).reshape(2, 2, *d_ff.shape) * per_determinant
+            solved: C128 = np.stack([d_rr, -d_fr, -d_fr, d_ff]).reshape(2, 2, *d_ff.shape) * per_determinant
+            return solved
         d_pp = stiffness[1, 0] + stiffness[1, 1] - inertia[5]
         coupled = stiffness[2] - inertia[3:5]
         by_f, by_r = coupled / d_pp
@@ -245,21 +248,25 @@ class Motion:
         e_ff, e_rr, e_fr = d_rr * per_determinant, d_ff * per_determinant, -d_fr * per_determinant
         e_fp, e_rp = -by_f * e_ff - by_r * e_fr, -by_f * e_fr - by_r * e_rr
         e_pp = 1.0 / d_pp - by_f * e_fp - by_r * e_rp
-        return np.stack([e_ff, e_fr, e_fp, e_fr, e_rr, e_rp, e_fp, e_rp, e_pp]).reshape(3, 3, *e_ff.shape)
+        rows = [e_ff, e_fr, e_fp, e_fr, e_rr, e_rp, e_fp, e_rp, e_pp]
+        return np.reshape(np.stack(rows), (3, 3, *e_ff.shape))
 
     def _body(self, compliance: C128) -> C128:
         """(c, s, ..., m)."""
         force = self._axles.force
-        together = compliance[:, :2] * force[0]
+        together: C128 = compliance[:, :2] * force[0]
         if len(compliance) == 2:
             return together
         roll = compliance[:, 2, None]
         against = compliance[:, :2] * force[2] + roll * force[1]
-        return np.concatenate([together + roll * force[2], against], axis=1)
+        both: C128 = np.concatenate([together + roll * force[2], against], axis=1)
+        return both
 
     def _late(self) -> C128:
         """A gyro's rate by the angle that it measures."""
-        return 1j * self._omega * np.exp(-1j * self._omega * self._numbers.group(SENSOR)[1])
+        turn: C128 = np.multiply(1j, self._omega)
+        late: C128 = turn * np.exp(-turn * self._numbers.group(SENSOR)[1])
+        return late
 
     def _rows(self, n_sensors: int) -> C128:
         """(p, c, ..., m) what the sensors read of each coordinate."""

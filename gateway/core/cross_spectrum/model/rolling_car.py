@@ -115,7 +115,7 @@ def _axle_numbers(car: RollingCar, load: SidewaysLoad) -> list[tuple[Real, ...]]
         strict=True,
     ):
         sides = np.stack(np.broadcast_arrays(added_kg, added_kg + 2.0 * moved_kg, added_kg - 2.0 * moved_kg))
-        spring, left, right = spring_npm(axle, sides)
+        spring, left, right = np.asarray(spring_npm(axle, sides))
         found.append((*axle_numbers(axle, spring), left - right, against.damper, against.anti_roll_npm))
     return found
 

@@ -111,7 +111,8 @@ def _by_response(by: Driven, moved: Paths, model: SpectralModel) -> SpectralMatr
     slack, back = (1.0 + model.slack)[:, None, None], np.conj(by.phase)
     changed = SpectralMatrix.zeros(len(model.slack), moved[0].shape[1:])
     power_by = np.zeros(moved[0].shape, np.complex128)
-    for way, share in enumerate((1.0,) if by.twist is None else (1.0, by.twist)):
+    shares: tuple[float | F64, ...] = (1.0,) if by.twist is None else (1.0, by.twist)
+    for way, share in enumerate(shares):
         front, rear = share * by.paths[2 * way], share * by.paths[2 * way + 1]
         for own, other, d in ((front, by.phase * rear, moved[2 * way]), (rear, back * front, moved[2 * way + 1])):
             power_by += np.conj(slack * own[:, None] + other[:, None]) * d
