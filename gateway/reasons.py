@@ -123,7 +123,7 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         Why.GRAVITY_MISSING: Explanation(
             Cause.SENSORS,
             "the mean vertical acceleration is far from 9.81 m/s2",
-            "wrong axis, sign or unit in the signal map, or the device has removed gravity",
+            "wrong axis, sign, unit or scaling in the signal map, or the device has removed gravity",
         ),
         Why.TIME_STAMPS: Explanation(
             Cause.SENSORS,

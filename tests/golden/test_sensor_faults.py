@@ -59,7 +59,7 @@ def test_a_sound_drive_is_weighed(lines: dict[tuple[str, str], dict[str, Any]]) 
 @pytest.mark.parametrize(
     ("fault", "strength", "why"),
     [
-        ("acceleration times", "1.2", Why.SENSOR_CHANGED),
+        ("acceleration times", "1.2", Why.GRAVITY_MISSING),
         ("pitch rate turned over", "", Why.WRONG_SIGN),
         ("speed frozen", "", Why.SPEED_FROZEN),
     ],
