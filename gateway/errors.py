@@ -13,6 +13,10 @@ class ConfigurationError(SpringscaleError):
     exit_code = 2
 
 
+class NothingWeighedError(SpringscaleError):
+    """Logs were read, and no batch in them gave an estimate."""
+
+
 class UntrustedFileError(ConfigurationError):
     """A file that must be signed is not, or by nobody who is trusted, or was changed afterwards."""
 

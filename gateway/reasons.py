@@ -167,7 +167,8 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         Why.MODEL_MISFIT: Explanation(
             Cause.ANSWER,
             "no payload and share explain these spectra as well as calibration leads to expect",
-            "look for a changed tyre, spring or sensor mount; calibrate anew",
+            "make sure that the calibration is this vehicle's; look for a changed tyre, spring or sensor mount; "
+            "calibrate anew",
         ),
         Why.NO_SOLUTION: Explanation(
             Cause.ANSWER,

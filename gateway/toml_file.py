@@ -1,9 +1,11 @@
 """TOML files that people write: read, checked against a model, every fault named with its file and key."""
 
 import tomllib
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
 from math import isnan
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -11,6 +13,8 @@ from gateway.errors import ConfigurationError, UntrustedFileError
 from gateway.files.signed import Read
 
 Model = TypeVar("Model", bound=BaseModel)
+
+SIMILAR: Final = 0.7  # of difflib's ratio: a letter too many, too few or another one, or a unit left out
 
 _BEYOND: Final = {  # pydantic's type of fault -> (its words, the bound's name in the fault)
     "less_than_equal": ("is above", "le"),
@@ -66,18 +70,18 @@ def checked(
     try:
         return model.model_validate(tables)
     except ValidationError as fault:
-        raise error(describe_faults(path, fault)) from None
+        raise error(describe_faults(path, fault, model)) from None
 
 
-def describe_faults(where: Path | str, fault: ValidationError) -> str:
-    """One line a fault: file, key, what is wrong and what stands there.
+def describe_faults(where: Path | str, fault: ValidationError, model: type[BaseModel]) -> str:
+    """One line a fault of ``model``: file, key, what is wrong and what stands there.
 
     A list is not reported as too short when the missing entries are already reported as wrong.
     """
     faults = fault.errors(include_url=False)
     within = {each["loc"][:n] for each in faults for n in range(len(each["loc"]))}
     told = (each for each in faults if each["type"] != "too_short" or each["loc"] not in within)
-    return "\n".join(f"{where}: {_key(each['loc'])}: {_what(dict(each))}" for each in told)
+    return "\n".join(f"{where}: {_key(each['loc'])}: {_what(dict(each), model)}" for each in told)
 
 
 def _key(location: tuple[int | str, ...]) -> str:
@@ -87,9 +91,11 @@ def _key(location: tuple[int | str, ...]) -> str:
     return key or "(file)"
 
 
-def _what(fault: dict[str, Any]) -> str:
+def _what(fault: dict[str, Any], model: type[BaseModel]) -> str:
     if fault["type"] == "extra_forbidden":
-        return "unknown key; remove it or check its spelling"
+        *table, key = fault["loc"]
+        meant = get_close_matches(str(key), _keys_of(model, table), 1, SIMILAR)
+        return f"unknown key; did you mean {meant[0]}?" if meant else "unknown key; remove it or check its spelling"
     if fault["type"] == "missing":
         return "missing; it must be given"
     if fault["type"] in _BEYOND:
@@ -97,6 +103,23 @@ def _what(fault: dict[str, Any]) -> str:
     message = fault["msg"].removeprefix("Value error, ")
     shown = repr(fault.get("input"))
     return message if fault["type"] == "value_error" or len(shown) > 60 else f"{message} (it says {shown})"
+
+
+def _keys_of(model: type[BaseModel], table: Sequence[int | str]) -> list[str]:
+    """The keys that the table at this place may have; where there is a choice of models, those of all of them."""
+    models = [model]
+    for part in table:
+        fields = [one.model_fields[part] for one in models if isinstance(part, str) and part in one.model_fields]
+        inner = [found for each in fields for found in _models_in(each.annotation)]
+        models = inner or models  # an index, or a name that the writer chose, leads no deeper
+    return [key for one in models for key in one.model_fields]
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)
 
 
 def _beyond(fault: dict[str, Any]) -> str:

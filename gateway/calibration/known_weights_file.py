@@ -173,5 +173,5 @@ def known_weights_of(content: bytes, path: Path | str) -> KnownWeights:
         return KnownWeights.model_validate_json(content)
     except ValidationError as fault:
         raise ConfigurationError(
-            f"{describe_faults(path, fault)}: restore it, or remove it to go on without known weights"
+            f"{describe_faults(path, fault, KnownWeights)}: restore it, or remove it to go on without known weights"
         ) from None

@@ -4,6 +4,7 @@ import os
 import sys
 import threading
 from contextlib import suppress
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -43,6 +44,8 @@ _ROOMS |= {"campaign": "logs", "events": "logs", "feed": "logs", "import": "logs
 _NAMES = {"import": "import_recording"}  # a word of the language names no module
 
 
+INTERRUPTED = 130  # 128 and the number of SIGINT, as shells have it
+
 # What a vehicle does without: the extra "workbench", in Debian a package of its own.
 _WORKBENCH = frozenset({"matplotlib", "numba", "plotly"})
 _DEBIAN_TREE = Path("/usr/lib/springscale")
@@ -64,6 +67,24 @@ class _Lazy(click.Group):
         command: click.Command = getattr(import_module(f"gateway.cli{room}.{name}"), name)
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click does; for a name that there is not, the one that was probably meant."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as fault:
+            if meant := get_close_matches(args[0], _COMMANDS, 1):
+                raise click.UsageError(f"{fault.message.rstrip('.')}: did you mean {meant[0]}?", ctx) from None
+            raise
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Ctrl-C ends quietly, with the exit code of a process that SIGINT ended."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            ctx.exit(INTERRUPTED)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list of --help, without importing anything."""
         with formatter.section("Commands"):
@@ -71,11 +92,11 @@ class _Lazy(click.Group):
 
 
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(version("springscale"), prog_name="springscale")
+@click.version_option(version("springscale"), "-V", "--version", prog_name="springscale")
 def springscale() -> None:
     """Weighs a vehicle by listening to its springs.
 
-    Exit codes: 0 done, 1 the work failed, 2 a wrong option or configuration.
+    Exit codes: 0 done, 1 the work failed, 2 a wrong option or configuration, 130 interrupted.
     """
 
 

@@ -1,6 +1,7 @@
 """springscale estimate: logs to estimates, by the same pipeline as the service."""
 
 import csv
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -15,11 +16,12 @@ from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, wi
 from gateway.cli.text.estimate import sentence
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
-from gateway.errors import ConfigurationError
+from gateway.errors import ConfigurationError, NothingWeighedError
 from gateway.estimate import Estimate
 from gateway.estimate_json import COLUMNS, estimate_to_json, table_row
 from gateway.offline import estimates_of_logs
-from gateway.records import json_line
+from gateway.reasons import EXPLANATIONS
+from gateway.records import Why, json_line
 from gateway.setup import Setup, load_setup, setup_of
 
 
@@ -51,6 +53,7 @@ def estimate(
     """One line per batch of every LOG, rejected ones included with their reasons.
 
     With several logs each line says of which it is: in front of the line, as "log" in its JSON, or in a first column.
+    Where a calibration is given and no batch could be weighed, it says why and ends with 1.
     """
     if as_json and as_csv:
         raise click.UsageError("give --json or --csv, not both")
@@ -60,16 +63,31 @@ def estimate(
     if not no_known_weights:
         setup = with_known_weights(setup, known_weights, state)
     lines = partial(_csv, has_logs=len(logs) > 1) if as_csv else _json_lines if as_json else _sentences
-    found = (
-        (log if len(logs) > 1 else None, weighed)
-        for log in logs
-        for weighed in estimates_of_logs([log], setup, settings, on_read=_tell)
-    )
-    for line in lines(found):
+    reasons = Counter[Why | None]()
+
+    def found() -> Found:
+        for log in logs:
+            for weighed in estimates_of_logs([log], setup, settings, on_read=_tell):
+                reasons.update(weighed.rejected or [None])
+                yield log if len(logs) > 1 else None, weighed
+
+    for line in lines(found()):
         click.echo(line)
+    if setup.calibration is not None and not reasons.pop(None, 0):
+        raise NothingWeighedError(_in_words(reasons))
 
 
 Found = Iterable[tuple[Path | None, Estimate]]  # the log, where there are several
+
+
+def _in_words(reasons: Counter[Why | None]) -> str:
+    """Why not one batch was weighed, the most frequent reason first, and what to do about each."""
+    lines = ["nothing was weighed" + ("" if reasons else ": there is no batch in these logs")]
+    for why, n in reasons.most_common():
+        if why is not None:
+            told = EXPLANATIONS[why]
+            lines.append(f"  {why} ({n} batch{'es' * (n > 1)}): {told.happened}. What to do: {told.advice}.")
+    return "\n".join(lines)
 
 
 def _sentences(found: Found) -> Iterator[str]:

@@ -236,7 +236,7 @@ def load_settings(path: Path, trusted_keys: Path | None = None) -> Settings:
     try:
         settings = Settings(**tables)
     except ValidationError as fault:
-        raise ConfigurationError(describe_faults(path, fault)) from None
+        raise ConfigurationError(describe_faults(path, fault, Settings)) from None
     trust = TrustSection(public_keys=(*pinned.public_keys, *settings.trust.public_keys))
     return _with_absolute_paths(settings.model_copy(update={"trust": trust}), path.resolve().parent)
 

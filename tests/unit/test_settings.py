@@ -73,7 +73,9 @@ def test_a_fault_in_the_environment_is_named(tmp_path: Path, monkeypatch: pytest
 FAULTS = [
     ("", "signals: missing"),
     (LEAST + "colour = 1", "colour: unknown key"),
-    (LEAST + "[batch]\nwindow = 300", "batch.window: unknown key"),
+    (LEAST + "[batch]\nwindow = 300", "batch.window: unknown key; did you mean window_s?"),
+    (LEAST + '[uplinc]\nbroker = "b"', "uplinc: unknown key; did you mean uplink?"),
+    (LEAST + "[limits]\nfront_axle_kg = 1", "limits: unknown key; "),
     (LEAST + "[batch]\nwindow_s = 5.0", "batch.window_s: "),
     (LEAST + "[batch]\nstandstill_s = inf", "batch.standstill_s: "),
     (LEAST + "[batch]\nusable_share_min = 60", "batch.usable_share_min: "),

@@ -40,4 +40,4 @@ def vehicle_table(said: VehicleAnswers, name: str, of_the_line: Mapping[str, Any
         named = {"name": said.name.strip() or name}
         return VehicleTable.model_validate(sprung.vehicle_keys() | dict(of_the_line) | typed | named)
     except ValidationError as fault:
-        raise CampaignError(describe_faults("the vehicle that follows", fault)) from None
+        raise CampaignError(describe_faults("the vehicle that follows", fault, VehicleTable)) from None

@@ -128,7 +128,7 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
     except ValidationError as fault:
-        raise CalibrationFileError(describe_faults(path, fault)) from None
+        raise CalibrationFileError(describe_faults(path, fault, CalibrationFile)) from None
     return held
 
 

@@ -83,7 +83,7 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
         held = LineFile.model_validate({key: part for key, part in content.items() if key != "id"})
         held.line.require_known()
     except ValidationError as fault:
-        raise CalibrationFileError(describe_faults(path, fault)) from None
+        raise CalibrationFileError(describe_faults(path, fault, LineFile)) from None
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
     return held

@@ -123,7 +123,7 @@ def load_record(directory: Path) -> Record:
     except OSError as fault:
         raise ConfigurationError(f"{path}: cannot be read: {fault.strerror or fault}") from None
     except ValidationError as fault:
-        raise ConfigurationError(describe_faults(path, fault)) from None
+        raise ConfigurationError(describe_faults(path, fault, Record)) from None
 
 
 def save_record(directory: Path, record: Record) -> None:
