@@ -150,8 +150,8 @@ def _days_section(days: Mapping[str, Any]) -> list[str]:
     return [
         "## On delivery days",
         "",
-        f"The {days['n_days']} simulated days of [load events](events.md): vans that are not quite as they were "
-        f"calibrated, eight stops, legs of one or two batches. Each day is held against limits of {limits} % of the "
+        f"The {days['n_days']} simulated days of `python -m benchmarks.accuracy delivery`: vans that are not quite as "
+        f"they were calibrated, eight stops, legs of one or two batches. Each day is held against limits of {limits} % of the "
         "rated payload in turn; what counts is how the alarm of the gross weight stands at the end of each leg that "
         "was weighed.",
         "",
@@ -160,7 +160,8 @@ def _days_section(days: Mapping[str, Any]) -> list[str]:
         *(_day_row(line) for line in days["lines"]),
         "",
         "What was confirmed stays so through later legs, until their load says no. Where nobody said what the vans "
-        "carry, they may weigh too little ([load events](events.md#the-shape-of-the-load)); no rule of an alarm mends "
+        "carry, they may weigh too little "
+        "([the shape of a load](method.md#weighing-gatewaycorecross_spectrumestimatorpy)); no rule of an alarm mends "
         "that.",
         "",
     ]
