@@ -152,8 +152,8 @@ def _days_section(days: Mapping[str, Any]) -> list[str]:
         "",
         f"The {days['n_days']} simulated days of `python -m benchmarks.accuracy delivery`: vans that are not quite as "
         f"they were calibrated, eight stops, legs of one or two batches. Each day is held against limits of "
-        f"{limits} % of the rated payload in turn; what counts is how the alarm of the gross weight stands at the end of each leg that "
-        "was weighed.",
+        f"{limits} % of the rated payload in turn; what counts is how the alarm of the gross weight stands at the end "
+        "of each leg that was weighed.",
         "",
         "| campaign says | the true payload is | legs | no alarm | told early | confirmed |",
         "|---|---|---|---|---|---|",

@@ -112,7 +112,7 @@ def test_a_silent_sensor_is_told_after_a_while_and_for_sure_later(bench: AlarmBe
     assert look(1200.0, State.READER_FAULT) == [("silent", "final")]
     assert [step["detail"] for step in bench.history()[0]["steps"]] == ["pitch_rate", "can0 is down"]
     assert look(1201.0, State.ESTIMATING) == []
-    assert bench.history()[0]["sentence"] == "Not heard: can0 is down (over)"
+    assert bench.history()[0]["sentence"] == "Not heard: can0 is down (ended)"
 
 
 def test_drift_is_final_at_once_and_judged_only_when_it_was_judged_anew(bench: AlarmBench) -> None:

@@ -120,7 +120,7 @@ def test_a_side_that_bears_too_much() -> None:
     (alarm,) = watch.weigh(found, VAN)
     assert (alarm.cause.name, alarm.state) == ("imbalance.left_right", AlarmState.EARLY)
     assert alarm.steps[-1].figure.found == pytest.approx(60.0)
-    assert sentence(alarm) == "One side bears 60 +- 1 %, 55 % are the most"
+    assert sentence(alarm) == "One side bears 60 +- 1 %, limit 55 %"
 
 
 def test_an_axle_that_bears_too_much_of_the_whole() -> None:
