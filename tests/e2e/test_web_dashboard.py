@@ -154,7 +154,7 @@ def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width:
     )
     expect(page.locator("#spectra-of")).to_contain_text("Abschnitt bis 1. Jan. 1970, 00:20")
     page.evaluate("document.getElementById('commissioning').remove()")
-    for fold in page.locator("button.fold").all():
+    for fold in page.locator("button.fold:visible").all():
         fold.click()
     for summary in page.locator("summary:visible").all():
         summary.click()

@@ -61,4 +61,5 @@ export const COMMON = {
   "reason.too_uncertain": ["too uncertain", "zu unsicher"],
   "reason.ambiguous": ["ambiguous", "mehrdeutig"],
   "reason.model_misfit": ["model misfit", "Modell passt nicht"],
+  "reason.no_solution": ["no solution", "keine Lösung"],
 };

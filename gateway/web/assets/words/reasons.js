@@ -30,6 +30,7 @@ export const REASONS_DE = {
   too_uncertain: ["das Intervall wäre zu breit, um zu nützen", "mit ähnlicheren Ladungen kalibrieren; länger oder auf rauerer Straße fahren"],
   ambiguous: ["zwei weit auseinanderliegende Ladungen erklären diese Spektren etwa gleich gut", "weiterfahren, auf anderer Straße oder mit anderer Geschwindigkeit; mit mehr Ladungen kalibrieren"],
   model_misfit: ["keine Nutzlast erklärt diese Spektren so gut, wie die Kalibrierung erwarten lässt", "nach geänderten Reifen, Federn oder Sensorhaltern suchen; neu kalibrieren"],
+  no_solution: ["die Suche nach der Ladung kam zu keinem Ende, oder ihre Zahlen gingen nicht auf", "nichts, wenn es selten ist; sonst ansehen, was die Sensoren senden, und neu kalibrieren"],
 };
 
 export const SOURCES_DE = {
