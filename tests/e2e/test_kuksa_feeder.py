@@ -212,7 +212,7 @@ def test_a_value_that_the_databroker_refuses_holds_nothing_else_up(tmp_path: Pat
         gateway.publish(make_estimate(4))
         assert wait_until(lambda: PAYLOAD in broker.refused)
         assert wait_until(lambda: broker.now[PAYLOAD] is None)  # and not the 103 kg of before
-        assert wait_until(lambda: known - {PAYLOAD} == {p for p, value in broker.now.items() if value is not None})
+        assert wait_until(lambda: known - {PAYLOAD} <= {p for p, value in broker.now.items() if value is not None})
     assert f"refuses {PAYLOAD} = 104" in (tmp_path / "log").read_text()
 
 

@@ -57,7 +57,7 @@ def test_empty_now_is_stated_and_taken_back_after_a_question(
         expect(page.get_by_role("dialog")).to_be_hidden()
         expect(page.locator("#weights-in-use")).to_have_text("1; without them estimates were +12 kg off")
         expect(page.locator("#weights-said")).to_have_text("Kept. It counts from the next batch on.")
-        page.get_by_text("All that were stated").click()
+        page.get_by_text("All stated weights").click()
         expect(page.locator("#weights-entries li")).to_contain_text("empty: 0 ± 20 kg known, 12 ± ")
         expect(page.locator("#weights-entries li")).to_contain_text("by local (yard); in use")
         page.get_by_role("button", name="Take back: empty").click()
@@ -130,7 +130,7 @@ def test_a_refusal_is_told_where_it_was_asked(gateway: Gateway, bench: KnownWeig
         expect(page.get_by_role("alert")).to_contain_text("it was weighed 1000 s ago")
         page.get_by_role("button", name="Cancel", exact=True).click()
         gateway.publish(make_estimate(0))  # news, whatever they are
-        expect(page.locator("#weights-offer")).to_contain_text("not possible: it was weighed 1000 s ago")
+        expect(page.locator("#weights-offer")).to_contain_text("Not possible: the last weighing is too old.")
         expect(page.locator("#weights-empty")).to_be_disabled()
         gateway.board.close()
 

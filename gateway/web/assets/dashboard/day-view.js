@@ -11,7 +11,7 @@ const HEIGHT = 130;
 const FLOOR = 108; // of the bars
 const CEILING = 20;
 const LEAST_WIDTH = 3;
-const LETTER_PX = 9; // of a label: as wide as its widest digit
+const LETTER_PX = 10; // of a label, on average: a bold sign is wider than a digit
 const SURE = 0.99;
 const SVG = "http://www.w3.org/2000/svg";
 

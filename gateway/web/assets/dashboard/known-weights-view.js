@@ -18,8 +18,8 @@ function inUse({ n_teaching, mean_error_kg, error_std_kg }) {
   return phrase("weights_some", { n: n_teaching, error: signed(mean_error_kg, 0, "kg"), scatter });
 }
 
-function offered({ is_possible, detail, load }) {
-  return is_possible ? phrase("offer", { kg: payload(load), span: span(load) }) : phrase("no_offer", { detail });
+function offered({ is_possible, reason, load }) {
+  return is_possible ? phrase("offer", { kg: payload(load), span: span(load) }) : phrase(`no_offer.${reason}`);
 }
 
 function stateText(one) {

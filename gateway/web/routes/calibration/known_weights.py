@@ -23,7 +23,7 @@ TARE_PATH: Final = "/calibration/tare"
 TICKETS_PATH: Final = "/calibration/tickets"
 EMPTY: Final = (KnownWeightKind.EMPTY,)
 WEIGHED: Final = tuple(kind for kind in KnownWeightKind if kind is not KnownWeightKind.EMPTY)
-_NO_CALIBRATION: Final = ("no_calibration", "there is no calibration, and so nothing to correct")
+_NO_CALIBRATION: Final = ("no_calibration", "no calibration is loaded, so there is nothing to correct")
 _NO_SUCH: Final = ("no_such_weight", "there is no such known weight that still stands")
 
 
