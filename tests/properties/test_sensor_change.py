@@ -49,12 +49,28 @@ def test_a_sensor_that_nobody_touched_is_believed(calibration: CrossSpectrumCali
     assert told["sensor_noise_score"] < 4.0
 
 
-@pytest.mark.parametrize("moved_m", [-0.2, 0.2])
-def test_a_sensor_moved_along_the_vehicle_is_told(calibration: CrossSpectrumCalibration, moved_m: float) -> None:
+def moved(moved_m: float, calibration: CrossSpectrumCalibration) -> Estimate:
     elsewhere = replace(CAR, sensor_position_m=CAR.sensor_position_m + moved_m)
-    estimate = weighed(batch_over_road(*LOAD, seed=61, car=elsewhere), calibration)
-    assert estimate.rejected == (Why.SENSOR_CHANGED,)
+    return weighed(batch_over_road(*LOAD, seed=61, car=elsewhere), calibration)
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "why"), [(-0.3, Why.SENSOR_CHANGED), (-0.2, Why.SENSOR_CHANGED), (0.3, Why.MODEL_MISFIT)]
+)
+def test_a_sensor_moved_along_the_vehicle_is_told(
+    calibration: CrossSpectrumCalibration, moved_m: float, why: Why
+) -> None:
+    estimate = moved(moved_m, calibration)
+    assert estimate.rejected == (why,)
     assert np.sign(estimate.diagnostics["sensor_position_score"]) == np.sign(moved_m)
+
+
+def test_a_sensor_moved_forward_a_little_reads_as_a_longer_load(calibration: CrossSpectrumCalibration) -> None:
+    """One batch cannot tell the two apart; the payload's interval holds both, the front share's does not."""
+    estimate = moved(0.2, calibration)
+    low, high = estimate.payload.interval95
+    assert low < LOAD[0] < high
+    assert high - low > 300.0
 
 
 def test_what_does_not_come_through_the_springs_is_told_as_noise(calibration: CrossSpectrumCalibration) -> None:

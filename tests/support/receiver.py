@@ -107,7 +107,11 @@ class Receiver:
         return list(dict.fromkeys(letter_id for letter_id, _ in self.taken))
 
     def _receive(self, request: BaseHTTPRequestHandler) -> None:
-        body = request.rfile.read(int(request.headers["Content-Length"]))
+        length = int(request.headers["Content-Length"])
+        body = request.rfile.read(length)
+        if len(body) < length:  # the sender was killed while it wrote
+            request.close_connection = True
+            return
         letter_id = request.headers["webhook-id"]
         if (fault := why_wrong(request.headers, body)) is not None:
             self.wrong.append(fault)

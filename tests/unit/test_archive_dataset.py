@@ -42,6 +42,7 @@ def test_every_field_of_an_estimate_is_a_column_but_its_spectra() -> None:
         "way",
         "error_budget",
         "posterior",
+        "epoch_posterior",
         "measured_posterior",
     }
     assert list(page.DIAGNOSTICS) == list(DIAGNOSTICS)
