@@ -90,6 +90,7 @@ class Event(StrEnum):
     COMMISSIONING = "commissioning"
     COMMISSIONED = "commissioned"
     COMMISSIONING_CANCELLED = "commissioning cancelled"
+    COMMISSIONING_CONFIRMED = "commissioning doubt confirmed"
     COMMISSIONING_UNDONE = "commissioning undone"
     COMMISSIONING_NOT_KEPT = "commissioning not kept"
     COMMISSIONING_SET_ASIDE = "broken commissioning set aside"

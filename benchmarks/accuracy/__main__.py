@@ -20,6 +20,7 @@ from benchmarks.accuracy import budget as on_budget
 from benchmarks.accuracy import coverage as on_coverage
 from benchmarks.accuracy import delivery as on_delivery
 from benchmarks.accuracy import disturbances as on_disturbances
+from benchmarks.accuracy import false_facts as on_false_facts
 from benchmarks.accuracy import faults as on_faults
 from benchmarks.accuracy import phones as on_phones
 from benchmarks.accuracy import sensitivity as on_sensitivity
@@ -218,6 +219,22 @@ def siblings(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
     with counted("calibrating lines and driving their siblings") as on_line:
         found = on_siblings.siblings(n_vans, seed, workers=workers, on_van=on_line).to_json()
     _hand_out("siblings", found, siblings_page(found), output)
+
+
+@studies.command("false-facts")
+@click.option("--lines", "n_lines", type=click.IntRange(min=1), default=on_false_facts.N_LINES, show_default=True)
+@click.option("--right", "n_right", type=click.IntRange(min=1), default=on_false_facts.N_RIGHT, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=on_false_facts.SEED, show_default=True)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
+@_output
+def false_facts(n_lines: int, n_right: int, seed: int, workers: int, output: Path | None) -> None:
+    """Which false facts does commissioning catch, and does it let true ones pass? ~3 minutes a line."""
+    with counted("commissioning simulated vans") as on_line:
+        tried = on_false_facts.false_facts(n_lines, n_right, seed, workers=workers, on_van=on_line)
+    for line in on_false_facts.each_line(tried):
+        click.echo(line, err=True)
+    found = tried.to_json()
+    _hand_out("false-facts", found, on_false_facts.false_facts_page(found), output)
 
 
 @studies.command("phones")

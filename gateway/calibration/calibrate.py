@@ -9,6 +9,7 @@ from importlib.metadata import version
 import numpy as np
 
 from gateway.calibration.campaign import Campaign, file_sha256
+from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file import (
     CalibrationFile,
     CrossSpectrumPart,
@@ -30,18 +31,23 @@ from gateway.calibration.ratio_index import BandChoice, RatioIndexFit, Structure
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch
+from gateway.stated.doubt import Doubt
 
 OnFit = Callable[[str, int, int], None]  # (estimator, steps done, steps in all)
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A calibration file with all that stands behind it. What an estimator did not give is None."""
+    """A calibration file with all that stands behind it. What an estimator did not give is None.
+
+    ``doubts`` are of facts that the campaign states of the vehicle and that its drives contradict.
+    """
 
     file: CalibrationFile
     inspection: Inspection
     ratio_index: RatioIndexFit | None = None
     cross_spectrum: CrossSpectrumFit | None = None
+    doubts: tuple[Doubt, ...] = ()
 
     @property
     def split(self) -> tuple[SplitRun, ...]:
@@ -77,6 +83,10 @@ def calibrate_inspected(
     runs = [one.identification for one in split]
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
     ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, line, bands, structure, on_fit)
+    doubts = (
+        contradictions(runs, campaign.vehicle, cross_spectrum.calibration, inherited=line) if cross_spectrum else ()
+    )
+    warnings += [f"{one.kind}: {one.sentence}" for one in doubts]
     file = CalibrationFile(
         vehicle=VehiclePart(**asdict(campaign.vehicle)),
         seen=_seen(runs, counted, line.seen if line and cross_spectrum else None),
@@ -87,7 +97,7 @@ def calibrate_inspected(
         warnings=(*inspection.warnings, *warnings),
         provenance=_provenance(campaign, split, command),
     )
-    return Outcome(file, inspection, ratio_index, cross_spectrum)
+    return Outcome(file, inspection, ratio_index, cross_spectrum, doubts)
 
 
 def _fit(

@@ -69,6 +69,12 @@ class Scheduler:
         """The newest stamp of the drive that is under way; None between drives. Safe from any thread."""
         return self._newest_ns
 
+    @property
+    def open_window_ns(self) -> tuple[int, int] | None:
+        """Where the open window begins, and the newest stamp in it; None between drives. Safe from any thread."""
+        newest_ns = self._newest_ns
+        return None if newest_ns is None else (self._window_start_ns, max(self._window_start_ns, newest_ns))
+
     def take_rows(self) -> Motion:
         """Those that the batch yielded last was made of, and maybe some beyond its window; given once."""
         rows, self._rows_of_last = self._rows_of_last, None

@@ -35,6 +35,7 @@ class FakeDrives:
 
     drive_start_ns: int | None = None
     newest_ns: int | None = None
+    open_window_ns: tuple[int, int] | None = None
 
 
 class FakeWorker:

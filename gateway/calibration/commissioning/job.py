@@ -6,6 +6,7 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.calibration.campaign import VehicleTable
+from gateway.stated.doubt import Doubt
 
 JOB: Final = "job.json"
 RESULT: Final = "result.json"
@@ -77,6 +78,7 @@ class Result(_Table):
     calibration: str | None = None
     calibration_id: str | None = None
     warnings: tuple[str, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
     fault: str | None = None
     seconds: float = 0.0
     most_memory_mb: float = 0.0

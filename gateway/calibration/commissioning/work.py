@@ -64,6 +64,7 @@ def _made(outcome: Outcome, campaign: Campaign, job: Job) -> dict[str, object]:
         "calibration": outcome.file.to_json(),
         "calibration_id": outcome.file.id,
         "warnings": outcome.file.warnings,
+        "doubts": outcome.doubts,
     }
 
 

@@ -88,6 +88,7 @@ def _verdict(assessment: Assessment, judgement: Judgement, expected: Expected | 
     if assessment.outcome:
         verdicts = assessment.outcome.inspection.verdicts
         reasons += [*_runs(verdicts), *_labels(verdicts), *_campaign(assessment.outcome)]
+        reasons += [Reason("facts", Grade.UNFIT, _sentence(one.sentence)) for one in assessment.outcome.doubts]
     return Verdict(judgement.estimator, (*reasons, *_warnings(assessment, judgement.estimator)))
 
 
@@ -224,6 +225,7 @@ def _warnings(assessment: Assessment, estimator: str) -> Iterator[Reason]:
     skipped = [f"{name}: " for name in ESTIMATOR_NAMES if name != estimator]
     if assessment.outcome:
         skipped += ["run ", *(f"{finding.kind}: " for finding in assessment.outcome.inspection.findings)]
+        skipped += [f"{one.kind}: " for one in assessment.outcome.doubts]
     for warning in assessment.file.warnings:
         if not warning.startswith(tuple(skipped)):
             yield Reason("warning", Grade.RESERVED, _WARNING_TEXT.get(warning, warning))
@@ -259,6 +261,10 @@ def _labels(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
     if doubted:
         text = f"The other runs weigh {_listed(doubted)} otherwise than the campaign file says: correct the load, or "
         yield Reason("labels", Grade.UNFIT, f"{text}calibrate without (--runs).")
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -2,9 +2,9 @@
 
 import time
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
-from gateway.calibration.commissioning import vehicle_table
+from gateway.calibration.commissioning import doubts_of, vehicle_table
 from gateway.calibration.kept import KeptBatch, Shelf
 from gateway.errors import CampaignError, CommissioningRefusedError
 from gateway.log import Event
@@ -13,10 +13,12 @@ from gateway.service.commissioning.book import Book, OnEvent
 from gateway.service.commissioning.drive import EmptyDrive, MakeWorker, Vehicle
 from gateway.service.commissioning.jobs import Jobs
 from gateway.service.commissioning.lines import Lines, require_alike
-from gateway.service.commissioning.record import EmptyClaim, Ended, LineChoice, Source, Underway
-from gateway.service.commissioning.steps import Present, Step, lines_told, step_of, told
+from gateway.service.commissioning.record import Confirmed, EmptyClaim, Ended, LineChoice, Source, Underway
+from gateway.service.commissioning.steps import OpenWindow, Present, Step, lines_told, step_of, told
 from gateway.service.commissioning.worker import Worker
 from gateway.stated import VehicleAnswers
+from gateway.stated.doubt import OF_THE_DRIVE, meant_by
+from gateway.units import NS_PER_S
 
 UPLOADED: Final = "uploaded"
 
@@ -32,6 +34,11 @@ class Drives(Protocol):
     @property
     def newest_ns(self) -> int | None:
         """The newest stamp of that drive."""
+        ...
+
+    @property
+    def open_window_ns(self) -> tuple[int, int] | None:
+        """Where its open window begins, and the newest stamp in it."""
         ...
 
 
@@ -52,6 +59,7 @@ class Commissioning:
     ) -> None:
         """Reads what was under way, to go on with it. ``make_worker`` stands in for the process that fits."""
         self._lines, self._drives, self._vehicle = lines, drives, vehicle
+        self._window_s = jobs.batch.window_s
         self._book = Book(jobs.directory, on_event, clock_ns)
         active = self._book.record.active
         self._started_with = active.id if active else None
@@ -136,21 +144,38 @@ class Commissioning:
                 choice, content = self._lines.choose(name, source or UPLOADED)
                 self._book.write(str(choice.copy_name), content)
             self._require_alike(choice, underway.vehicle)
-            self._book.keep(underway.model_copy(update={"line": choice, "learned": None, "fault": None}))
+            self._book.keep(underway.model_copy(update={"line": choice} | _anew(underway.vehicle, choice)))
             self._drive.fit()
             return self.told()
 
     def state_vehicle(self, answers: VehicleAnswers) -> str:
-        """What was typed."""
+        """What was typed. What is unlikely of it is asked about, and nothing goes on until that is confirmed."""
         with self._book.lock:
             underway = self._underway(Step.VEHICLE)
-            self._require_alike(underway.line or LineChoice(name=""), answers)
-            self._book.keep(underway.model_copy(update={"vehicle": answers, "learned": None, "fault": None}))
+            line = underway.line or LineChoice(name="")
+            self._require_alike(line, answers)
+            self._book.keep(underway.model_copy(update={"vehicle": answers} | _anew(answers, line)))
             self._drive.fit()
             return self.told()
 
-    def is_empty(self, by: str) -> str:
-        """From now on it is driven empty."""
+    def confirm(self, by: str) -> str:
+        """Every doubt that is open is answered: it is so all the same. One that a fit showed puts that fit to use."""
+        with self._book.lock:
+            underway = self._underway(Step.VEHICLE)
+            doubts = underway.open_doubts
+            if not doubts:
+                raise CommissioningRefusedError("nothing_doubted", "nothing is asked: there is nothing to confirm")
+            kinds = tuple(dict.fromkeys(one.kind for one in doubts))
+            confirmed = Confirmed(at=self._book.now(), by=by, kinds=kinds)
+            is_of_drive = any(kind in OF_THE_DRIVE for kind in kinds)
+            change = {"confirmed": (*underway.confirmed, confirmed), "is_fit_asked": is_of_drive}
+            self._book.keep(underway.model_copy(update=change))
+            self._book.tell(Event.COMMISSIONING_CONFIRMED, {"doubts": list(kinds), "by": by})
+            self._drive.fit()
+            return self.told()
+
+    def is_empty(self, by: str, *, again: bool = False) -> str:
+        """From now on it is driven empty; ``again`` forgets what was driven so far."""
         with self._book.lock:
             underway = self._underway(Step.EMPTY)
             if self._drive.looked is not None and self._drive.looked.has_fault:
@@ -163,8 +188,9 @@ class Commissioning:
             claim = EmptyClaim(
                 at=self._book.now(), by=by, drive_start_ns=self._drives.drive_start_ns, newest_ns=self._drives.newest_ns
             )
-            if underway.empty is None:
-                self._book.keep(underway.model_copy(update={"empty": claim}))
+            if underway.empty is None or again:
+                self._drive.forget()
+                self._book.keep(underway.model_copy(update={"empty": claim} | _not_driven(underway)))
                 self._book.tell(Event.COMMISSIONING, {"step": Step.DRIVE, "by": by})
             return self.told()
 
@@ -203,8 +229,20 @@ class Commissioning:
             self._book.tell(Event.COMMISSIONING_UNDONE, {"calibration_ids": [one.id for one in chosen], "by": by})
             return self.told()
 
+    def _window(self) -> OpenWindow | None:
+        """Of the empty drive: one that had begun before the claim does not count, but the next one does."""
+        underway, window_ns, window_s = self._book.record.underway, self._drives.open_window_ns, self._window_s
+        drive_start_ns = self._drives.drive_start_ns
+        if underway is None or underway.empty is None or window_ns is None or drive_start_ns is None:
+            return None
+        open_s = (window_ns[1] - window_ns[0]) / NS_PER_S
+        if underway.empty.covers(drive_start_ns, window_ns[0]):
+            return OpenWindow(open_s, max(0.0, window_s - open_s))
+        return OpenWindow(0.0, max(0.0, 2.0 * window_s - open_s))
+
     def _present(self) -> Present:
         return Present(
+            window=self._window(),
             why_not_allowed=self._vehicle.why_not_allowed,
             is_calibrated=self._vehicle.is_calibrated,
             is_busy=self._drive.is_busy,
@@ -232,10 +270,27 @@ class Commissioning:
         try:
             table = vehicle_table(answers, self._vehicle.name)
         except CampaignError as fault:
-            raise CommissioningRefusedError("vehicle_unusable", str(fault)) from None
+            meant = meant_by(doubts_of(answers, line.facts))
+            raise CommissioningRefusedError("vehicle_unusable", f"{fault}{meant}") from None
         if line.copy_name is not None:
-            require_alike(self._book.directory / line.copy_name, table)
+            try:
+                require_alike(self._book.directory / line.copy_name, table)
+            except CommissioningRefusedError as fault:
+                meant = meant_by(doubts_of(answers, line.facts))
+                raise CommissioningRefusedError(fault.reason, f"{fault}{meant}") from None
 
     def _require_allowed(self) -> None:
         if self._vehicle.why_not_allowed is not None:
             raise CommissioningRefusedError("not_allowed", self._vehicle.why_not_allowed)
+
+
+def _anew(answers: VehicleAnswers | None, line: LineChoice) -> dict[str, Any]:
+    """What begins anew with another answer: the doubts about it, and what was made of the drive so far."""
+    doubts = () if answers is None else doubts_of(answers, line.facts)
+    return {"doubts": doubts, "confirmed": (), "learned": None, "fault": None}
+
+
+def _not_driven(underway: Underway) -> dict[str, Any]:
+    """As before the first window."""
+    doubts = underway.with_doubts_of_drive(())
+    return {"batches": (), "open_batch": None, "learned": None, "fault": None, "doubts": doubts}

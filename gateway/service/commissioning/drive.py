@@ -55,11 +55,11 @@ class EmptyDrive:
 
     @property
     def driven_s(self) -> float:
-        """Of the windows that count, the open one as far as it has come."""
+        """Of the windows that are whole and count."""
         underway = self._book.record.underway
         if underway is None:
             return 0.0
-        mine = {*underway.batches, *([underway.open_batch] if underway.open_batch else [])}
+        mine = set(underway.batches)
         return sum(entry.duration_s for entry in self._shelf.entries() if entry.id in mine)
 
     def stop(self) -> None:
@@ -136,6 +136,8 @@ class EmptyDrive:
         underway = self._book.record.underway
         if underway is None or underway.vehicle is None or underway.line is None or not underway.batches:
             return
+        if underway.is_vehicle_doubted:
+            return
         there = {entry.id: entry for entry in self._shelf.entries()}
         files = [
             BatchFile(self._shelf.path(there[one]), there[one].t_start_ns, there[one].t_end_ns)
@@ -184,10 +186,12 @@ class EmptyDrive:
         """Put a fit to use where enough is known, or somebody asked for it; else drive on."""
         has_enough = result.learned is not None and result.learned.is_enough
         is_wanted = underway.is_fit_asked or (has_enough and len(underway.batches) >= LEAST_BATCHES)
-        if result.calibration is None or result.calibration_id is None or not is_wanted:
+        doubts = underway.with_doubts_of_drive(result.doubts)
+        doubted = underway.model_copy(update={"doubts": doubts})
+        if result.calibration is None or result.calibration_id is None or not is_wanted or doubted.open_doubts:
             fault = result.fault or result.refusal
             change = {"learned": result.learned, "fault": fault, "is_fit_asked": False}
-            self._book.keep(underway.model_copy(update=change))
+            self._book.keep(doubted.model_copy(update=change))
             return
         name = self._book.write_calibration(result.calibration, result.calibration_id)
         line = underway.line or LineChoice(name="")
@@ -201,7 +205,7 @@ class EmptyDrive:
             vehicle=self._table(vehicle, line),
             batches=underway.batches,
             learned=result.learned,
-            warnings=result.warnings,
+            warnings=(*result.warnings, *(one.sentence for one in doubts if one not in result.doubts)),
         )
         self._book.save(self._book.record.with_made(made))
         with suppress(OSError):

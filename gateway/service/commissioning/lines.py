@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.calibration.campaign import VehicleTable
-from gateway.calibration.commissioning import OF_THE_LINE
+from gateway.calibration.commissioning import OF_THE_LINE, LineFacts
 from gateway.calibration.file import CalibrationFile, LikeFile, line_of_files, load_like
 from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError, LineError
 from gateway.files.kept import KeptFiles
@@ -70,7 +70,16 @@ class Lines:
         copy_name = f"line-{hashlib.sha256(content).hexdigest()[:16]}.json"
         figures = _figures(held)
         shared = {key: figures[key] for key in OF_THE_LINE if figures.get(key) is not None}
-        return LineChoice(name=name, id=held.id, source=source, copy_name=copy_name, shared=shared), content
+        choice = LineChoice(
+            name=name,
+            id=held.id,
+            source=source,
+            copy_name=copy_name,
+            shared=shared,
+            facts=_facts(held),
+            figures=_form(held),
+        )
+        return choice, content
 
     def upload(self, name: str, content: str, signature: str | None) -> LineFound:
         """Keep a file under this name; on disk when this returns. Raises CommissioningRefusedError."""
@@ -144,3 +153,24 @@ def _figures(held: LikeFile) -> dict[str, object]:
         "wheelbase_m": held.line.wheelbase_m,
         "payload_range_kg": [0.0, most_kg] if most_kg > 0.0 else None,
     }
+
+
+def _form(held: LikeFile) -> dict[str, object]:
+    """Of ``_figures``, what sisters have in common."""
+    common = ("wheelbase_m", "track_width_m", "payload_range_kg", "kerb_front_axle_kg", "kerb_rear_axle_kg")
+    return {name: figure for name, figure in _figures(held).items() if name in common and figure is not None}
+
+
+def _facts(held: LikeFile) -> LineFacts:
+    """What of it typed answers are held against."""
+    if not isinstance(held, CalibrationFile):
+        line = held.line
+        return LineFacts(sprung_kg=line.empty_mass_kg, wheelbase_m=line.wheelbase_m)
+    sister = held.vehicle
+    front_kg, rear_kg = sister.kerb_front_axle_kg, sister.kerb_rear_axle_kg
+    return LineFacts(
+        sprung_kg=sister.empty_mass_kg,
+        wheelbase_m=sister.wheelbase_m,
+        axles_kg=None if front_kg is None or rear_kg is None else (front_kg, rear_kg),
+        track_width_m=sister.track_width_m,
+    )

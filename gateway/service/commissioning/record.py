@@ -7,11 +7,12 @@ from typing import Any, Final, Literal
 from pydantic import Field, ValidationError
 
 from gateway.calibration.campaign import VehicleTable
-from gateway.calibration.commissioning import Learned
+from gateway.calibration.commissioning import NO_LINE, Learned, LineFacts
 from gateway.calibration.file.parts import Part
 from gateway.errors import ConfigurationError
 from gateway.files.kept import KeptFiles
 from gateway.stated import VehicleAnswers
+from gateway.stated.doubt import OF_THE_DRIVE, Doubt, DoubtKind
 from gateway.toml_file import describe_faults
 
 FILE_NAME: Final = "commissioning.json"
@@ -24,7 +25,8 @@ Source = Literal["package", "administrator", "uploaded"]
 class LineChoice(Part):
     """The line that was chosen. ``copy_name`` is its copy in the service's folder, None for no line at all.
 
-    ``shared`` is what it says of the vehicle of which nothing was typed.
+    ``shared`` is what it says of the vehicle of which nothing was typed, ``facts`` what typed answers are held against,
+    ``figures`` what a form may be filled with.
     """
 
     name: str
@@ -32,6 +34,8 @@ class LineChoice(Part):
     source: Source | None = None
     copy_name: str | None = None
     shared: dict[str, Any] = Field(default_factory=dict)
+    facts: LineFacts = NO_LINE
+    figures: dict[str, Any] = Field(default_factory=dict)
 
 
 class EmptyClaim(Part):
@@ -49,6 +53,14 @@ class EmptyClaim(Part):
         return t_start_ns >= self.newest_ns
 
 
+class Confirmed(Part):
+    """Doubts that somebody has answered: it is so all the same."""
+
+    at: str
+    by: str
+    kinds: tuple[DoubtKind, ...]
+
+
 class Underway(Part):
     """A commissioning that has begun and not ended."""
 
@@ -64,6 +76,23 @@ class Underway(Part):
     learned: Learned | None = None
     is_fit_asked: bool = False
     fault: str | None = Field(None, description="why the last fit made no calibration")
+    doubts: tuple[Doubt, ...] = Field((), description="about what was typed, and about what the last fit shows")
+    confirmed: tuple[Confirmed, ...] = ()
+
+    @property
+    def open_doubts(self) -> tuple[Doubt, ...]:
+        """Those that nobody has confirmed."""
+        confirmed = {kind for one in self.confirmed for kind in one.kinds}
+        return tuple(one for one in self.doubts if one.kind not in confirmed)
+
+    @property
+    def is_vehicle_doubted(self) -> bool:
+        """Whether what was typed is asked about still."""
+        return any(one.kind not in OF_THE_DRIVE for one in self.open_doubts)
+
+    def with_doubts_of_drive(self, found: tuple[Doubt, ...]) -> tuple[Doubt, ...]:
+        """Those of what was typed, and ``found`` in the place of what an earlier fit showed."""
+        return (*(one for one in self.doubts if one.kind not in OF_THE_DRIVE), *found)
 
 
 class Ended(Part):

@@ -9,6 +9,7 @@ from gateway.calibration.commissioning import Learned
 from gateway.calibration.commissioning.job import Found
 from gateway.service.commissioning.lines import LineFound
 from gateway.service.commissioning.record import Made, Record, Underway
+from gateway.stated.doubt import OF_THE_DRIVE, Doubt
 
 
 class Step(StrEnum):
@@ -25,7 +26,7 @@ def step_of(underway: Underway) -> Step:
     """The first that is not answered yet."""
     if underway.line is None:
         return Step.LINE
-    if underway.vehicle is None:
+    if underway.vehicle is None or underway.is_vehicle_doubted:
         return Step.VEHICLE
     if underway.empty is None:
         return Step.EMPTY
@@ -46,6 +47,14 @@ class Looked:
 
 
 @dataclass(frozen=True, slots=True)
+class OpenWindow:
+    """The window that is being driven: how much of it counts so far, and how long until the next one that counts."""
+
+    counted_s: float
+    next_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Present:
     """What is not on disk: how things are at this moment."""
 
@@ -54,6 +63,7 @@ class Present:
     is_busy: bool
     driven_s: float
     looked: Looked | None
+    window: OpenWindow | None  # None between drives, and before the vehicle is called empty
     started_with: str | None  # the calibration of ``Record.active`` at the service's start
 
 
@@ -85,8 +95,11 @@ def _underway(underway: Underway, present: Present) -> dict[str, Any]:
         "begun_at": underway.begun_at,
         "by": underway.by,
         "note": underway.note,
-        "line": None if underway.line is None else underway.line.model_dump(include={"name", "id", "source"}),
+        "line": None
+        if underway.line is None
+        else underway.line.model_dump(include={"name", "id", "source"}) | {"vehicle": dict(underway.line.figures)},
         "vehicle": None if underway.vehicle is None else underway.vehicle.model_dump(mode="json"),
+        "empty": None if underway.empty is None else underway.empty.model_dump(include={"at", "by"}),
         "inspection": None
         if looked is None
         else {
@@ -95,11 +108,19 @@ def _underway(underway: Underway, present: Present) -> dict[str, Any]:
             "findings": [found.model_dump() for found in looked.findings],
         },
         "n_batches": len(underway.batches),
-        "driven_s": present.driven_s,
+        "driven_s": present.driven_s + (present.window.counted_s if present.window else 0.0),
+        "next_window_s": present.window.next_s if present.window else None,
+        "doubts": [_doubt(one) for one in underway.open_doubts],
+        "confirmed": [_doubt(one) for one in underway.doubts if one not in underway.open_doubts],
         "learned": _learned(underway.learned),
         "is_fitting": present.is_busy,
         "fault": underway.fault,
     }
+
+
+def _doubt(doubt: Doubt) -> dict[str, Any]:
+    said = {"is_of_drive": doubt.kind in OF_THE_DRIVE, "text": doubt.text, "advice": doubt.advice}
+    return doubt.model_dump(mode="json") | said
 
 
 def _learned(learned: Learned | None) -> dict[str, Any] | None:

@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.stated import VehicleAnswers
+from gateway.stated.doubt import DoubtKind
 from gateway.web.schemas import Body
 
 Source = Literal["package", "administrator", "uploaded"]
@@ -38,6 +39,8 @@ class VehicleBody(Body, VehicleAnswers):
 class ClaimEmpty(Body):
     """The claim that the drive rests on."""
 
+    again: bool = Field(False, description="forget what was driven so far: it was not empty then")
+
     is_empty: Literal[True] = Field(description="you know that the vehicle is empty, and will be until this is over")
 
 
@@ -57,6 +60,33 @@ class LineTold(BaseModel):
     name: str
     id: str | None
     source: Source | None
+
+
+class ChosenLine(LineTold):
+    """The same with what of it a form may be filled with."""
+
+    vehicle: dict[str, object]
+
+
+class DoubtTold(BaseModel):
+    """A fact that is unlikely to be true: nothing goes on until it is corrected or confirmed.
+
+    ``numbers`` are those of the text, ``meant`` the answers that would leave no doubt, where one slip explains it.
+    """
+
+    kind: DoubtKind
+    numbers: dict[str, float]
+    meant: dict[str, float | tuple[float, float]]
+    is_of_drive: bool = Field(description="the drive contradicts what was stated; false: what was typed is unusual")
+    text: str
+    advice: str
+
+
+class EmptyTold(BaseModel):
+    """Who said that the vehicle is empty, and when."""
+
+    at: str = Field(json_schema_extra={"format": "date-time"})
+    by: str
 
 
 class FindingTold(BaseModel):
@@ -93,11 +123,15 @@ class UnderwayTold(BaseModel):
     begun_at: str = Field(json_schema_extra={"format": "date-time"})
     by: str
     note: str | None
-    line: LineTold | None
+    line: ChosenLine | None
     vehicle: VehicleAnswers | None
+    empty: EmptyTold | None = Field(description="null: nobody has said that it is empty")
+    doubts: list[DoubtTold] = Field(description="what is asked still")
+    confirmed: list[DoubtTold] = Field(description="what was asked and confirmed")
     inspection: InspectionTold | None = Field(description="null: nothing was driven yet")
     n_batches: int = Field(description="of the empty drive that count")
     driven_s: float = Field(description="seconds in them, the open one as far as it has come")
+    next_window_s: float | None = Field(description="until the next one counts; null: it stands")
     learned: LearnedTold | None = Field(description="null: before the first batch is fitted")
     is_fitting: bool
     fault: str | None = Field(description="why the last fit made no calibration")

@@ -36,7 +36,8 @@ class CommissioningDesk(Protocol):
     def upload(self, name: str, content: str, signature: str | None) -> str: ...
     def choose_line(self, name: str | None, source: Source | None) -> str: ...
     def state_vehicle(self, answers: VehicleAnswers) -> str: ...
-    def is_empty(self, by: str) -> str: ...
+    def confirm(self, by: str) -> str: ...
+    def is_empty(self, by: str, *, again: bool = False) -> str: ...
     def fit_now(self, by: str) -> str: ...
     def cancel(self, by: str) -> str: ...
     def undo(self, by: str, *, to_factory: bool) -> str: ...
@@ -83,14 +84,22 @@ def commissioning_router(desk: CommissioningDesk) -> APIRouter:
 
     @router.post("/vehicle", response_model=CommissioningState, responses=of_body)
     async def state_vehicle(request: Request, said: VehicleBody) -> Response:
-        """What the empty vehicle weighs, its wheelbase, and where the sensor sits. May be answered anew as well."""
+        """What the empty vehicle weighs, its wheelbase, and where the sensor sits. May be answered anew as well.
+
+        Answers that are unlikely are kept and asked about (``doubts``): correct them, or confirm.
+        """
         answers = VehicleAnswers(**said.model_dump(exclude_unset=True))
         return await answered(request, lambda: desk.state_vehicle(answers))
 
+    @router.post("/confirm", response_model=CommissioningState, responses=refusals)
+    async def confirm_doubts(request: Request) -> Response:
+        """Every doubt that is open: it is so all the same. One that the drive raised puts its fit to use."""
+        return await answered(request, lambda: desk.confirm(who(request)))
+
     @router.post("/empty", response_model=CommissioningState, responses=of_body)
-    async def claim_empty(request: Request, _said: ClaimEmpty) -> Response:
+    async def claim_empty(request: Request, said: ClaimEmpty) -> Response:
         """It is empty now: what is driven from now on counts, until enough is known."""
-        return await answered(request, lambda: desk.is_empty(who(request)))
+        return await answered(request, lambda: desk.is_empty(who(request), again=said.again))
 
     @router.post("/fit", response_model=CommissioningState, responses=refusals)
     async def fit_now(request: Request) -> Response:

@@ -1,0 +1,126 @@
+"""Unlikely answers are asked about before anything is driven, with what was probably meant; true ones are not."""
+
+from typing import Any
+
+import pytest
+
+from gateway.calibration.commissioning import LineFacts, doubts_of
+from gateway.stated import VehicleAnswers
+from gateway.stated.doubt import WORDS, Doubt, DoubtKind, meant_by
+
+VAN: dict[str, Any] = {
+    "kerb_front_axle_kg": 713.0,
+    "kerb_rear_axle_kg": 704.0,
+    "wheelbase_m": 2.8,
+    "sensor_position_m": 3.2,
+    "sensor_offset_left_m": 0.3,
+    "track_width_m": 1.5,
+    "payload_range_kg": (0.0, 450.0),
+    "gross_limit_kg": 1900.0,
+}
+SISTER = LineFacts(sprung_kg=1254.0, wheelbase_m=2.8, axles_kg=(700.0, 710.0), track_width_m=1.5)
+NO_LINE = LineFacts()
+
+
+def asked(line: LineFacts, **changes: Any) -> tuple[Doubt, ...]:
+    return doubts_of(VehicleAnswers(**VAN | changes), line)
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind", "meant"),
+    [
+        ({"kerb_front_axle_kg": 71.3}, DoubtKind.MASS, {"kerb_front_axle_kg": 713.0}),
+        ({"kerb_rear_axle_kg": 7040.0}, DoubtKind.MASS, {"kerb_rear_axle_kg": 704.0}),
+        (
+            {"kerb_front_axle_kg": 71.3, "kerb_rear_axle_kg": 70.4},
+            DoubtKind.MASS,
+            {"kerb_front_axle_kg": 713.0, "kerb_rear_axle_kg": 704.0},
+        ),
+        (
+            {"kerb_front_axle_kg": 1572.0, "kerb_rear_axle_kg": 1552.0},
+            DoubtKind.MASS,
+            {"kerb_front_axle_kg": 713.0, "kerb_rear_axle_kg": 704.0},
+        ),
+        ({"kerb_front_axle_kg": 404.0, "kerb_rear_axle_kg": 1013.0}, DoubtKind.FRONT_SHARE, {}),
+        (
+            {"kerb_front_axle_kg": 460.0, "kerb_rear_axle_kg": 900.0},
+            DoubtKind.FRONT_SHARE,
+            {"kerb_front_axle_kg": 900.0, "kerb_rear_axle_kg": 460.0},
+        ),
+        ({"wheelbase_m": 9.19}, DoubtKind.WHEELBASE, {"wheelbase_m": 2.801}),
+        ({"sensor_position_m": 12.6}, DoubtKind.SENSOR_PLACE, {"sensor_position_m": 1.26}),
+        ({"sensor_offset_left_m": 1.4}, DoubtKind.SENSOR_SIDE, {"sensor_offset_left_m": 0.14}),
+        ({"track_width_m": 0.59}, DoubtKind.TRACK, {}),
+        ({"payload_range_kg": (0.0, 4500.0)}, DoubtKind.PAYLOAD, {"payload_range_kg": (0.0, 450.0)}),
+        ({"payload_range_kg": (0.0, 600.0)}, DoubtKind.PAYLOAD_LIMIT, {}),
+        ({"gross_limit_kg": 1.9}, DoubtKind.GROSS_LIMIT, {"gross_limit_kg": 1900.0}),
+        ({"front_axle_limit_kg": 700.0}, DoubtKind.AXLE_LIMIT, {}),
+        ({"unsprung_front_kg": 400.0}, DoubtKind.UNSPRUNG, {}),
+        ({"empty_mass_kg": 1500.0, "empty_front_share_pct": 50.0}, DoubtKind.SPRUNG, {}),
+        ({"payload_length_m": 24.0}, DoubtKind.LOAD_LENGTH, {"payload_length_m": 2.4}),
+        ({"payload_height_m": 4.0}, DoubtKind.LOAD_HEIGHT, {"payload_height_m": 0.4}),
+    ],
+)
+def test_what_vehicles_are_not_like_is_asked_about(
+    changes: dict[str, Any], kind: DoubtKind, meant: dict[str, Any]
+) -> None:
+    if changes.get("payload_length_m"):
+        changes = {"payload_length_m": 20.0}
+        meant = {"payload_length_m": 2.0}
+    if changes.get("sensor_position_m"):
+        assert asked(NO_LINE, **changes)[0].meant == meant
+    found = asked(NO_LINE, **changes)
+    assert kind in {one.kind for one in found}
+    assert all(one.meant == meant for one in found)
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({"kerb_front_axle_kg": 850.0, "kerb_rear_axle_kg": 840.0}, DoubtKind.LINE_MASS),
+        ({"kerb_front_axle_kg": 570.0, "kerb_rear_axle_kg": 850.0}, DoubtKind.LINE_AXLES),
+        ({"track_width_m": 1.7}, DoubtKind.LINE_TRACK),
+    ],
+)
+def test_what_the_line_is_not_like_is_asked_about(changes: dict[str, Any], kind: DoubtKind) -> None:
+    assert [one.kind for one in asked(SISTER, **changes)] == [kind]
+    assert asked(NO_LINE, **changes) == ()
+
+
+@pytest.mark.parametrize("line", [NO_LINE, SISTER], ids=["no line", "a sister"])
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"kerb_front_axle_kg": 740.0}, {"sensor_position_m": -0.6}, {"sensor_offset_left_m": -0.7}],
+)
+def test_a_van_as_it_is_passes(line: LineFacts, changes: dict[str, Any]) -> None:
+    assert asked(line, **changes) == ()
+
+
+@pytest.mark.parametrize(
+    ("front_kg", "rear_kg", "wheelbase_m"),
+    [
+        (380.0, 500.0, 1.87),  # a city car, its engine behind
+        (800.0, 500.0, 2.62),
+        (1250.0, 1150.0, 2.59),
+        (1350.0, 1050.0, 4.33),
+        (1950.0, 2150.0, 3.44),
+        (2400.0, 1600.0, 4.2),
+        (4600.0, 3400.0, 6.0),
+    ],
+)
+def test_cars_vans_and_trucks_pass(front_kg: float, rear_kg: float, wheelbase_m: float) -> None:
+    said = VehicleAnswers(
+        kerb_front_axle_kg=front_kg, kerb_rear_axle_kg=rear_kg, wheelbase_m=wheelbase_m, sensor_position_m=1.0
+    )
+    assert doubts_of(said) == ()
+
+
+def test_a_doubt_is_a_sentence_with_the_question_at_its_end() -> None:
+    (first, *_) = asked(NO_LINE, kerb_front_axle_kg=71.3)
+    assert first.text == "775 kg empty on a wheelbase of 2.8 m: such vehicles weigh 862 to 2979 kg"
+    assert first.sentence.endswith("in kilograms; did you mean kerb_front_axle_kg = 713?")
+    assert meant_by(()) == ""
+
+
+def test_every_kind_has_words() -> None:
+    assert set(WORDS) == set(DoubtKind)
