@@ -29,7 +29,7 @@ from gateway.sim.vans import VANS
 from gateway.sim.vehicle import Load
 from gateway.stated import DIVISION_KG, VehicleAnswers
 
-SEED: Final = 20301
+SEED: Final = 20303
 N_LINES: Final = 3
 N_RIGHT: Final = 20
 POUNDS_PER_KG: Final = 1.0 / 0.45359237
@@ -295,5 +295,6 @@ def _by(row: Mapping[str, Any]) -> str:
 
 
 def each_line(found: FalseFacts) -> Iterator[str]:
-    """What passed though it was false, for a terminal."""
+    """What passed though it was false, and what was asked about though it was true, for a terminal."""
     yield from (f"passed: {one.words}, line {one.has_line}" for one in found.false if one.caught_by == PASSED)
+    yield from (f"asked: {one.caught_by}, line {one.has_line}" for one in found.right if one.caught_by != PASSED)

@@ -99,12 +99,11 @@ WORDS: Final[Mapping[DoubtKind, tuple[str, str]]] = MappingProxyType(
             _PAPERS,
         ),
         DoubtKind.GROSS_LIMIT: (
-            "a permitted gross weight of {limit_kg:.0f} kg: the vehicle weighs {gross_kg:.0f} kg empty, and its axles "
-            "may carry {axles_kg:.0f} kg",
-            _PAPERS,
+            "a permitted gross weight of {limit_kg:g} kg: the vehicle weighs {gross_kg:.0f} kg empty",
+            "it is more than that, and no more than both axles may carry: " + _PAPERS,
         ),
         DoubtKind.AXLE_LIMIT: (
-            "an axle limit of {limit_kg:.0f} kg on an axle that weighs {axle_kg:.0f} kg empty",
+            "an axle limit of {limit_kg:g} kg on an axle that weighs {axle_kg:.0f} kg empty",
             _PAPERS,
         ),
         DoubtKind.LOAD_LENGTH: (

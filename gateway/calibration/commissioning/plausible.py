@@ -7,7 +7,7 @@ Nothing has been driven here: what a drive says of the same answers is in ``gate
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -38,18 +38,20 @@ MOST_MASS_OFF: Final = 0.12
 MOST_AXLE_OFF: Final = 0.18
 MOST_TRACK_OFF: Final = 0.05
 MOST_WHEELBASE_OFF: Final = 0.01  # as a line asks for
-GROSS_ROUNDED: Final = 1.005  # papers round
+GROSS_ROUNDED: Final = 1.005  # papers round; of the sum of the axles' limits, which is the most
+MOST_LIMIT: Final = 5.0  # times what is there empty: the rear axle of a truck
 
 KG_PER_POUND: Final = 0.45359237
 M_PER_INCH: Final = 0.0254
 M_PER_FOOT: Final = 0.3048
-_MASS_SLIPS: Final = (10.0, 0.1, KG_PER_POUND, 1000.0, 100.0, 0.01, 0.001)
+_DECIMALS: Final = (10.0, 0.1, 1000.0, 100.0, 0.01, 0.001)
+_MASS_SLIPS: Final = (*_DECIMALS, KG_PER_POUND)
 _LENGTH_SLIPS: Final = (10.0, 0.1, 0.01, 0.001, M_PER_INCH, M_PER_FOOT)
 AXLES: Final = ("kerb_front_axle_kg", "kerb_rear_axle_kg")
 _SLIPPED: Final[Mapping[tuple[str, ...], tuple[float, ...]]] = MappingProxyType(
     {
-        AXLES[:1]: _MASS_SLIPS,
-        AXLES[1:]: _MASS_SLIPS,
+        AXLES[:1]: _DECIMALS,
+        AXLES[1:]: _DECIMALS,
         AXLES: _MASS_SLIPS,
         ("wheelbase_m",): _LENGTH_SLIPS,
         ("sensor_position_m",): _LENGTH_SLIPS,
@@ -103,16 +105,16 @@ def _meant(said: VehicleAnswers, line: LineFacts) -> dict[str, Any]:
 
 
 def _candidates(said: VehicleAnswers) -> Iterator[dict[str, Any]]:
-    """Each slip that is usual, then front and rear exchanged."""
+    """Front and rear exchanged, then each slip that is usual."""
+    yield {AXLES[0]: said.kerb_rear_axle_kg, AXLES[1]: said.kerb_front_axle_kg}
     for names, slips in _SLIPPED.items():
         typed = [getattr(said, name) for name in names]
         if None not in typed:
             for slip in slips:
                 yield {name: _rounded(slip * number) for name, number in zip(names, typed, strict=True)}
     if said.payload_range_kg is not None:
-        for slip in _MASS_SLIPS:
+        for slip in _DECIMALS:
             yield {"payload_range_kg": (0.0, _rounded(slip * said.payload_range_kg[1]))}
-    yield {AXLES[0]: said.kerb_rear_axle_kg, AXLES[1]: said.kerb_front_axle_kg}
 
 
 def _rounded(number: float) -> float:
@@ -228,13 +230,12 @@ def _limits(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
         (said.kerb_rear_axle_kg, said.rear_axle_limit_kg),
     )
     for axle_kg, permitted_kg in axles:
-        if permitted_kg is not None and permitted_kg <= axle_kg:
+        if permitted_kg is not None and not axle_kg < permitted_kg <= MOST_LIMIT * axle_kg:
             yield Doubt.of(DoubtKind.AXLE_LIMIT, limit_kg=permitted_kg, axle_kg=axle_kg)
     permitted = [kg for _, kg in axles if kg is not None]
     axles_kg = sum(permitted) if len(permitted) == len(axles) else inf
-    if limit_kg is not None and not gross_kg < limit_kg <= GROSS_ROUNDED * axles_kg:
-        most_kg = axles_kg if isfinite(axles_kg) else limit_kg
-        yield Doubt.of(DoubtKind.GROSS_LIMIT, limit_kg=limit_kg, gross_kg=gross_kg, axles_kg=most_kg)
+    if limit_kg is not None and not gross_kg < limit_kg <= min(GROSS_ROUNDED * axles_kg, MOST_LIMIT * gross_kg):
+        yield Doubt.of(DoubtKind.GROSS_LIMIT, limit_kg=limit_kg, gross_kg=gross_kg)
 
 
 _RULES: Final[tuple[Callable[[VehicleAnswers, LineFacts], Iterator[Doubt]], ...]] = (

@@ -1,52 +1,94 @@
-// Calibrating on the vehicle itself: one step at a time, each answered by the gateway before the next is shown.
+// Calibrating on the vehicle itself: one step at a time, each answered by the gateway before the next is shown. What the
+// gateway has is shown again whenever somebody goes back or returns; what is typed and not yet sent stays in this browser.
 
+import { asked, changed, meantText } from "/assets/dashboard/commissioning-doubts.js";
+import { summary } from "/assets/dashboard/commissioning-summary.js";
 import { unfold } from "/assets/dashboard/fold.js";
 import { COMMISSIONING, change, hasToken, load } from "/assets/dashboard/gateway.js";
 import { known, learn, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { clock, duration, figure, number } from "/assets/dashboard/words.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { Z95, clock, duration, figure } from "/assets/dashboard/words.js";
 
 const STEPS = ["line", "vehicle", "empty", "drive", "fit"];
 const TONES = { fault: "alarm", warning: "warning", note: "soft" };
-const WHY_ENDED = { undone: "undone", back_to_factory: "back to the settings' own" };
 const NO_LINE = "";
+const DRAFT = "springscale-commissioning-draft";
 const OPTIONAL = new Set(["sensor_offset_left_m", "track_width_m", "payload_range_kg", "name", "carries", "payload_length_m", "payload_height_m"]);
 
 const card = element("commissioning");
+const form = element("commissioning-vehicle");
 let lines = [];
+let at = null; // an earlier step that somebody went back to; null: the one that is wanted next
 let shown = null; // the step whose form is on the page: what is typed in it stays while news come
+let told = ""; // what was done last, where the gateway's state does not say it
+let windowAt = null; // [seconds until the next window, when that was learned]
 
-const windows = (n) => (n === 1 ? "one window" : `${n} windows`);
+const lineText = (line) => (line.name ? phrase("com_of_line", { name: line.name }) : phrase("com_without_line"));
 
-const lineText = (line) => (line.name ? `of the line ${line.name}` : "without a line");
+const madeText = (one) =>
+  phrase("com_made", { n: one.n_batches, vehicle: one.vehicle_name, line: lineText(one.line), time: clock(one.at), by: one.by, note: one.note ? ` (${one.note})` : "" });
 
-const madeText = (one) => `${one.vehicle_name}, ${lineText(one.line)}, from ${windows(one.n_batches)}, ${clock(one.at)} by ${one.by}${one.note ? ` (${one.note})` : ""}`;
+const activeText = (one) => (one === null ? phrase("com_of_settings") : madeText(one));
 
-function sentence({ underway, is_offered, is_allowed, is_pending, why_not }) {
-  if (underway === null && is_pending) return "Done. It counts from the next drive on: when the vehicle has stood for a minute, or sleeps.";
-  if (underway !== null) return `Begun ${clock(underway.begun_at)} by ${underway.by}.`;
-  if (!is_allowed) return `Not possible here: ${why_not}.`;
-  return is_offered ? "This vehicle is not calibrated. Its axle weights and a quarter of an hour of empty driving are enough." : "";
+function sentence({ underway, is_offered, is_allowed, is_pending, active, why_not }) {
+  if (underway !== null) return phrase("com_begun", { time: clock(underway.begun_at), by: underway.by });
+  if (told) return told;
+  if (is_pending && active !== null) return phrase("com_done");
+  if (!is_allowed) return phrase("com_not_here", { why: why_not });
+  return is_offered ? phrase("com_offer") : "";
 }
 
 function learnedText({ learned, n_batches, driven_s, is_fitting }) {
-  const driven = `${duration(driven_s)} driven, ${windows(n_batches)}`;
-  if (learned === null) return `${driven}${is_fitting ? "; looking at it" : ""}.`;
-  const payload = `a payload would be told to ± ${figure(1.96 * learned.payload_std_kg, 0, "kg")}`;
-  return `${driven}: ${number(100 * learned.share, 0)} % of what is wanted is known; ${payload}, ± ${figure(1.96 * learned.needed_std_kg, 0, "kg")} are enough.`;
+  const driven = phrase("com_driven", { n: n_batches, duration: duration(driven_s) });
+  if (learned === null) return `${driven}${is_fitting ? `; ${phrase("com_fitting")}` : ""}.`;
+  return phrase("com_learned", {
+    driven, percent: figure(100 * learned.share, 0, "%"), now: figure(Z95 * learned.payload_std_kg, 0, "kg"), enough: figure(Z95 * learned.needed_std_kg, 0, "kg"),
+  });
 }
 
-function finding({ severity, text, advice }) {
-  return made("li", `${text}: ${advice}.`, TONES[severity]);
+/** How long until the next window counts, as a clock that runs on between two answers of the gateway. */
+function showWindow() {
+  if (windowAt === null) return;
+  const [seconds, since] = windowAt;
+  const left = Math.max(0, Math.round(seconds - (performance.now() - since) / 1000));
+  write("commissioning-window", phrase("com_next_in", { time: `${Math.floor(left / 60)}:${String(left % 60).padStart(2, "0")}` }));
 }
 
-function drawSteps(step) {
-  for (const item of element("commissioning-steps").children) {
-    const at = STEPS.indexOf(item.dataset.step), now = STEPS.indexOf(step);
-    item.className = at < now ? "done" : "";
-    item.toggleAttribute("aria-current", at === now);
-    if (at === now) item.setAttribute("aria-current", "step");
-  }
+function drawWindow({ step, next_window_s }) {
+  windowAt = next_window_s === null ? null : [next_window_s, performance.now()];
+  if (step === "fit") write("commissioning-window", "");
+  else if (windowAt === null) write("commissioning-window", phrase("com_standing"));
+  else showWindow();
+}
+
+const finding = ({ severity, text, advice }) => made("li", `${text}: ${advice}.`, TONES[severity]);
+
+function drawSteps(wanted, current) {
+  const items = STEPS.map((name, i) => {
+    const isDone = i < STEPS.indexOf(wanted), isCurrent = name === current;
+    const name_ = phrase(`com_step.${name}`);
+    const item = made("li", "", isDone ? "done" : "");
+    if (isCurrent) item.setAttribute("aria-current", "step");
+    if ((isDone || name === wanted) && !isCurrent && wanted !== "fit") {
+      const back = made("button", name_, "link");
+      back.type = "button";
+      back.setAttribute("aria-label", phrase("com_step_back", { step: name_ }));
+      back.addEventListener("click", () => goTo(name));
+      item.append(back);
+    } else item.textContent = name_;
+    return item;
+  });
+  element("commissioning-steps").replaceChildren(...items);
+}
+
+/** Shows a step again, with the keyboard in it. */
+export function goTo(step) {
+  at = step === known.commissioning.underway?.step ? null : step;
+  shown = null;
+  draw(known);
+  const place = element(`commissioning-${step === "fit" ? "drive" : step}`);
+  (place.querySelector("select, input:not([type=file])") || element("commissioning-title")).focus();
 }
 
 function openForm(step) {
@@ -56,107 +98,183 @@ function openForm(step) {
   element("commissioning-drive").hidden = step !== "drive" && step !== "fit";
   if (step === "line") askLines();
   if (step === "vehicle") fillVehicle();
+  if (step === "empty") element("commissioning-claim").checked = false;
 }
 
-show(({ commissioning: told }) => {
-  if (told === null) return;
-  const { underway, active, history } = told;
-  const isWanted = underway !== null || told.is_offered;
+function drawDoubts({ doubts, step }) {
+  const isOfDrive = doubts.some((one) => one.is_of_drive);
+  element("commissioning-doubts").hidden = doubts.length === 0 || step === "fit";
+  element("commissioning-doubts-drive").hidden = !isOfDrive;
+  element("commissioning-asked").replaceChildren(...doubts.map((one) => made("li", asked(one))));
+  const meant = meantText(doubts);
+  element("commissioning-meant").hidden = meant === "";
+  write("commissioning-meant", meant);
+}
+
+function drawDone({ underway, active, is_pending }) {
+  const learned = active?.learned;
+  element("commissioning-done").hidden = underway !== null || active === null || !learned;
+  if (underway !== null || !learned) return;
+  write("commissioning-reached", phrase("com_reached", { payload: figure(Z95 * learned.payload_std_kg, 0, "kg"), share: figure(Z95 * learned.front_share_std_pct, 1, "%") }));
+  const better = active.line.name === "" ? "com_better_line" : learned.is_enough ? "com_better_load" : "com_better_drive";
+  write("commissioning-better", phrase(better));
+  card.classList.toggle("wanted", is_pending);
+}
+
+function draw({ commissioning: state }) {
+  if (state === null) return;
+  const { underway, active, history } = state;
+  if (underway === null) at = null;
+  else told = "";
+  if (at !== null && STEPS.indexOf(at) >= STEPS.indexOf(underway.step)) at = null;
+  if (underway?.step === "fit") at = null;
+  const isWanted = underway !== null || state.is_offered;
   if (isWanted && !card.classList.contains("wanted")) unfold(card);
   card.classList.toggle("wanted", isWanted);
-  say("commissioning-said", sentence(told));
-  write("commissioning-in-use", active === null ? "that of the settings, or none" : madeText(active));
+  const current = at ?? underway?.step ?? null;
+  say("commissioning-said", sentence(state));
+  write("commissioning-in-use", activeText(active));
   element("commissioning-steps").hidden = underway === null;
-  drawSteps(underway?.step);
-  openForm(underway?.step ?? null);
-  element("commissioning-begin").hidden = underway !== null || !told.is_allowed;
+  if (underway !== null) drawSteps(underway.step, current);
+  else element("commissioning-doubts").hidden = true;
+  openForm(current);
+  element("commissioning-begin").hidden = underway !== null || !state.is_allowed;
   element("commissioning-cancel").hidden = underway === null;
   element("commissioning-undo").hidden = active === null || underway !== null;
-  element("commissioning-token").hidden = !hasToken() || !told.is_allowed;
+  element("commissioning-token").hidden = !hasToken() || !state.is_allowed;
+  element("commissioning-summary").hidden = underway === null || underway.line === null || current === "line";
   if (underway !== null) {
+    drawDoubts(underway);
+    drawWindow(underway);
+    element("commissioning-entered").replaceChildren(...summary(underway, underway.step === "fit" ? null : goTo));
+    write("commissioning-drive-what", phrase(underway.step === "fit" ? "com_fit_what" : "com_drive_what"));
     write("commissioning-learned", learnedText(underway));
     element("commissioning-progress").value = underway.learned?.share ?? 0;
-    element("commissioning-fit").disabled = underway.n_batches === 0 || underway.step === "fit";
-    element("commissioning-fit").hidden = underway.step === "fit";
+    const isFit = underway.step === "fit";
+    element("commissioning-fit").disabled = underway.n_batches === 0 || isFit;
+    for (const button of element("commissioning-drive").querySelectorAll("button")) button.hidden = isFit;
   }
+  drawDone(state);
   say("commissioning-fault", underway?.fault ?? "");
   element("commissioning-findings").replaceChildren(...(underway?.inspection?.findings ?? []).map(finding));
-  const looked = underway?.inspection ? `Axes, signs, units and rates, by the last ${duration(underway.inspection.seconds)} of driving:${underway.inspection.findings.length ? "" : " all is well."}` : "";
-  say("commissioning-looked", looked);
+  const looked = underway?.inspection;
+  say("commissioning-looked", looked ? `${phrase("com_looked", { duration: duration(looked.seconds) })}${looked.findings.length ? "" : ` ${phrase("com_all_well")}`}` : "");
   element("commissioning-history").hidden = history.length === 0;
-  element("commissioning-entries").replaceChildren(...history.map((one) => made("li", `${madeText(one)}${one.ended ? `; ${WHY_ENDED[one.ended.why]} ${clock(one.ended.at)} by ${one.ended.by}` : ""}`)));
-}, "commissioning");
+  element("commissioning-entries").replaceChildren(...history.map(historyEntry));
+}
+
+function historyEntry(one) {
+  const ended = one.ended ? phrase("com_ended", { why: phrase(`com_ended.${one.ended.why}`), time: clock(one.ended.at), by: one.ended.by }) : "";
+  return made("li", madeText(one) + ended);
+}
+
+show(draw, "commissioning");
+setInterval(showWindow, 1000);
 
 async function askLines() {
   ({ items: lines } = await load(`${COMMISSIONING}/lines`));
-  const choices = lines.map((line, at) => {
-    const option = made("option", `${line.name} (${line.source}): ${line.fault ?? `${line.vehicle.name}, wheelbase ${line.vehicle.wheelbase_m} m`}`);
-    option.value = at;
+  const choices = lines.map((line, i) => {
+    const source = phrase(`com_source.${line.source}`);
+    const text = line.fault
+      ? `${line.name} (${source}): ${line.fault}`
+      : phrase("com_line_option", { name: line.name, source, vehicle: line.vehicle.name, wheelbase: figure(line.vehicle.wheelbase_m, 2, "m") });
+    const option = made("option", text);
+    option.value = i;
     option.disabled = line.fault !== null;
     return option;
   });
-  const none = made("option", "none of them: as any vehicle, less exact");
+  const none = made("option", phrase("com_no_line"));
   none.value = NO_LINE;
   element("commissioning-choice").replaceChildren(...choices, none);
+  const chosen = known.commissioning?.underway?.line;
+  if (chosen) element("commissioning-choice").value = chosen.name ? String(lines.findIndex((one) => one.id === chosen.id)) : NO_LINE;
 }
 
-/** What sisters have in common. */
-function fillVehicle() {
-  const { line } = known.commissioning.underway;
-  const sister = lines.find((one) => one.id === line?.id)?.vehicle;
-  for (const name of ["wheelbase_m", "track_width_m"]) {
-    const field = element("commissioning-vehicle").elements[name];
-    if (sister?.[name] && field.value === "") field.value = sister[name];
-  }
-  const most = element("commissioning-vehicle").elements.payload_range_kg;
-  if (sister?.payload_range_kg && most.value === "") most.value = sister.payload_range_kg[1];
+const fields = () => [...form.querySelectorAll("input, select")];
+
+function put(field, answer) {
+  if (field.type === "checkbox") field.checked = answer === true;
+  else field.value = answer === null || answer === undefined ? "" : field.name === "payload_range_kg" && Array.isArray(answer) ? answer[1] : answer;
 }
+
+function draft(begunAt) {
+  const kept = JSON.parse(localStorage.getItem(DRAFT) || "null");
+  return kept?.begun_at === begunAt ? kept.answers : null;
+}
+
+/** With what is typed and not sent, else with what was sent, else with what its line's vehicles have in common. */
+function fillVehicle() {
+  const { line, vehicle, begun_at } = known.commissioning.underway;
+  const typed = draft(begun_at);
+  const ofLine = Object.fromEntries(Object.entries(line?.vehicle ?? {}).filter(([name]) => !name.startsWith("kerb_")));
+  const answers = typed ?? vehicle ?? ofLine;
+  for (const field of fields()) put(field, answers[field.name]);
+  const isFilled = !typed && !vehicle && Object.keys(ofLine).length > 0;
+  say("commissioning-prefilled", isFilled ? phrase("com_prefilled", { line: line.name }) : "");
+}
+
+const typedNow = () => Object.fromEntries(fields().map((field) => [field.name, field.type === "checkbox" ? field.checked : field.value]));
+
+form.addEventListener("input", () => {
+  localStorage.setItem(DRAFT, JSON.stringify({ begun_at: known.commissioning.underway.begun_at, answers: typedNow() }));
+});
 
 /** One question to the gateway: its own words where it refuses, and no button twice. */
-async function step(form, path, claim, method = "POST") {
-  const buttons = [...form.querySelectorAll("button")];
+async function step(place, path, claim, method = "POST") {
+  const buttons = [...place.querySelectorAll("button")];
   for (const button of buttons) button.disabled = true;
   say("commissioning-refusal", "");
   try {
     const token = element("commissioning-token-text").value.trim();
-    learn({ commissioning: await change(method, COMMISSIONING + path, token, claim, COMMISSIONING) });
+    const state = await change(method, COMMISSIONING + path, token, claim, COMMISSIONING);
+    at = null;
+    learn({ commissioning: state });
     return true;
   } catch (error) {
     say("commissioning-refusal", error.message);
     return false;
   } finally {
     for (const button of buttons) button.disabled = false;
+    element("commissioning-fit").disabled = !known.commissioning.underway?.n_batches;
   }
 }
 
-async function chooseLine(form) {
+async function chooseLine(place) {
   const files = [...element("commissioning-file").files];
   const file = files.find((one) => !one.name.endsWith(".sig"));
   let line = null;
   if (file) {
     const signature = files.find((one) => one.name === `${file.name}.sig`);
     const said = { name: file.name, content: await file.text(), ...(signature ? { signature: await signature.text() } : {}) };
-    if (!(await step(form, "/lines", said))) return;
+    if (!(await step(place, "/lines", said))) return;
     await askLines();
     line = { name: file.name, source: "uploaded" };
   } else if (element("commissioning-choice").value !== NO_LINE) {
     const { name, source } = lines[Number(element("commissioning-choice").value)];
     line = { name, source };
   }
-  await step(form, "/line", { line });
+  await step(place, "/line", { line });
 }
 
-function stateVehicle(form) {
+async function sendVehicle(said) {
+  const isTaken = await step(form, "/vehicle", said);
+  if (!isTaken) return;
+  localStorage.removeItem(DRAFT);
+  if (known.commissioning.underway?.step === "vehicle") fillVehicle();
+  if (known.commissioning.underway?.doubts.length) element("commissioning-doubts").scrollIntoView({ block: "nearest" });
+}
+
+function stateVehicle() {
   const said = {};
-  for (const field of form.querySelectorAll("input, select")) {
+  for (const field of fields()) {
     if (field.type === "checkbox") said[field.name] = field.checked;
     else if (field.value !== "" || !OPTIONAL.has(field.name)) said[field.name] = field.type === "number" ? Number(field.value) : field.value;
   }
   if (said.payload_range_kg) said.payload_range_kg = [0, said.payload_range_kg];
-  return step(form, "/vehicle", said);
+  return sendVehicle(said);
 }
 
-const SUBMITTED = { line: chooseLine, vehicle: stateVehicle, empty: (form) => step(form, "/empty", { is_empty: true }) };
+const SUBMITTED = { line: chooseLine, vehicle: stateVehicle, empty: (place) => step(place, "/empty", { is_empty: true }) };
 
 for (const [name, submit] of Object.entries(SUBMITTED)) {
   element(`commissioning-${name}`).addEventListener("submit", (event) => {
@@ -165,17 +283,51 @@ for (const [name, submit] of Object.entries(SUBMITTED)) {
   });
 }
 
+for (const back of card.querySelectorAll("button.back")) {
+  back.addEventListener("click", () => goTo(STEPS[Math.max(0, STEPS.indexOf(shown) - 1)]));
+}
+
+element("commissioning-meant").addEventListener("click", () => {
+  const { vehicle, doubts } = known.commissioning.underway;
+  sendVehicle(changed(vehicle, doubts));
+});
+element("commissioning-confirm").addEventListener("click", () => step(element("commissioning-doubts"), "/confirm"));
+
+/** What counts once the calibration in use is gone. */
+function before({ history, active }) {
+  return activeText(history.find((one) => one.ended === null && one.id !== active.id) ?? null);
+}
+
 const SURE = {
-  cancel: ["Forget this commissioning?", "What was driven for it no longer counts. Calibrations made before stay.", () => step(card, "", undefined, "DELETE")],
-  undo: ["Take this calibration out of use?", "The one before it counts from the next drive on, or that of the settings.", () => step(card, "/undo", {})],
+  cancel: [
+    () => phrase("com_cancel_question"),
+    () => phrase("com_cancel_effect"),
+    async () => {
+      told = phrase("com_cancelled");
+      if (!(await step(card, "", undefined, "DELETE"))) told = "";
+    },
+  ],
+  undo: [
+    () => phrase("com_undo_question"),
+    () => phrase("com_undo_effect", { made: madeText(known.commissioning.active), before: before(known.commissioning) }),
+    async () => {
+      told = phrase("com_undone", { made: madeText(known.commissioning.active), before: before(known.commissioning) });
+      if (!(await step(card, "/undo", {}))) told = "";
+    },
+  ],
+  again: [
+    () => phrase("com_again_question"),
+    () => phrase("com_again_effect"),
+    () => step(element("commissioning-drive"), "/empty", { is_empty: true, again: true }),
+  ],
 };
 let sure = null;
 
 for (const name of Object.keys(SURE)) {
   element(`commissioning-${name}`).addEventListener("click", () => {
     sure = SURE[name];
-    write("commissioning-question", sure[0]);
-    write("commissioning-effect", sure[1]);
+    write("commissioning-question", sure[0]());
+    write("commissioning-effect", sure[1]());
     element("commissioning-dialog").showModal();
   });
 }

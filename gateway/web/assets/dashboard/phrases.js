@@ -1,11 +1,12 @@
 // The dashboard's words in the reader's language; loading this writes those that stand in the page itself.
 
 import { fill, language, speaker } from "/assets/language.js";
+import { COMMISSIONING_WORDS } from "/assets/words/commissioning.js";
 import { COMMON } from "/assets/words/common.js";
 import { DASHBOARD } from "/assets/words/dashboard.js";
 import { REASONS_DE, REMEDIES_DE, SOURCES_DE } from "/assets/words/reasons.js";
 
-export const phrase = speaker(COMMON, DASHBOARD);
+export const phrase = speaker(COMMON, DASHBOARD, COMMISSIONING_WORDS);
 
 /** What the gateway says in English of reasons, sources and remedies, by name, in the reader's language. */
 export function explained({ items, sources, remedies }) {

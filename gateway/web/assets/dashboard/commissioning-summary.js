@@ -1,0 +1,62 @@
+// What was entered so far, each with the way back to it.
+
+import { asked } from "/assets/dashboard/commissioning-doubts.js";
+import { made, pair } from "/assets/dashboard/page.js";
+import { phrase } from "/assets/dashboard/phrases.js";
+import { UNKNOWN, clock, figure } from "/assets/dashboard/words.js";
+
+function place({ sensor_position_m, sensor_offset_left_m }) {
+  const m = figure(sensor_position_m, 2, "m");
+  return sensor_offset_left_m === null ? phrase("com_behind", { m }) : phrase("com_behind_left", { m, left: figure(sensor_offset_left_m, 2, "m") });
+}
+
+function axles({ kerb_front_axle_kg: front, kerb_rear_axle_kg: rear }) {
+  return phrase("com_axles", { front: figure(front, 0, "kg"), rear: figure(rear, 0, "kg"), share: figure((100 * front) / (front + rear), 0, "%") });
+}
+
+/** What was typed, else what its line says, else that nobody knows it. */
+function typedOrLine(typed, ofLine, digits, unit) {
+  if (typed !== null && typed !== undefined) return figure(typed, digits, unit);
+  return ofLine === undefined ? UNKNOWN : phrase("com_as_line", { value: figure(ofLine, digits, unit) });
+}
+
+function entered({ line, vehicle, empty }) {
+  const rows = line === null ? [] : [["com_sum_line", line.name || phrase("com_none"), "line"]];
+  if (vehicle !== null) {
+    const ofLine = line?.vehicle ?? {};
+    rows.push(
+      ["com_sum_axles", axles(vehicle), "vehicle"],
+      ["com_sum_gross", figure(vehicle.kerb_front_axle_kg + vehicle.kerb_rear_axle_kg, 0, "kg"), "vehicle"],
+      ["com_sum_wheelbase", figure(vehicle.wheelbase_m, 2, "m"), "vehicle"],
+      ["com_sum_track", typedOrLine(vehicle.track_width_m, ofLine.track_width_m, 2, "m"), "vehicle"],
+      ["com_sum_sensor", place(vehicle), "vehicle"],
+      ["com_sum_payload", typedOrLine(vehicle.payload_range_kg?.[1], ofLine.payload_range_kg?.[1], 0, "kg"), "vehicle"],
+    );
+    if (vehicle.carries) rows.push(["com_sum_carries", phrase(`com_carries.${vehicle.carries}`), "vehicle"]);
+  }
+  if (empty) rows.push(["com_sum_empty", phrase("com_empty_by", { time: clock(empty.at), by: empty.by }), null]);
+  return rows;
+}
+
+function changeButton(step, what, goTo) {
+  const button = made("button", phrase("com_change"), "link");
+  button.type = "button";
+  button.setAttribute("aria-label", phrase("com_change_of", { what }));
+  button.addEventListener("click", () => goTo(step));
+  return button;
+}
+
+/** Terms and descriptions for a <dl class="pairs">; `goTo` shows a step again, null: nothing can be changed now. */
+export function summary(underway, goTo) {
+  const steps = new Set();
+  const rows = entered(underway).map(([key, text, step]) => {
+    const row = pair(phrase(key), text);
+    if (goTo !== null && step !== null && !steps.has(step)) {
+      steps.add(step); // one way back to each step
+      row.lastChild.append(" ", changeButton(step, phrase(key), goTo));
+    }
+    return row;
+  });
+  const confirmed = underway.confirmed.map((one) => made("div", phrase("com_confirmed", { what: asked(one).replace(/\.$/, "") }), "soft wide"));
+  return [...rows, ...confirmed];
+}
