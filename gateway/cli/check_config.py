@@ -41,7 +41,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
     known_weights = settings.store.directory / FILE_NAME
     if os.access(known_weights, os.R_OK):  # the service's own; others may not be allowed to see it
         setup = setup.with_known_weights_of(known_weights)
-    faults = tuple(startable_faults(settings))
+    faults = tuple(startable_faults(settings, setup.signal_map))
     if faults:
         raise ConfigurationError("\n".join(f"{config}: {fault}" for fault in faults))
     forwarding = uplink_settings(settings.uplink, settings.vehicle)

@@ -7,10 +7,12 @@ from dataclasses import replace
 from functools import partial
 from io import StringIO
 from pathlib import Path
+from typing import Final
 
 import click
 
 from gateway.bus.logs import LogReport
+from gateway.calibration.file import CalibrationFile
 from gateway.calibration.known_weights_file import FILE_NAME
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.text.estimate import sentence
@@ -74,7 +76,7 @@ def estimate(
     for line in lines(found()):
         click.echo(line)
     if setup.calibration is not None and not reasons.pop(None, 0):
-        raise NothingWeighedError(_in_words(reasons))
+        raise NothingWeighedError("\n".join([_in_words(reasons), *_other_vehicle(reasons, setup.calibration)]))
 
 
 Found = Iterable[tuple[Path | None, Estimate]]  # the log, where there are several
@@ -88,6 +90,22 @@ def _in_words(reasons: Counter[Why | None]) -> str:
             told = EXPLANATIONS[why]
             lines.append(f"  {why} ({n} batch{'es' * (n > 1)}): {told.happened}. What to do: {told.advice}.")
     return "\n".join(lines)
+
+
+UNLIKE: Final = frozenset({Why.MODEL_MISFIT, Why.NO_SOLUTION, Why.AMBIGUOUS, Why.OUT_OF_RANGE, Why.SENSOR_CHANGED})
+"""What the calibration of another vehicle makes of a drive."""
+
+
+def _other_vehicle(reasons: Counter[Why | None], calibration: CalibrationFile) -> Iterator[str]:
+    """The likely cause, where the drives moved as another vehicle does in most batches."""
+    n_unlike = sum(n for why, n in reasons.items() if why in UNLIKE)
+    if 2 * n_unlike > reasons.total():
+        vehicle = calibration.vehicle
+        yield (
+            f"  The likely cause: this is not the log of the vehicle that was calibrated, {vehicle.name} (wheelbase "
+            f"{vehicle.wheelbase_m:g} m, {vehicle.empty_mass_kg:.0f} kg sprung), or its springs, tyres or sensor were "
+            "changed since."
+        )
 
 
 def _sentences(found: Found) -> Iterator[str]:

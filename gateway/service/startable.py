@@ -1,15 +1,21 @@
 """Whether a service of these settings could start and do its work, as far as that can be told without the bus."""
 
+import os
 from collections.abc import Iterator
+from pathlib import Path
 
 from gateway.bus.live import what_lacks
+from gateway.bus.signals import SignalMap
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
+from gateway.records import Signal
 from gateway.web import TokenFile, refuse_open_address
 
 
-def startable_faults(settings: Settings) -> Iterator[str]:
+def startable_faults(settings: Settings, signal_map: SignalMap) -> Iterator[str]:
     """Everything that would keep it from starting or from showing a fresh estimate, each with how to mend it."""
+    yield from _signals_that_lack(signal_map)
+    yield from _store_that_cannot_be_written(settings.store.directory)
     lacking = what_lacks(settings.bus.interface)
     if lacking is not None:
         yield lacking
@@ -24,6 +30,27 @@ def startable_faults(settings: Settings) -> Iterator[str]:
             f"[web] stale_after_s = {settings.web.stale_after_s:g} is below [batch] window_s = "
             f"{settings.batch.window_s:g}: every estimate would be stale before the next; set it to three windows"
         )
+
+
+def _signals_that_lack(signal_map: SignalMap) -> Iterator[str]:
+    """Weighing needs two inertial signals and a speed."""
+    mapped = set(signal_map.signals)
+    for signal in (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE):
+        if signal not in mapped:
+            yield f"{signal_map.name} maps no {signal}: nothing can be weighed without it; add [signals.{signal}]"
+    if not mapped & {Signal.SPEED, Signal.WHEEL_SPEED}:
+        yield f"{signal_map.name} maps no speed: nothing can be weighed without it; add [signals.speed]"
+
+
+def _store_that_cannot_be_written(directory: Path) -> Iterator[str]:
+    """Another user's folder is that user's to write: of it nothing is said."""
+    there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
+    if not there.is_dir():
+        yield f"[store] directory = {directory}: {there} is a file; name a folder"
+    elif os.statvfs(there).f_flag & os.ST_RDONLY:
+        yield f"[store] directory = {directory}: lies on a file system that can only be read; name a folder elsewhere"
+    elif not os.access(there, os.W_OK | os.X_OK) and (there != directory or there.stat().st_uid == os.geteuid()):
+        yield f"[store] directory = {directory}: {there} cannot be written; allow it (chmod u+w), or name another folder"
 
 
 def _has_tokens(settings: Settings) -> bool:

@@ -1,17 +1,26 @@
 """The wizard in a real browser: from the offer to the calibration, on a page as wide as a phone."""
 
+import json
+import re
 from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 from support.calibrated import calibration_file
-from support.commissioning import Bench, fitted, in_steps
+from support.commissioning import ANSWERS, NOW_NS, Bench, fitted, in_steps
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
+from support.estimates import make_estimate
 from support.web import Gateway, serving
 
 from gateway.calibration.commissioning import Result
 from gateway.calibration.commissioning.job import Found
+from gateway.calibration.file import CalibrationFile
+from gateway.records import Why
+from gateway.stated import VehicleAnswers
+from gateway.stated.doubt import Doubt, DoubtKind
+from gateway.units import NS_PER_S
 from gateway.web import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
@@ -71,11 +80,11 @@ def test_a_fitter_walks_through_it(gateway: Gateway, bench: Bench, browser: Any,
         expect(page.get_by_label("Under the front axle [kg]")).to_be_visible()
         assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
         fill(page, "690", "20", "2.75", "1.2")
-        page.get_by_role("button", name="Go on").click()
+        page.get_by_role("button", name="Next").click()
         expect(page.locator("#commissioning-refusal")).to_contain_text("unsprung masses")
         page.get_by_label("Under the rear axle").fill("710")
         say_what_is_carried(page)
-        page.get_by_role("button", name="Go on").click()
+        page.get_by_role("button", name="Next").click()
         expect(page.locator("#commissioning-claim")).to_be_visible()
         bench.drive(0, 60, is_provisional=True)
         bench.worker.finish(Result(findings=(FAULT,)))
@@ -145,4 +154,177 @@ def test_cancel_wants_a_yes_and_a_token_that_may_operate(tmp_path: Path, bench: 
         page.get_by_role("button", name="Yes").click()
         expect(page.locator("#commissioning-begin")).to_be_visible()
         assert operator not in page.evaluate("JSON.stringify({...sessionStorage, ...localStorage})")
+        gateway.board.close()
+
+
+CONTRADICTED = Doubt.of(
+    DoubtKind.DRIVEN_WEIGHT,
+    front_kg=823.0, front_95_kg=59.0, rear_kg=1010.0, rear_95_kg=56.0, said_front_kg=713.0, said_rear_kg=704.0,
+)  # fmt: skip
+ENGLISH = re.compile(
+    r"\b(the|and|not|of|load|window|windows|known|axle|drive|driven|vehicle|by|back|undone)\b", re.IGNORECASE
+)
+
+
+@pytest.fixture
+def with_line(tmp_path: Path) -> Iterator[tuple[Gateway, Bench]]:
+    """A sister in the administrator's folder: 700 kg on each axle, 2.8 m from axle to axle, 900 kg of payload."""
+    sister = json.loads((Path(str(files("gateway"))) / "demo" / "paper_van.json").read_text())
+    sister["vehicle"] |= {
+        "payload_range_kg": [0.0, 900.0], "track_width_m": 1.6, "kerb_front_axle_kg": 700.0, "kerb_rear_axle_kg": 700.0,
+    }  # fmt: skip
+    held = CalibrationFile.model_validate({key: part for key, part in sister.items() if key != "id"})
+    (tmp_path / "lines").mkdir()
+    (tmp_path / "lines" / "sister.json").write_text(held.to_json())
+    bench = Bench(tmp_path / "service", lines=tmp_path / "lines")
+    with Gateway(tmp_path / "store", commissioning=bench.desk) as opened:
+        opened.status = STATUS.model_copy(update={"calibration_id": None})
+        yield opened, bench
+
+
+def typed_into(page: Any, **answers: str) -> None:
+    for name, answer in answers.items():
+        page.locator(f"#commissioning-vehicle [name={name}]").fill(answer)
+
+
+def in_order(page: Any, locale: str) -> None:
+    """No English where German is spoken, contrast, and no sideways scrolling."""
+    card = page.locator("#commissioning")
+    if locale.startswith("de"):
+        said = card.inner_text().replace("van-17", "").replace("sister.json", "").splitlines()
+        assert [line for line in said if ENGLISH.search(line)] == []
+    assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+@pytest.fixture(params=[("en-GB", "light", 1400), ("de-DE", "dark", 390)], ids=["desk", "phone in German"])
+def seen(request: pytest.FixtureRequest, browser: Any) -> Iterator[tuple[Watched, str]]:
+    """A page on a wide desk, and one on a phone in German and in the dark; with its locale."""
+    locale, scheme, width = request.param
+    made = Watched(browser, locale=locale, color_scheme=scheme, viewport={"width": width, "height": 900})
+    made.page.route("**/plotly-*", lambda route: route.abort())
+    yield made, locale
+    assert [said for said in made.complaints if "ERR_FAILED" not in said] == []
+    made.page.close()
+
+
+def test_unlikely_answers_are_asked_about_and_nothing_typed_is_lost(
+    with_line: tuple[Gateway, Bench], seen: tuple[Watched, str]
+) -> None:
+    gateway, _ = with_line
+    page, locale = seen[0].page, seen[1]
+    with serving(gateway.app) as server:
+        page.goto(server.url)
+        page.locator("#commissioning-begin").click()
+        page.locator("#commissioning-choice").select_option("0")
+        page.locator("#commissioning-line .go").click()
+        expect(page.locator("[name=track_width_m]")).to_have_value("1.6")
+        expect(page.locator("[name=payload_range_kg]")).to_have_value("900")
+        typed_into(page, kerb_front_axle_kg="71.3", kerb_rear_axle_kg="704", sensor_position_m="3.2")
+        page.reload()  # what was typed and not sent is there again
+        expect(page.locator("[name=kerb_front_axle_kg]")).to_have_value("71.3")
+        expect(page.locator("[name=track_width_m]")).to_have_value("1.6")
+        page.locator("#commissioning-vehicle .go").click()
+        expect(page.locator("#commissioning-meant")).to_contain_text("713 kg")
+        in_order(page, locale)
+        page.locator("#commissioning-meant").click()
+        expect(page.locator("#commissioning-claim")).to_be_visible()
+        expect(page.locator("#commissioning-doubts")).to_be_hidden()
+        expect(page.locator("#commissioning-entered")).to_contain_text("713")
+        page.locator("#commissioning-empty .back").click()
+        expect(page.locator("[name=kerb_front_axle_kg]")).to_have_value("713")
+        page.locator("#commissioning-vehicle .back").click()
+        expect(page.locator("#commissioning-choice")).to_have_value("0")
+        page.locator("#commissioning-steps button").nth(1).click()
+        page.locator("#commissioning-vehicle .go").click()
+        expect(page.locator("#commissioning-claim")).to_be_visible()
+        gateway.board.close()
+
+
+def test_a_drive_that_contradicts_is_asked_about_and_the_end_says_how_good_it_is(
+    with_line: tuple[Gateway, Bench], seen: tuple[Watched, str]
+) -> None:
+    gateway, bench = with_line
+    watched, locale = seen
+    page = watched.page
+    bench.desk.begin("workshop", None)
+    bench.desk.choose_line("sister.json", "administrator")
+    bench.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, "wheelbase_m": 2.8}))
+    with serving(gateway.app) as server:
+        page.goto(server.url)
+        page.locator("#commissioning-claim").check()
+        page.locator("#commissioning-empty .go").click()
+        expect(page.locator("#commissioning-fit")).to_be_visible()
+        bench.drives.drive_start_ns = NOW_NS
+        bench.drives.open_window_ns = (NOW_NS, NOW_NS + 50 * NS_PER_S)
+        news(gateway, watched)
+        expect(page.locator("#commissioning-window")).to_contain_text("4:")
+        bench.drive(1)
+        bench.worker.finish(fitted(payload_std_kg=15.0).model_copy(update={"doubts": (CONTRADICTED,)}))
+        bench.drive(2)
+        bench.worker.finish(fitted(payload_std_kg=15.0).model_copy(update={"doubts": (CONTRADICTED,)}))
+        news(gateway, watched)
+        expect(page.locator("#commissioning-asked")).to_contain_text("823")
+        in_order(page, locale)
+        page.locator("#commissioning-again").click()
+        page.locator("#commissioning-yes").click()
+        expect(page.locator("#commissioning-doubts")).to_be_hidden()
+        for n in (3, 4):
+            bench.drive(n)
+            bench.worker.finish(fitted(payload_std_kg=15.0))
+        news(gateway, watched)
+        expect(page.locator("#commissioning-reached")).to_contain_text("± 29")
+        expect(page.locator("#commissioning-better")).to_be_visible()
+        in_order(page, locale)
+        page.locator("#commissioning-undo").click()
+        expect(page.locator("#commissioning-effect")).to_contain_text("van-17")
+        page.locator("#commissioning-yes").click()
+        expect(page.locator("#commissioning-said")).to_contain_text("van-17")
+        expect(page.locator("#commissioning-said")).to_contain_text("sister.json")
+        in_order(page, locale)
+        gateway.board.close()
+
+
+def test_by_keyboard_alone(with_line: tuple[Gateway, Bench], watched: Watched) -> None:
+    """Every step is taken, and taken back, without a pointer."""
+    gateway, _ = with_line
+    page = watched.page
+
+    def press(selector: str) -> None:
+        page.locator(selector).focus()
+        assert page.evaluate("document.activeElement.matches(':focus-visible')")
+        page.keyboard.press("Enter")
+
+    with serving(gateway.app) as server:
+        page.goto(server.url)
+        expect(page.locator("#commissioning-begin")).to_be_visible()
+        page.keyboard.press("Tab")  # from here on the browser takes us for a keyboard
+        press("#commissioning-begin")
+        expect(page.locator("#commissioning-choice option")).to_have_count(2)
+        press("#commissioning-line .go")
+        expect(page.locator("[name=kerb_front_axle_kg]")).to_be_visible()
+        page.locator("[name=kerb_front_axle_kg]").focus()
+        for answer in ("404", "1013"):
+            page.keyboard.type(answer)
+            page.keyboard.press("Tab")
+        page.keyboard.press("Tab")  # past the wheelbase, which its line says
+        page.keyboard.type("3.2")
+        page.keyboard.press("Enter")
+        expect(page.locator("#commissioning-asked")).to_contain_text("29 % of the empty weight on the front axle")
+        press("#commissioning-confirm")
+        expect(page.locator("#commissioning-claim")).to_be_visible()
+        expect(page.locator("#commissioning-entered")).to_contain_text("Confirmed though unusual")
+        press("#commissioning-empty .back")
+        expect(page.locator("[name=kerb_front_axle_kg]")).to_be_focused()
+        assert [said for said in watched.complaints if "ERR_FAILED" not in said] == []
+        gateway.board.close()
+
+
+def test_meanwhile_the_load_says_that_it_is_being_calibrated(gateway: Gateway, bench: Bench, watched: Watched) -> None:
+    gateway.publish(make_estimate(0, Why.NO_CALIBRATION))
+    in_steps(bench)
+    with serving(gateway.app) as server:
+        watched.page.goto(server.url)
+        expect(watched.page.locator("#note")).to_contain_text("the vehicle is being calibrated")
+        expect(watched.page.locator("#note")).not_to_contain_text("springscale")
         gateway.board.close()

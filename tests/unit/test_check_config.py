@@ -1,6 +1,7 @@
 """check-config calls good only what can run; the help of replay offers only what works here."""
 
 import importlib.util
+import re
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from click.testing import CliRunner, Result
 from support.commissioning import Bench, fitted, in_steps
 
 from gateway.bus.live import usable_interfaces, what_lacks
+from gateway.bus.signals.signal_map import shipped_map
 from gateway.cli import springscale
 from gateway.errors import ConfigurationError
 from gateway.web import Scope, TokenFile
@@ -63,6 +65,32 @@ def test_what_cannot_run_is_not_called_good(
     assert isinstance(found.exception, ConfigurationError)
     assert words in str(found.exception)
     assert "springscale.toml: " in str(found.exception)
+
+
+def test_a_map_that_cannot_weigh_is_not_called_good(tmp_path: Path) -> None:
+    found = checked(tmp_path)
+    assert found.exit_code == 0
+    shipped = shipped_map("reference")
+    text = re.sub(r"(?ms)^\[signals\.pitch_rate\].*?(?=^\[|\Z)", "", shipped.read_text())
+    (tmp_path / "map.toml").write_text(text)
+    for dbc in shipped.parent.glob("*.dbc"):
+        (tmp_path / dbc.name).write_bytes(dbc.read_bytes())
+    config = tmp_path / "springscale.toml"
+    config.write_text(config.read_text().replace("springscale:reference", str(tmp_path / "map.toml")))
+    again = CliRunner().invoke(springscale, ["check-config", str(config)])
+    assert isinstance(again.exception, ConfigurationError)
+    assert "maps no pitch_rate: nothing can be weighed without it" in str(again.exception)
+
+
+def test_a_store_that_cannot_be_written_is_not_called_good(tmp_path: Path) -> None:
+    (tmp_path / "state").write_text("no folder")
+    found = checked(tmp_path)
+    assert isinstance(found.exception, ConfigurationError)
+    assert f"{tmp_path / 'state'} is a file; name a folder" in str(found.exception)
+    config = tmp_path / "springscale.toml"
+    config.write_text(config.read_text().replace(str(tmp_path / "state"), "/proc/sys/springscale"))
+    again = CliRunner().invoke(springscale, ["check-config", str(config)])
+    assert "directory = /proc/sys/springscale: " in str(again.exception)
 
 
 def test_every_fault_is_named_at_once(tmp_path: Path) -> None:

@@ -29,6 +29,7 @@ from gateway.records import Why
 from gateway.service.commissioning import commissioned, with_commissioned
 from gateway.service.commissioning.record import FILE_NAME, MOST_MADE, load_record
 from gateway.stated import VehicleAnswers
+from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.units import NS_PER_S
 from gateway.web.routes.commissioning import CommissioningState
 
@@ -258,6 +259,77 @@ def test_what_a_line_shares_need_not_be_typed(tmp_path: Path, typed: dict[str, A
     assert vehicle.payload_range_kg == (0.0, payload_kg)
     assert (vehicle.gross_limit_kg, vehicle.track_width_m) == (2300.0, 1.6)
     assert vehicle.kerb_front_axle_kg == ANSWERS["kerb_front_axle_kg"]
+
+
+CONTRADICTED = Doubt.of(DoubtKind.DRIVEN_LINE)
+SLIPPED = {**ANSWERS, "kerb_front_axle_kg": 69.0}
+
+
+def test_unlikely_answers_are_kept_and_nothing_goes_on_until_they_are_confirmed(bench: Bench) -> None:
+    in_steps(bench, until="vehicle")
+    bench.desk.state_vehicle(VehicleAnswers(**SLIPPED))
+    now = underway(bench)
+    assert (now["step"], now["vehicle"]["kerb_front_axle_kg"]) == ("vehicle", 69.0)
+    assert {one["kind"] for one in now["doubts"]} == {"mass", "front_share"}
+    assert now["doubts"][0]["meant"] == {"kerb_front_axle_kg": 690.0}
+    assert reason(lambda: bench.desk.is_empty("x")) == "wrong_step"
+    bench.desk.confirm("workshop")
+    now = underway(bench)
+    assert (now["step"], now["doubts"], len(now["confirmed"])) == ("empty", [], 2)
+    assert reason(lambda: bench.desk.confirm("x")) == "nothing_doubted"
+    assert "commissioning_doubt_confirmed" in bench.events
+    bench.desk.is_empty("workshop")
+    bench.drive(0)
+    bench.drive(1)
+    bench.worker.finish(fitted())
+    assert any("did you mean kerb_front_axle_kg = 690?" in one for one in told(bench)["active"]["warnings"])
+
+
+def test_corrected_answers_leave_no_doubt(bench: Bench) -> None:
+    in_steps(bench, until="vehicle")
+    bench.desk.state_vehicle(VehicleAnswers(**SLIPPED))
+    bench.desk.state_vehicle(VehicleAnswers(**ANSWERS))
+    assert (underway(bench)["step"], underway(bench)["doubts"]) == ("empty", [])
+
+
+def test_a_fit_that_contradicts_the_facts_is_held_until_somebody_confirms(driving: Bench) -> None:
+    doubtful = fitted().model_copy(update={"doubts": (CONTRADICTED,)})
+    for n in range(2):
+        driving.drive(n)
+        driving.worker.finish(doubtful)
+    assert told(driving)["active"] is None
+    assert [one["kind"] for one in underway(driving)["doubts"]] == ["driven_line"]
+    driving.desk.confirm("workshop")
+    assert underway(driving)["step"] == "fit"
+    driving.worker.finish(doubtful)
+    assert told(driving)["active"] is not None
+
+
+def test_where_it_was_not_empty_the_drive_begins_again(driving: Bench) -> None:
+    driving.drive(0)
+    driving.worker.finish(fitted().model_copy(update={"doubts": (CONTRADICTED,)}))
+    driving.desk.is_empty("workshop")
+    assert underway(driving)["n_batches"] == 1  # said once more, it changes nothing
+    driving.desk.is_empty("workshop", again=True)
+    now = underway(driving)
+    assert (now["step"], now["n_batches"], now["doubts"], now["learned"]) == ("drive", 0, [], None)
+    driving.drive(1)
+    assert underway(driving)["n_batches"] == 1
+
+
+def test_the_open_window_counts_from_its_first_second(driving: Bench) -> None:
+    assert (underway(driving)["driven_s"], underway(driving)["next_window_s"]) == (0.0, None)
+    driving.drives.drive_start_ns = NOW_NS
+    driving.drives.open_window_ns = (NOW_NS, NOW_NS + 50 * NS_PER_S)
+    assert (underway(driving)["driven_s"], underway(driving)["next_window_s"]) == (50.0, 250.0)
+
+
+def test_a_window_that_had_begun_before_the_claim_does_not_count(bench: Bench) -> None:
+    in_steps(bench, until="empty")
+    bench.drives.drive_start_ns, bench.drives.newest_ns = NOW_NS, NOW_NS + 100 * NS_PER_S
+    bench.desk.is_empty("workshop")
+    bench.drives.open_window_ns = (NOW_NS, NOW_NS + 120 * NS_PER_S)
+    assert (underway(bench)["driven_s"], underway(bench)["next_window_s"]) == (0.0, 480.0)
 
 
 def test_cancel_forgets_all_but_what_was_made(driving: Bench) -> None:

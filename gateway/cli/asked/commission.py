@@ -9,7 +9,7 @@ import click
 
 from gateway.cli.asked.service import Service, asks_service
 from gateway.cli.options import FILE, NUMBER, as_json
-from gateway.cli.text.commission import lines_text, progress_text, state_text, underway_text
+from gateway.cli.text.commission import doubts_text, lines_text, progress_text, state_text, underway_text
 from gateway.cli.text.progress import StatusLine
 from gateway.core.cargo import Carries
 from gateway.errors import ConfigurationError, SpringscaleError
@@ -63,6 +63,7 @@ def commission() -> None:
 @click.option("--roof-rack", is_flag=True, default=None, help="part of the load may lie on the roof")
 @click.option("--tow-bar", is_flag=True, default=None, help="part of the load may hang on a tow bar")
 @click.option("--empty", is_flag=True, help="you know that the vehicle is empty, and will be until this is over")
+@click.option("--sure", is_flag=True, help="what is asked about is right all the same")
 @click.option("--note", default=None, help="kept in the history")
 @click.option("--follow/--no-follow", default=None, help="show progress until it is made [default: at a terminal]")
 @asks_service
@@ -71,6 +72,7 @@ def start(
     service: Service,
     line: str | None,
     empty: bool,
+    sure: bool,
     note: str | None,
     follow: bool | None,
     as_json: bool,
@@ -84,6 +86,12 @@ def start(
         state = service.ask(f"{PATH}/line", "POST", {"line": _line(service, line)})
     if any(answer is not None for answer in said.values()) or state["underway"]["vehicle"] is None:
         state = service.ask(f"{PATH}/vehicle", "POST", _vehicle(said))
+    if doubts := state["underway"]["doubts"]:
+        if not (sure or (_is_at_terminal() and click.confirm(f"{doubts_text(doubts)}\nIs it right all the same?"))):
+            raise SpringscaleError(
+                f"{doubts_text(doubts)}\ncorrect the answers, or say --sure; all that was answered is kept"
+            )
+        state = service.ask(f"{PATH}/confirm", "POST", {})
     if state["underway"]["step"] == "empty":
         if not (empty or (_is_at_terminal() and click.confirm("Is the vehicle empty, driver and tank as in service?"))):
             raise SpringscaleError("say --empty once the vehicle is empty; all that was answered is kept")
@@ -129,6 +137,22 @@ def upload(service: Service, file: Path, as_json: bool) -> None:
 def fit(service: Service, as_json: bool) -> None:
     """Make the calibration of what was driven so far, enough or not."""
     _tell(service.ask(f"{PATH}/fit", "POST", {}), as_json=as_json)
+
+
+@commission.command("confirm")
+@asks_service
+@as_json
+def confirm(service: Service, as_json: bool) -> None:
+    """What is asked about is right all the same; where the drive contradicts it, its calibration is used."""
+    _tell(service.ask(f"{PATH}/confirm", "POST", {}), as_json=as_json)
+
+
+@commission.command("again")
+@asks_service
+@as_json
+def again(service: Service, as_json: bool) -> None:
+    """It was not empty, but is now: forget what was driven, and begin the empty drive again."""
+    _tell(service.ask(f"{PATH}/empty", "POST", {"is_empty": True, "again": True}), as_json=as_json)
 
 
 @commission.command("cancel")
@@ -225,6 +249,8 @@ def _follow(service: Service) -> None:
             if state["underway"] is None:
                 break
             status.show(progress_text(state["underway"]))
+            if any(one["is_of_drive"] for one in state["underway"]["doubts"]):
+                raise SpringscaleError(underway_text(state["underway"]))
             if state["underway"]["fault"] or (state["underway"]["inspection"] or {}).get("has_fault"):
                 raise SpringscaleError(underway_text(state["underway"]))
             time.sleep(LOOK_EVERY_S)

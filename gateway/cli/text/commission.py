@@ -33,6 +33,11 @@ def underway_text(underway: dict[str, Any]) -> str:
     lines = [f"next: {STEPS[underway['step']]}"]
     if underway["n_batches"] or underway["driven_s"]:
         lines.append(progress_text(underway))
+    if underway["doubts"]:
+        lines.append(doubts_text(underway["doubts"]))
+        lines.append("`springscale commission confirm` where it is right all the same")
+    if any(one["is_of_drive"] for one in underway["doubts"]):
+        lines.append("`springscale commission again` where it was not empty, but is now")
     if underway["fault"]:
         lines.append(f"no calibration yet: {underway['fault']}")
     inspection = underway["inspection"] or {"findings": []}
@@ -40,10 +45,20 @@ def underway_text(underway: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def doubts_text(doubts: list[dict[str, Any]]) -> str:
+    """What is asked, one line each, and the answers that were probably meant."""
+    lines = [f"is this right? {one['text']}: {one['advice']}" for one in doubts]
+    meant = doubts[0]["meant"]
+    said = " and ".join(f"{name} = {x[1] if isinstance(x, list) else x:g}" for name, x in meant.items())
+    return "\n".join([*lines, *([f"did you mean {said}?"] if said else [])])
+
+
 def progress_text(underway: dict[str, Any]) -> str:
     """One line, while it is driven."""
     driven = f"{underway['driven_s'] / 60.0:.0f} min driven, {one_or_more(underway['n_batches'], 'window', 'windows')}"
-    learned = underway["learned"]
+    learned, next_s = underway["learned"], underway["next_window_s"]
+    if next_s is not None:
+        driven += f", next window in {int(next_s) // 60}:{int(next_s) % 60:02}"
     if learned is None:
         return f"{driven}: nothing is known yet"
     return (

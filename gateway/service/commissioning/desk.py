@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, Protocol
 
+from gateway.calibration.campaign import VehicleTable
 from gateway.calibration.commissioning import doubts_of, vehicle_table
 from gateway.calibration.kept import KeptBatch, Shelf
 from gateway.errors import CampaignError, CommissioningRefusedError
@@ -143,7 +144,7 @@ class Commissioning:
             if name is not None:
                 choice, content = self._lines.choose(name, source or UPLOADED)
                 self._book.write(str(choice.copy_name), content)
-            self._require_alike(choice, underway.vehicle)
+            self._require_usable(choice, underway.vehicle)
             self._book.keep(underway.model_copy(update={"line": choice} | _anew(underway.vehicle, choice)))
             self._drive.fit()
             return self.told()
@@ -153,7 +154,7 @@ class Commissioning:
         with self._book.lock:
             underway = self._underway(Step.VEHICLE)
             line = underway.line or LineChoice(name="")
-            self._require_alike(line, answers)
+            self._require_usable(line, answers)
             self._book.keep(underway.model_copy(update={"vehicle": answers} | _anew(answers, line)))
             self._drive.fit()
             return self.told()
@@ -165,6 +166,8 @@ class Commissioning:
             doubts = underway.open_doubts
             if not doubts:
                 raise CommissioningRefusedError("nothing_doubted", "nothing is asked: there is nothing to confirm")
+            if underway.line is not None and underway.vehicle is not None:
+                require_alike(self._book.directory, underway.line, self._table(underway.vehicle, underway.line))
             kinds = tuple(dict.fromkeys(one.kind for one in doubts))
             confirmed = Confirmed(at=self._book.now(), by=by, kinds=kinds)
             is_of_drive = any(kind in OF_THE_DRIVE for kind in kinds)
@@ -264,20 +267,19 @@ class Commissioning:
             raise CommissioningRefusedError("fitting", "the calibration is being made: wait for it, or cancel")
         return underway
 
-    def _require_alike(self, line: LineChoice, answers: VehicleAnswers | None) -> None:
-        if answers is None:
-            return
+    def _require_usable(self, line: LineChoice, answers: VehicleAnswers | None) -> None:
+        """Raises CommissioningRefusedError where no vehicle follows, or one that is not of the line without a doubt."""
+        if answers is not None:
+            table = self._table(answers, line)
+            if not doubts_of(answers, line.facts):
+                require_alike(self._book.directory, line, table)
+
+    def _table(self, answers: VehicleAnswers, line: LineChoice) -> VehicleTable:
         try:
-            table = vehicle_table(answers, self._vehicle.name)
+            return vehicle_table(answers, self._vehicle.name)
         except CampaignError as fault:
             meant = meant_by(doubts_of(answers, line.facts))
             raise CommissioningRefusedError("vehicle_unusable", f"{fault}{meant}") from None
-        if line.copy_name is not None:
-            try:
-                require_alike(self._book.directory / line.copy_name, table)
-            except CommissioningRefusedError as fault:
-                meant = meant_by(doubts_of(answers, line.facts))
-                raise CommissioningRefusedError(fault.reason, f"{fault}{meant}") from None
 
     def _require_allowed(self) -> None:
         if self._vehicle.why_not_allowed is not None:

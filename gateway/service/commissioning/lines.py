@@ -135,10 +135,12 @@ class Lines:
         return held, content
 
 
-def require_alike(path: Path, vehicle: VehicleTable) -> None:
-    """Raises CommissioningRefusedError where a vehicle is none of the line whose copy lies at ``path``."""
+def require_alike(directory: Path, line: LineChoice, vehicle: VehicleTable) -> None:
+    """Raises CommissioningRefusedError where a vehicle is none of the line, whose copy lies in ``directory``."""
+    if line.copy_name is None:
+        return
     try:
-        line_of_files([load_like(path)]).prior_of(vehicle.stated, with_roll=False)
+        line_of_files([load_like(directory / line.copy_name)]).prior_of(vehicle.stated, with_roll=False)
     except (CalibrationFileError, LineError) as fault:
         raise CommissioningRefusedError("not_of_the_line", str(fault)) from None
 

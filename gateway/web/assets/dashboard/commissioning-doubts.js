@@ -34,7 +34,8 @@ export function meantText(doubts) {
   const meant = Object.entries(doubts[0]?.meant ?? {}).filter(([name]) => name in FIELDS);
   if (meant.length === 0) return "";
   const digits = (name) => (name.endsWith("_kg") ? 0 : 2);
-  const answers = meant.map(([name, x]) => `${phrase(FIELDS[name]).split("[")[0].split(":")[0].trim()} ${number(answer(x), digits(name))} ${name.endsWith("_kg") ? "kg" : "m"}`);
+  const label = (name) => phrase(FIELDS[name]).split(/[[:]/)[0].trim(); // without the unit and the explanation
+  const answers = meant.map(([name, x]) => `${number(answer(x), digits(name))} ${name.endsWith("_kg") ? "kg" : "m"} (${label(name)})`);
   return phrase("com_meant", { answers: answers.join(", ") });
 }
 

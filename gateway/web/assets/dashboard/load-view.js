@@ -8,18 +8,21 @@ import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as nam
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 
 /** What became of the last batch, where none was weighed yet, and what to do about it. */
-function noneYet(refusal, reasons) {
+function noneYet(refusal, reasons, commissioning) {
   if (refusal == null) return phrase("none_yet");
+  if (refusal.rejected.includes("no_calibration") && commissioning?.is_allowed) {
+    return phrase(commissioning.underway || commissioning.is_pending ? "none_meanwhile" : "none_uncalibrated");
+  }
   const advice = refusal.rejected.map((reason) => reasons.get(reason)?.advice).filter(Boolean).map((text) => `${text.replaceAll("`", "")}.`);
   const todo = advice.length ? phrase("to_do", { advice: advice.join(" ") }) : "";
   return phrase("none_because", { reasons: named(refusal.rejected) }) + todo;
 }
 
-function notes(latest, reasons) {
+function notes(latest, reasons, commissioning) {
   const said = [];
   if (latest.is_stale) said.push(phrase("note_old"));
   if (latest.provisional) said.push(phrase("note_early"));
-  if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons));
+  if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons, commissioning));
   else if (latest.rejected.length) said.push(phrase("note_none", { reasons: named(latest.rejected) }));
   return said.join(" ");
 }
@@ -84,7 +87,7 @@ show(({ latest, sources, remedies }) => {
   }));
 }, "latest", "sources", "remedies");
 
-show(({ latest, vehicle, reasons, isReachable }) => {
+show(({ latest, vehicle, reasons, commissioning, isReachable }) => {
   if (latest === null) return;
   const seen = vehicle?.calibration;
   writeNumber("payload", latest.payload_kg, 0, "kg");
@@ -99,11 +102,11 @@ show(({ latest, vehicle, reasons, isReachable }) => {
   element("conditioned").hidden = latest.raw_payload_kg == null;
   write("raw-payload", withStd(latest.raw_payload_kg, latest.raw_payload_std_kg, 0, "kg"));
   element("latest").classList.toggle("stale", latest.is_stale || isReachable === false);
-  say("note", notes(latest, reasons));
+  say("note", notes(latest, reasons, commissioning));
   document.title = latest.payload_kg == null ? "Springscale" : `${figure(latest.payload_kg, 0, "kg")} – Springscale`;
   showAge();
   announce(latest);
-}, "latest", "vehicle", "reasons", "isReachable");
+}, "latest", "vehicle", "reasons", "commissioning", "isReachable");
 
 element("budget").open = matchMedia("(min-width: 56rem)").matches; // where there is room for it
 setInterval(() => known.latest && showAge(), 1000);

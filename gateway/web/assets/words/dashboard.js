@@ -81,6 +81,14 @@ export const DASHBOARD = {
   fault_refused: ["Batches are refused because of a sensor", "Abschnitte werden wegen eines Sensors abgelehnt"],
 
   load: ["Load now", "Ladung jetzt"],
+  none_meanwhile: [
+    "Not weighed yet: the vehicle is being calibrated. \u201cCalibrate on this vehicle\u201d says what comes next.",
+    "Noch nicht gewogen: Das Fahrzeug wird gerade kalibriert. „An diesem Fahrzeug kalibrieren“ sagt, was als Nächstes kommt.",
+  ],
+  none_uncalibrated: [
+    "Not weighed: the vehicle is not calibrated. \u201cCalibrate on this vehicle\u201d begins it.",
+    "Nicht gewogen: Das Fahrzeug ist nicht kalibriert. „An diesem Fahrzeug kalibrieren“ beginnt damit.",
+  ],
   payload: ["Payload", "Nutzlast"],
   share: ["On the front axle", "Auf der Vorderachse"],
   gross: ["Gross weight", "Gesamtgewicht"],
