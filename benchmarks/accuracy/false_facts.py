@@ -29,7 +29,7 @@ from gateway.sim.vans import VANS
 from gateway.sim.vehicle import Load
 from gateway.stated import DIVISION_KG, VehicleAnswers
 
-SEED: Final = 20303
+SEED: Final = 20304
 N_LINES: Final = 3
 N_RIGHT: Final = 20
 POUNDS_PER_KG: Final = 1.0 / 0.45359237

@@ -35,10 +35,9 @@ from gateway.estimate import Z95
 from gateway.records import F64
 from gateway.stated.doubt import Doubt, DoubtKind
 
-SELDOM: Final = (
-    1e-4  # so seldom a true fact is doubted, where vehicles of a line differ as is believed; chosen: fleets differ more
-)
-LINES_DIFFER: Final = 2.0  # variance over what is believed of a line before siblings told it; chosen
+SELDOM: Final = 1e-3  # so seldom true weights are doubted; a question costs less than a false calibration
+SELDOM_LINE: Final = 1e-4  # so seldom a vehicle of the line is called none
+LINES_DIFFER: Final = 2.0  # variance of vehicles of a line over what is believed before siblings told it; chosen
 STATED_STD: Final = 0.02  # of each axle's weight: fuel, driver, what lies about, the scales' step; chosen
 DOUBTED_STDS: Final = 4.0  # of a length that the drive tells
 LOOKED_STDS: Final = 3.0  # of the time between the axles: from here on it is sought anew, free
@@ -161,5 +160,5 @@ def _axle_directions(vehicle: Vehicle) -> F64:
 def _line(fitted: _Fitted) -> Iterator[Doubt]:
     """Whether it is of this line at all: all that vehicles of a line share, each by itself."""
     off, covariance = fitted.amount(np.eye(_N)[:, _BUILT])
-    if off @ np.linalg.solve(LINES_DIFFER * covariance, off) > chi2.isf(SELDOM, len(_BUILT)):
+    if off @ np.linalg.solve(LINES_DIFFER * covariance, off) > chi2.isf(SELDOM_LINE, len(_BUILT)):
         yield Doubt.of(DoubtKind.DRIVEN_LINE)

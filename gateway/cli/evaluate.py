@@ -7,7 +7,17 @@ import click
 
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
-from gateway.calibration.judgement import Errors, ErrorTable, Judged, Part, TargetErrors, assess_evaluation, error_table
+from gateway.calibration.judgement import (
+    TARGETS,
+    Errors,
+    ErrorTable,
+    Judged,
+    Part,
+    TargetErrors,
+    assess_evaluation,
+    error_table,
+    width_of,
+)
 from gateway.cli.options import CAMPAIGN, FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.text.progress import counted
 from gateway.errors import ConfigurationError
@@ -73,11 +83,20 @@ def _text(table: ErrorTable) -> str:
         _row("front share", errors.front_share),
         *_sideways_lines(errors),
         "",
+        *_widths(table),
         f"{'run':>4}  {'true':>18}{'batches':>9}{'rejected':>10}"
         f"{'payload, mean |e|':>19}{'bias':>10}{'share, mean |e|':>17}{'bias':>10}",
         *(_run_row(first, of_run) for first, of_run in table.runs),
     ]
     return "\n".join(lines)
+
+
+def _widths(table: ErrorTable) -> Iterator[str]:
+    """How wide intervals are, judged, and why."""
+    widths = [width_of(table.judged, table.errors.of(target), target) for target in TARGETS]
+    if any(widths):
+        yield from (width.sentence for width in widths if width is not None)
+        yield ""
 
 
 def _row(name: str, errors: TargetErrors) -> str:

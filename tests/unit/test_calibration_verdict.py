@@ -1,5 +1,6 @@
 """Fit for use or not: every rule by itself, on estimates made up for it."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.calibrated import calibration_file
 
+from gateway.budget import BudgetLine, Remedy
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import Finding, Inspection, RunVerdict, Severity
 from gateway.calibration.inspection.kinds import Kind
@@ -26,7 +28,7 @@ def judged(run: int, error_kg: float = 0.0, half_kg: float = 20.0, error_pp: flo
     estimate = Estimate(
         0, 1, "cross_spectrum",
         payload=Quantity(payload_kg, interval95=(payload_kg - half_kg, payload_kg + half_kg)),
-        front_share=Quantity(share_pct, interval95=(share_pct - 5.0, share_pct + 5.0)),
+        front_share=Quantity(share_pct, interval95=(share_pct - 4.0, share_pct + 4.0)),
     )  # fmt: skip
     return Judged(run, f"{run}.log", 200.0, 50.0, estimate)
 
@@ -69,7 +71,7 @@ def test_a_calibration_that_errs_little_is_fit() -> None:
     [(44.0, Grade.FIT), (46.0, Grade.RESERVED), (89.0, Grade.RESERVED), (91.0, Grade.UNFIT)],
 )
 def test_mean_errors_of_a_tenth_and_a_fifth_of_the_range_are_the_limits(error_kg: float, grade: Grade) -> None:
-    found = verdict([judged(run, error_kg, half_kg=200.0) for run in range(1, 11)])
+    found = verdict([judged(run, error_kg, half_kg=110.0) for run in range(1, 11)])
     assert (found.grade, grade_of(found, "payload_error")) == (grade, grade)
 
 
@@ -83,6 +85,28 @@ def test_intervals_too_narrow_are_told_from_bad_luck(n_missed: int, grade: Grade
     """30 of an interval of 20 kg is a miss; one batch a run, ten runs."""
     rows = [judged(run, error_kg=30.0 if run <= n_missed else 1.0) for run in range(1, 11)]
     assert grade_of(verdict(rows), "payload_coverage") is grade
+
+
+@pytest.mark.parametrize(("half_kg", "grade"), [(110.0, Grade.FIT), (120.0, Grade.RESERVED), (230.0, Grade.UNFIT)])
+def test_true_intervals_that_hold_nearly_every_load_are_of_no_use(half_kg: float, grade: Grade) -> None:
+    found = verdict([judged(run, half_kg=half_kg) for run in range(6)])
+    assert grade_of(found, "payload_half_width") is grade
+    text = next(one.text for one in found.reasons if one.rule == "payload_half_width")
+    assert f"± {half_kg:.0f} kg in the mean, {half_kg / 4.5:.0f} % of the range" in text
+
+
+def test_the_width_names_its_main_cause_and_what_would_narrow_it() -> None:
+    lines = (
+        BudgetLine("load_length", 60.0, 0.2, math.nan, Remedy.SAY_WHAT_IS_CARRIED, 35.0),
+        BudgetLine("day", 20.0, 0.4, math.nan, Remedy.WEIGH_EMPTY, 62.0),
+    )
+    rows = [judged(run, half_kg=124.0) for run in range(6)]
+    rows = [replace(one, estimate=replace(one.estimate, error_budget=lines)) for one in rows]
+    text = next(one.text for one in verdict(rows).reasons if one.rule == "payload_half_width")
+    assert text.endswith(
+        "Mostly by how long and high this very load is: say in the vehicle's data what it carries, and how long and "
+        "high that is (then ± 69 kg)."
+    )
 
 
 def test_batches_of_one_run_say_no_more_of_coverage_than_the_run() -> None:

@@ -32,6 +32,7 @@ from gateway.calibration.judgement.evaluation import (
 from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, Spread, curve_of
 from gateway.calibration.judgement.sideways import CgLeftErrors, WheelErrors
 from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
+from gateway.calibration.judgement.width import Width, width_of
 
 __all__ = [
     "LEVELS",
@@ -56,6 +57,7 @@ __all__ = [
     "TargetErrors",
     "Verdict",
     "WheelErrors",
+    "Width",
     "answers_of",
     "assess_calibration",
     "assess_evaluation",
@@ -68,4 +70,5 @@ __all__ = [
     "standardised",
     "stated_budget",
     "verdicts_of",
+    "width_of",
 ]

@@ -18,6 +18,7 @@ from gateway.calibration.inspection.kinds import Kind
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement, Part
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Target, TargetErrors
+from gateway.calibration.judgement.width import Width, width_of
 from gateway.calibration.plan import Expected
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.vehicle import Vehicle
@@ -102,6 +103,7 @@ def _errors_and_intervals(judgement: Judgement) -> Iterator[Reason]:
     yield from (_error(table.errors, part, target) for target in TARGETS)
     for target in TARGETS:
         yield from _coverage(table.judged, part, target)
+        yield from _half_width(width_of(table.judged, table.errors.of(target), target))
         yield from _width(table.judged, part, target)
     yield _answered(table.errors, part)
     if part is Part.LEFT_OUT and Part.VALIDATION in judgement.tables:
@@ -152,6 +154,13 @@ def _coverage(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[
         f"of {PART_NAMES[part]}; what {coverage.n_clusters} runs can tell of it is {100.0 * coverage.low:.0f} to "
         f"{100.0 * coverage.high:.0f} %.",
     )
+
+
+def _half_width(width: Width | None) -> Iterator[Reason]:
+    """Intervals that are true and hold nearly every load are of no use."""
+    if width is not None:
+        grade = Grade.FIT if width.is_fit else Grade.RESERVED if width.is_of_use else Grade.UNFIT
+        yield Reason(f"{width.target}_half_width", grade, width.sentence)
 
 
 def _width(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[Reason]:

@@ -192,7 +192,8 @@ class Commissioning:
                 at=self._book.now(), by=by, drive_start_ns=self._drives.drive_start_ns, newest_ns=self._drives.newest_ns
             )
             if underway.empty is None or again:
-                self._drive.forget()
+                if underway.empty is not None:
+                    self._drive.forget()
                 self._book.keep(underway.model_copy(update={"empty": claim} | _not_driven(underway)))
                 self._book.tell(Event.COMMISSIONING, {"step": Step.DRIVE, "by": by})
             return self.told()
