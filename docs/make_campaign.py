@@ -4,9 +4,15 @@ from pathlib import Path
 
 from generated import keep_up_to_date, key_table
 
-from gateway.calibration.axle_weights import DIVISION_KG, AxleWeights, sprung_of
+from gateway.calibration.axle_weights import (
+    DIVISION_KG,
+    ESTIMATED_UNSPRUNG_STD,
+    UNSPRUNG_SHARE,
+    WEIGHED_STD,
+    AxleWeights,
+    sprung_of,
+)
 from gateway.calibration.campaign import CampaignTable, RunTable, VehicleTable
-from gateway.calibration.half_car.prior import ESTIMATED_UNSPRUNG_STD, UNSPRUNG_SHARE, WEIGHED_STD
 from gateway.cli.text.axle_weights import vehicle_block
 
 PAGE = Path(__file__).with_name("campaign.md")

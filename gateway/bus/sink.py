@@ -13,6 +13,7 @@ import can
 
 from gateway.bus.frames import take
 from gateway.bus.live import require_known_interface
+from gateway.bus.live.source import system_reason
 from gateway.bus.logs import LogReport, open_whole_log
 from gateway.bus.messages import message_of
 from gateway.errors import BusError
@@ -37,7 +38,8 @@ class BusSink(AbstractContextManager["BusSink"]):
         try:
             self._bus = can.Bus(interface=interface, channel=channel, ignore_config=True, **options)
         except (OSError, can.CanError, TypeError, ValueError) as fault:
-            raise BusError(f"cannot send on {interface} {channel}: {fault}") from fault
+            raise BusError(f"cannot send on {interface} {channel}: {system_reason(fault, channel)}") from fault
+        self._channel = channel
         self._name = f"{interface} {channel}"
 
     def send(self, frames: Frames) -> None:
@@ -46,7 +48,7 @@ class BusSink(AbstractContextManager["BusSink"]):
             for row in range(len(frames)):
                 self._bus.send(message_of(frames, row), timeout=SEND_TIMEOUT_S)
         except (OSError, can.CanError) as fault:
-            raise BusError(f"cannot send on {self._name}: {fault}") from fault
+            raise BusError(f"cannot send on {self._name}: {system_reason(fault, self._channel)}") from fault
 
     def __exit__(
         self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None

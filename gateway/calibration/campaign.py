@@ -3,10 +3,11 @@
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from gateway.calibration.axle_weights import AxleWeights, sprung_of
 from gateway.core.vehicle import (
     MEASURED_OFFSET_STD_M,
     PAYLOAD_LEFT_STD_M,
@@ -212,7 +213,7 @@ def load_campaign(path: Path, *, may_lack_runs: bool = False) -> Campaign:
     """
     tables = read_toml(path, CampaignError)
     model = DraftTable if may_lack_runs and not tables.get("runs") else CampaignTable
-    campaign = Campaign(path, checked(tables, path, model, CampaignError))
+    campaign = Campaign(path, checked(_with_sprung(tables, path), path, model, CampaignError))
     faults = [f"{path}: vehicle.{fault}" for fault in _range_faults(campaign.vehicle)]
     faults += [
         f"{path}: runs[{i}].{fault}" for i, run in enumerate(campaign.runs, 1) for fault in _faults(campaign, run)
@@ -220,6 +221,22 @@ def load_campaign(path: Path, *, may_lack_runs: bool = False) -> Campaign:
     if faults:
         raise CampaignError("\n".join(faults))
     return campaign
+
+
+def _with_sprung(tables: dict[str, Any], path: Path) -> dict[str, Any]:
+    """With the sprung mass and its share that follow from the axle weights, where these alone are stated."""
+    vehicle = tables.get("vehicle")
+    if not isinstance(vehicle, dict) or "empty_mass_kg" in vehicle:
+        return tables
+    front_kg, rear_kg = (vehicle.get(f"kerb_{end}_axle_kg") for end in ("front", "rear"))
+    if not (isinstance(front_kg, int | float) and isinstance(rear_kg, int | float)):
+        return tables
+    unsprung = (vehicle.get(f"unsprung_{end}_kg") for end in ("front", "rear"))
+    try:
+        sprung = sprung_of(AxleWeights(front_kg, rear_kg, *unsprung))
+    except CampaignError as fault:
+        raise CampaignError(f"{path}: vehicle.kerb_front_axle_kg: {fault}") from None
+    return {**tables, "vehicle": sprung.vehicle_keys() | vehicle}
 
 
 def _is_in_tonnes(payload_kg: float, vehicle: Vehicle) -> bool:

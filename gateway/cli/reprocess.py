@@ -1,9 +1,12 @@
 """springscale reprocess: a fleet's archive of logs to a data set of estimates, on all cores or on a cluster."""
 
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
+from typing import Final
 
 import click
 
@@ -13,11 +16,14 @@ from gateway.archive.manifest import load_manifest
 from gateway.archive.places import place_of
 from gateway.archive.processes import Processes
 from gateway.archive.reprocess import reprocess as reprocess_archive
+from gateway.archive.turns import Progress
 from gateway.cli.options import as_json, trusted_keys
 from gateway.cli.text.progress import StatusLine
 from gateway.cli.text.reprocess import forecast_in_words, how_far, summary_in_words
 from gateway.files.signed import pinned_by
 from gateway.records import json_line
+
+TOLD_EVERY_S: Final = 5.0
 
 
 @click.command("reprocess")
@@ -28,6 +34,7 @@ from gateway.records import json_line
 @click.option("--scheduler", default=None, help="address of a Dask scheduler, tcp://HOST:PORT [default: this computer]")
 @click.option("--workers", type=click.IntRange(1), default=None, help="processes on this computer [default: its cores]")
 @click.option("--dry-run", is_flag=True, help="tell how much there is and how long it will take; write nothing")
+@click.option("--keep-going", is_flag=True, help="end with 0 although logs could not be read or jobs failed")
 @click.option("--retry-failed", is_flag=True, help="try those jobs again, too, of which nothing could be made")
 @trusted_keys
 @as_json
@@ -37,13 +44,15 @@ def reprocess(
     scheduler: str | None,
     workers: int | None,
     dry_run: bool,
+    keep_going: bool,
     retry_failed: bool,
     trusted_keys: Path | None,
     as_json: bool,
 ) -> None:
     """Weighs every log of ARCHIVE anew: a manifest (.toml or .parquet), or a folder with an archive.toml in it.
 
-    What has a receipt is not done again, so that a run that was stopped goes on where it was. See docs/archive.md.
+    What has a receipt is not done again, so that a run that was stopped goes on where it was. With --json, progress
+    comes as JSON lines on standard error. See docs/archive.md.
     """
     if scheduler is not None and workers is not None:
         raise click.UsageError("give --scheduler ADDRESS or --workers N, not both")
@@ -54,12 +63,24 @@ def reprocess(
             click.echo(json_line(ahead.to_json()) if as_json else forecast_in_words(ahead))
             return
         with StatusLine() as line:
-            summary = reprocess_archive(
-                manifest, dataset, at_work, lambda progress: line.show(how_far(progress)), retry_failed=retry_failed
-            )
+            tell = _Progress() if as_json else lambda progress: line.show(how_far(progress))
+            summary = reprocess_archive(manifest, dataset, at_work, tell, retry_failed=retry_failed)
     click.echo(json_line(summary.to_json()) if as_json else summary_in_words(summary, output))
-    if not summary.is_good:
+    if not (summary.is_good or (keep_going and not summary.lost)):
         sys.exit(1)
+
+
+class _Progress:
+    """A line of JSON on standard error every few seconds, for a scheduler that watches the run."""
+
+    def __init__(self) -> None:
+        self._next_s = 0.0
+
+    def __call__(self, progress: Progress) -> None:
+        """Tell it, where it is time to, or where the last piece is done."""
+        if time.monotonic() >= self._next_s or progress.n_done == progress.n_total:
+            self._next_s = time.monotonic() + TOLD_EVERY_S
+            click.echo(json_line(asdict(progress) | {"remaining_s": progress.remaining_s}), err=True)
 
 
 @contextmanager

@@ -1,13 +1,36 @@
 """Logs in, load events and trips out: what `springscale events` prints, and the service tells of the same frames."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 
+from gateway.bus.logs.open import open_log
+from gateway.bus.signals import SignalMap
 from gateway.core.events import Entry, Ledger, Rules
 from gateway.core.settings import BatchSettings
 from gateway.errors import LogUnreadableError
 from gateway.offline.estimates import AS_THE_SERVICE, estimates_of_logs
 from gateway.setup import Setup
+
+
+def require_order(logs: Sequence[Path], signal_map: SignalMap) -> None:
+    """Raises LogUnreadableError where a log begins before the one that is named before it.
+
+    Loads and trips are told between drives, so that logs out of order would tell of loads that nobody moved.
+    """
+    begun = [(log, start_ns) for log in logs if (start_ns := _start_ns(log, signal_map)) is not None]
+    for (before, before_ns), (log, start_ns) in pairwise(begun):
+        if start_ns < before_ns:
+            raise LogUnreadableError(f"{log}: begins before {before}: name the logs in order of time")
+
+
+def _start_ns(log: Path, signal_map: SignalMap) -> int | None:
+    """Of the first frame that the map reads; None where there is none, of which the reader tells."""
+    try:
+        chunks, _ = open_log(log, signal_map)
+        return next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), None)
+    except LogUnreadableError:
+        return None
 
 
 def entries_of_logs(

@@ -50,7 +50,7 @@ def _store_that_cannot_be_written(directory: Path) -> Iterator[str]:
     elif os.statvfs(there).f_flag & os.ST_RDONLY:
         yield f"[store] directory = {directory}: lies on a file system that can only be read; name a folder elsewhere"
     elif not os.access(there, os.W_OK | os.X_OK) and (there != directory or there.stat().st_uid == os.geteuid()):
-        yield f"[store] directory = {directory}: {there} cannot be written; allow it (chmod u+w), or name another folder"
+        yield f"[store] directory = {directory}: {there} cannot be written; chmod u+w it, or name another folder"
 
 
 def _has_tokens(settings: Settings) -> bool:

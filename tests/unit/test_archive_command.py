@@ -52,6 +52,15 @@ def test_what_failed_ends_it_with_1_and_its_reason(archive: Path) -> None:
     assert "failed: 0 jobs, 1 log:\n  van-1/2.log: holds no CAN frame" in result.stdout
 
 
+def test_who_keeps_going_ends_with_0_and_a_scheduler_hears_how_far_it_is(archive: Path) -> None:
+    (archive / "van-1" / "2.log").write_bytes(b"nothing\n")
+    result = called(archive, "--keep-going", "--json")
+    assert result.exit_code == 0, result.output
+    last = [json.loads(line) for line in result.stderr.splitlines()][-1]
+    assert last["n_done"] == last["n_total"] > 0
+    assert json.loads(result.stdout)["n_logs"] == 2
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

@@ -9,9 +9,8 @@ from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.calibration.axle_weights import AxleWeights, Sprung, sprung_of
+from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
 from gateway.calibration.campaign import VehicleTable
-from gateway.calibration.half_car.prior import UNSPRUNG_SHARE
 from gateway.cli import springscale
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import unsprung_kg

@@ -8,6 +8,7 @@ import pytest
 from gateway.bus.frames import join
 from gateway.bus.logs import LogReport
 from gateway.bus.logs.candump import read_candump
+from gateway.bus.logs.open import open_whole_log
 from gateway.bus.logs.report import LogReject
 from gateway.bus.signals import IdFilter
 from gateway.bus.signals.mapping import exact_filter, j1939_filter
@@ -269,3 +270,11 @@ def test_the_report_tells_all_to_machines(read):
     told = report.to_json()
     assert told["rejects"] == {"half_byte": {"count": 1, "first_lines": [2]}}
     assert (told["lines"], told["frames"], told["wanted"]) == (2, 2, 1)
+
+
+@pytest.mark.parametrize(("start", "kind"), [(b"\x89PNG\r\n\x1a\n", "a PNG image"), (b"LOGG", "a BLF log")])
+def test_another_kind_of_file_named_as_a_log_is_none(start, kind, tmp_path):
+    path = tmp_path / "a.log"
+    path.write_bytes(start + bytes(range(256)) * 40)
+    with pytest.raises(LogUnreadableError, match=kind):
+        open_whole_log(path)

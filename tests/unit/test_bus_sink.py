@@ -1,5 +1,6 @@
 """Replay: every frame once, in order, paced by the stamps, with progress, and stopped when told."""
 
+import errno
 import threading
 import time
 
@@ -145,3 +146,12 @@ def test_pacing_holds_on_a_real_clock():
     with BusSink("virtual", "sink-5") as sink:
         replay_frames([frames(1.0, 1.05)], sink, 1.0)
     assert time.monotonic() - begun_s >= 0.05
+
+
+def test_a_channel_that_is_missing_is_explained_as_the_service_explains_it(monkeypatch):
+    def missing(**_):
+        raise OSError(errno.ENODEV, "No such device")
+
+    monkeypatch.setattr(can, "Bus", missing)
+    with pytest.raises(BusError, match=r"cannot send on socketcan vcan9: the interface does not exist"):
+        BusSink("socketcan", "vcan9")

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.commissioning import vehicle_table
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import (
     MEASURED_OFFSET_STD_M,
@@ -13,6 +14,7 @@ from gateway.core.vehicle import (
     UNKNOWN_OFFSET_STD_M,
 )
 from gateway.errors import CampaignError
+from gateway.stated import VehicleAnswers
 
 VEHICLE = {"name": '"van"', "empty_mass_kg": "1240.0", "wheelbase_m": "2.8", "sensor_position_m": "3.2"}
 EMPTY_RUN = {"log": '"a.log"', "payload_kg": "0.0"}
@@ -57,6 +59,18 @@ def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     assert campaign.log_of(campaign.runs[0]) == tmp_path / "a.log"
     assert campaign.identification_fraction == 0.667
     assert loaded(tmp_path, campaign_text('signals = "springscale:aceinna"')).signals == "springscale:aceinna"
+
+
+def test_axle_weights_stand_for_the_sprung_mass_as_in_the_commissioning(tmp_path: Path) -> None:
+    weights = {"kerb_front_axle_kg": "713.0", "kerb_rear_axle_kg": "704.0"}
+    text = campaign_text(vehicle=weights).replace("empty_mass_kg = 1240.0\n", "")
+    vehicle = loaded(tmp_path, text).vehicle
+    said = VehicleAnswers(
+        kerb_front_axle_kg=713.0, kerb_rear_axle_kg=704.0, wheelbase_m=2.8, sensor_position_m=3.2, name="van"
+    )
+    assert vehicle == vehicle_table(said, "van").stated
+    assert "weigh each axle with the body on it" in fault_of(tmp_path, text.replace("713.0", "20.0"))
+    assert "vehicle.empty_mass_kg: missing" in fault_of(tmp_path, text.replace("kerb_rear_axle_kg = 704.0\n", ""))
 
 
 def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> None:

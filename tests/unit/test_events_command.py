@@ -101,3 +101,11 @@ def test_a_withdrawn_event_does_not_say_how_sure_it_was() -> None:
     assert entry_sentence(Entry(EntryKind.EVENT, "event-1-a", T0_NS, record)) == (
         "2026-09-21 14:13 to 14:20  withdrawn, nothing was loaded or unloaded after all; 300 kg aboard then"
     )
+
+
+def test_logs_out_of_order_are_refused(tmp_path: Path, drives: tuple[str, str]) -> None:
+    first, second = drives
+    config = str(tmp_path / "springscale.toml")
+    found = CliRunner().invoke(springscale, ["events", second, first, "--config", config])
+    assert isinstance(found.exception, LogUnreadableError)
+    assert f"{first}: begins before {second}: name the logs in order of time" in str(found.exception)

@@ -237,9 +237,14 @@ class LiveSource:
         return f"no frame for {self._silence_s:g} s"
 
     def _told(self, fault: Exception) -> str:
-        number = fault.errno if isinstance(fault, OSError) else getattr(fault, "error_code", None)
-        reason = _SYSTEM_REASONS.get(number or 0, str(fault) or type(fault).__name__)
-        return reason.format(channel=self._channel)
+        return system_reason(fault, self._channel)
+
+
+def system_reason(fault: Exception, channel: str) -> str:
+    """Why ``channel`` cannot be used, in words with what to do where the system's own do not say it."""
+    number = fault.errno if isinstance(fault, OSError) else getattr(fault, "error_code", None)
+    reason = _SYSTEM_REASONS.get(number or 0, str(fault) or type(fault).__name__)
+    return reason.format(channel=channel)
 
 
 def _none_told(channel: str) -> int:

@@ -21,6 +21,21 @@ BULK_READERS: Final = {".blf": read_blf, ".mf4": read_mf4}
 UNMISTAKABLE: Final = frozenset({".log", ".candump", *MESSAGE_SUFFIXES, *BULK_READERS} - {".csv", ".db"})
 
 
+OTHER_KINDS: Final = {
+    b"\x89PNG": "a PNG image",
+    b"\xff\xd8\xff": "a JPEG image",
+    b"GIF8": "a GIF image",
+    b"%PDF": "a PDF document",
+    b"PK\x03\x04": "a ZIP archive",
+    b"SQLite format 3": "an SQLite database; name it .db if it is a log of python-can",
+    b"\x7fELF": "a program",
+    b"LOGG": "a BLF log; name it .blf",
+    b"MDF ": "an MDF log; name it .mf4",
+}
+"""What files of other kinds begin with."""
+LONGEST_START: Final = max(map(len, OTHER_KINDS))
+
+
 def is_named_as_log(path: Path | str) -> bool:
     """Whether a file's name alone says that it is a log; .txt, .csv and .db may be anything."""
     return unpacked_suffix(Path(path)) in UNMISTAKABLE
@@ -48,6 +63,7 @@ def _open(
     suffix = unpacked_suffix(path)
     _require_file(path)
     if suffix in CANDUMP_SUFFIXES:
+        _require_no_other_kind(path)
         return read_candump(path, filters, channel, width=width, report=report), report
     selection = Selection(filters, channel, report)
     if suffix in MESSAGE_SUFFIXES:
@@ -66,6 +82,18 @@ def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Mot
     chunks, report = open_log(path, signal_map)
     decoder = Decoder(signal_map)
     return map(decoder.decode, chunks), report, decoder
+
+
+def _require_no_other_kind(path: Path) -> None:
+    """Text may be damaged; what begins as another kind of file never was a log's text."""
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(LONGEST_START)
+    except OSError:
+        return  # the reader says why it cannot be read
+    for first, kind in OTHER_KINDS.items():
+        if start.startswith(first):
+            raise LogUnreadableError(f"{path}: is {kind}, not the text that its name says")
 
 
 def _require_file(path: Path) -> None:

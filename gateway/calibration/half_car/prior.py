@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from scipy.linalg import block_diag
 
+from gateway.calibration.axle_weights import ESTIMATED_UNSPRUNG_STD, UNSPRUNG_SHARE, WEIGHED_STD
 from gateway.core.cross_spectrum.model.parameters import BEND_SHARES, INDEX, PARAMETERS, ROLL_PARAMETERS
 from gateway.core.cross_spectrum.model.usual_roll import usual_roll
 from gateway.core.vehicle import Vehicle
@@ -22,7 +23,6 @@ BOUNCE_HZ: Final = 1.35
 DAMPING_RATIO: Final = 0.3
 TYRE_NPM: Final = 400e3  # both tyres of an axle of a 1250 kg vehicle; scales with mass
 MOUNT_NPM: Final = 500e3
-UNSPRUNG_SHARE: Final = 0.065  # of the empty sprung mass, an axle
 GYRATION_PER_WHEELBASE: Final = 0.46
 MOST_OFFSET_STD_M: Final = 0.1  # of where the sensor sits sideways; a guess is worse than none
 EMPTY_LEFT_STD_M: Final = 0.02  # driver, tank, sliding door; chosen
@@ -35,8 +35,6 @@ SPRING_FRICTION, SPRING_FRICTION_STD = 0.03, 0.05
 TRACK_OFFSET_M: Final = 0.03
 NOISE_ACCELERATION_M2PS3: Final = 1e-5  # 300 ug per root hertz
 NOISE_PITCH_RATE_RAD2PS: Final = 1e-8  # 0.006 deg/s per root hertz; steps of 0.25 deg/s at 100 Hz make 3e-8
-ESTIMATED_UNSPRUNG_STD: Final = 0.3  # of an unsprung mass that nobody gives
-WEIGHED_STD: Final = 0.1  # of one that the campaign gives
 
 _LOG_STD: Final = {
     "spring": 0.35,

@@ -7,7 +7,7 @@ import click
 from gateway.cli.estimate import prepared, with_known_weights
 from gateway.cli.options import FILE, as_json, one_estimator, window
 from gateway.cli.text.events import entry_sentence
-from gateway.offline.events import entries_of_logs
+from gateway.offline.events import entries_of_logs, require_order
 from gateway.records import json_line
 
 
@@ -34,5 +34,6 @@ def events(
     weights of the service of --config into account.
     """
     setup, settings, state = prepared(config_path, signals, calibration, estimator, window_s)
+    require_order(logs, setup.signal_map)
     for entry in entries_of_logs(logs, with_known_weights(setup, None, state), settings):
         click.echo(json_line(entry.record) if as_json else entry_sentence(entry))

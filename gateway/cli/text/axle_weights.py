@@ -1,7 +1,6 @@
 """What axle weights make of a campaign's [vehicle], as TOML to paste."""
 
-from gateway.calibration.axle_weights import Sprung
-from gateway.calibration.half_car.prior import UNSPRUNG_SHARE
+from gateway.calibration.axle_weights import UNSPRUNG_SHARE, Sprung
 
 
 def vehicle_block(sprung: Sprung) -> str:

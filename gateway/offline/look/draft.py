@@ -1,5 +1,6 @@
 """A first signal map: what was found, written down with how it is known, to be checked by a person."""
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -69,9 +70,9 @@ def _own_text(seen: Look, output: Path) -> str:
 
 
 def _as_named(path: Path, output: Path) -> str:
-    """A database as the map names it: those of the package are copied beside it."""
+    """A database as the map names it, from where the map lies: those of the package are copied beside it."""
     beside = path in shipped_databases() or path.resolve().parent == output.resolve().parent
-    return path.name if beside else path.resolve().as_posix()
+    return path.name if beside else Path(os.path.relpath(path.resolve(), output.resolve().parent)).as_posix()
 
 
 def _entry(found: Found) -> Iterator[str]:
