@@ -5,7 +5,7 @@ than their own statistics say, for the half-car errs too: the evidence is temper
 the payload that is skewed, because a load can be much longer than a compact one and hardly shorter.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -37,12 +37,13 @@ POINTS: Final = (0.025, 0.5, 0.975)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
-    """A load weighed under one shape: where its search ended (start (k,), for the next one), minus the logarithm of its
-    evidence (cost), the answer x (k,), payload in kg and front share (0..1) being its last, and the payload's own
+    """A load weighed under one shape: where its search ended (start (k,), for the next one) and by how much this moves
+    with log s (moves (k,)), minus the logarithm of its evidence (cost), the answer x (k,), payload in kg and front share (0..1) being its last, and the payload's own
     error.
     """
 
     start: F64
+    moves: F64
     cost: float
     x: F64
     own_std_kg: float
@@ -129,15 +130,26 @@ def _profile(
     above = [node for node in wanted if node >= start[0]]
     below = [node for node in reversed(wanted) if node < start[0]]
     for outwards in (above, below):
-        x = start[1]
+        passed: list[tuple[float, Node]] = []
         for node in outwards:
-            found[node] = weighed_as(node, x)
-            x = found[node].start
+            found[node] = weighed_as(node, _near(node, passed) if passed else start[1])
+            passed.append((node, found[node]))
             least = min(least, found[node].cost)
             if _against(found[node].cost - least, evidence) > -np.log(LEAST_PROBABILITY):
                 break
     inside = sorted(found)
     return np.array(inside), [found[node] for node in inside]
+
+
+def _near(log_s: float, passed: Sequence[tuple[float, Node]]) -> F64:
+    """Where the search will end, by the last nodes' ends and the slope at the very last: a parabola through these."""
+    (*_, (last_log_s, last)), before = passed, passed[:-1]
+    further = log_s - last_log_s
+    x: F64 = last.start + further * last.moves
+    if before:
+        back = before[-1][0] - last_log_s
+        x += (before[-1][1].start - last.start - back * last.moves) * (further / back) ** 2
+    return x
 
 
 def _against(excess: float, evidence: float) -> float:
