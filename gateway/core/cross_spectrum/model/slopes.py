@@ -1,6 +1,7 @@
 """How the expected spectral matrix changes with each parameter of the vehicle and with its load."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -58,7 +59,9 @@ def spectral_slopes(
     if rows:
         by_level = _by_level(theta, load, ground, [free[row] for row in rows], model.motion)
         moved = level_weights(spectra.log_movement) @ by_level
-        slopes[..., rows] = _by_response(by, model) @ moved.reshape(*by.phase.shape, -1, len(rows))
+        changed = _by_response(by, model) @ moved.reshape(*by.phase.shape, -1, len(rows))
+        for into, part in _runs(rows):
+            slopes[..., into] = changed[..., part]
     _fill_in_slack(slopes, free, by, model, spectra)
     for row, entry in enumerate(free):
         if entry in _OF_ROAD:
@@ -66,6 +69,12 @@ def spectral_slopes(
     slopes = tapered_parts(slopes, spectra)
     _add_noise(slopes, tapered(without_noise(by, model), spectra), model, spectra, free)
     return slopes
+
+
+def _runs(rows: Sequence[int]) -> list[tuple[slice, slice]]:
+    """Unbroken stretches of rising ``rows``, and where these stand among them: numpy copies slices far faster."""
+    breaks = [0, *(i for i in range(1, len(rows)) if rows[i] != rows[i - 1] + 1), len(rows)]
+    return [(slice(rows[start], rows[end - 1] + 1), slice(start, end)) for start, end in pairwise(breaks)]
 
 
 def solved_at(
@@ -137,7 +146,9 @@ def _fill_in_slack(slopes: F64, free: Sequence[int], by: Driven, model: Spectral
         if by.twist is not None:
             own = own + by.twist * (power(by.paths[2][sensor]) + power(by.paths[3][sensor]))
         shares = slack_weights(spectra.freq_hz)[[free[row] - knots.start for row in rows]]
-        slopes[:, :, sensor, rows] = ((model.slack[sensor] - model.least_slack) * own)[..., None] * shares.T
+        changed = ((model.slack[sensor] - model.least_slack) * own)[..., None] * shares.T
+        for into, part in _runs(rows):
+            slopes[:, :, sensor, into] = changed[..., part]
 
 
 def _by_road(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
