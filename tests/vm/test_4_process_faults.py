@@ -41,6 +41,11 @@ def ids(records: list[Answer]) -> list[str]:
     return found
 
 
+def wait_for_another(vehicle: Vehicle, n_known: int) -> None:
+    """Until it has stored more records than these."""
+    vehicle.wait_for(lambda: len(vehicle.stored()) > n_known)
+
+
 def test_killed_again_and_again_it_loses_and_doubles_nothing(
     many_records: Vehicle, recovered: Recovered, measured: Callable[..., None]
 ) -> None:
@@ -54,7 +59,7 @@ def test_killed_again_and_again_it_loses_and_doubles_nothing(
         if n % COMMIT_EVERY:
             time.sleep(moments.uniform(1.0, 8.0))  # an emulated processor is starting for most of that time
         else:
-            vehicle.wait_for(lambda: len(vehicle.stored()) > len(committed))
+            wait_for_another(vehicle, len(committed))
             time.sleep(moments.uniform(0.0, 2.0))  # among its next commits
         found = ids(vehicle.stored())
         assert found[: len(committed)] == committed
