@@ -16,7 +16,7 @@ from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
 from gateway.store.database import FILE_NAME, Database, is_damaged
-from gateway.store.follower import StoreFollower
+from gateway.store.follower import Follower
 from gateway.store.reader import StoreReader
 from gateway.store.retention import Retention
 from gateway.store.rows import Chain, DocumentRow, JournalRow
@@ -104,9 +104,12 @@ class Store:
         """
         return self._buffer.add_delivery(uplink, cursor)
 
-    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> StoreFollower:
-        """As ``Journal.follow``."""
-        return StoreFollower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
+    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> Follower:
+        """Follow these kinds from behind a cursor (None: from the first record). ``on_news`` is called with each record
+        that is accepted, from the thread that writes it: quick, and never blocking. Raises ValueError for a cursor that
+        is none.
+        """
+        return Follower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
 
     def head(self) -> str:
         """Cursor of the newest record accepted."""

@@ -241,7 +241,9 @@ class KnownWeightService:
 
     def _calibrated(self) -> CalibratedVehicle:
         if self._subject.calibrated is None:
-            raise WeightRefusedError(WeightRefusal.NO_CALIBRATION, "no calibration is loaded, so there is nothing to correct")
+            raise WeightRefusedError(
+                WeightRefusal.NO_CALIBRATION, "no calibration is loaded, so there is nothing to correct"
+            )
         return self._subject.calibrated
 
     def _present(self) -> _Load:

@@ -20,9 +20,10 @@ from starlette.responses import JSONResponse, Response
 
 from gateway.estimate import Estimate, Weight
 from gateway.estimate_json import estimate_from_json
-from gateway.history import BATCHES, Reader
+from gateway.history import BATCHES
 from gateway.records import iso_utc
 from gateway.status import Status
+from gateway.store import StoreReader
 from gateway.web.instant import Instant
 from gateway.web.live.board import Board
 from gateway.web.routes.estimates import Cursor, asked
@@ -60,7 +61,7 @@ class VehiclesQuery(BaseModel):
     last_vin: str | SkipJsonSchema[None] = Field(None, alias="lastVin", max_length=17)
 
 
-def rfms_router(board: Board, reader: Reader, status: Callable[[], Status], scales: Scales) -> APIRouter:
+def rfms_router(board: Board, reader: StoreReader, status: Callable[[], Status], scales: Scales) -> APIRouter:
     """The routes under /rfms."""
     router = APIRouter(prefix=PREFIX, tags=["standards"], responses=problem_responses(400, 406))
 
@@ -128,7 +129,7 @@ class _Weighed:
 
 
 async def _batches(
-    board: Board, reader: Reader, query: StatusesQuery, *, has_vin: bool
+    board: Board, reader: StoreReader, query: StatusesQuery, *, has_vin: bool
 ) -> tuple[list[_Weighed], str | None]:
     triggers = None if query.trigger_filter is None else query.trigger_filter.upper().split(",")
     if not has_vin or (triggers is not None and TRIGGER not in triggers):
