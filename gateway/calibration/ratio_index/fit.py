@@ -88,7 +88,7 @@ def fit_ratio_index(
 
     ``progress`` is called with (steps done, steps in all).
     """
-    table = spectrum_table(runs, vehicle.sensor_offset_left_m)
+    table = spectrum_table(runs, vehicle.sensor_left_m)
     trials = _family_trials(table, vehicle, bands, FAMILIES if structure == "auto" else (structure,), progress)
     chosen = trials[0]
     batches = [batch for run in runs for batch in run.batches if not batch.rejected]
