@@ -24,11 +24,8 @@ TERMS: Mapping[str, Term] = MappingProxyType(
         "cbrt_rg": lambda ra, rg: np.cbrt(rg),
         "sqrt_rg": lambda ra, rg: np.sqrt(rg),
         "rg": lambda ra, rg: rg,
-        "rg2": lambda ra, rg: rg**2,
         "log_rg": lambda ra, rg: np.log(rg),
         "ra_rg": lambda ra, rg: ra * rg,
-        "sqrt_ra_rg": lambda ra, rg: np.sqrt(ra * rg),
-        "log_ra_log_rg": lambda ra, rg: np.log(ra) * np.log(rg),
     }
 )
 
