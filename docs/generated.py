@@ -2,13 +2,12 @@
 
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
+from pydantic import TypeAdapter
 
 ROOT = Path(__file__).parents[1]
 
@@ -35,35 +34,44 @@ def agrees(one: str, other: str, tolerance: Callable[[str], float]) -> bool:
     return all(here == there or abs(float(here) - float(there)) <= tolerance(here) for here, there in pairs)
 
 
-def key_table(model: type[BaseModel], *without: str) -> str:
-    """A table of TOML's keys: default, limits and description of every field of ``model`` but those named."""
-    limits = model.model_json_schema()["properties"]
+def key_table(model: type, *without: str) -> str:
+    """A table of TOML's keys: default, limits and description of every field of ``model`` but those named.
+
+    ``model`` is a pydantic model or an annotated dataclass; what is required comes first.
+    """
+    schema = TypeAdapter(model).json_schema()
+    required = schema.get("required", ())
     rows = [
-        f"| `{name}` | {default_of(field)} | {limits_of(limits[name])} | {field.description} |"
-        for name, field in model.model_fields.items()
+        f"| `{name}` | {'required' if name in required else default_of(key.get('default', _none_of(key)))} | "
+        f"{limits_of(key, schema.get('$defs', {}))} | {key['description']} |"
+        for name, key in sorted(schema["properties"].items(), key=lambda one: one[0] not in required)
         if name not in without
     ]
     return "| key | default | limits | meaning |\n|---|---|---|---|\n" + "\n".join(rows) + "\n"
 
 
-def default_of(field: FieldInfo) -> str:
+def _none_of(key: dict[str, Any]) -> dict[str, Any] | None:
+    """A schema leaves the default out where a factory makes it: an empty table."""
+    return {} if key.get("type") == "object" else None
+
+
+def default_of(default: Any) -> str:
     """What holds when the key is absent, as TOML would write it."""
-    default = field.get_default(call_default_factory=True)
-    if default is PydanticUndefined:
-        return "required"
     if default is None:
         return "absent"
     if isinstance(default, bool):
         return f"`{str(default).lower()}`"
-    if isinstance(default, tuple):
+    if isinstance(default, tuple | list):
         return f"`{list(default)}`"
     return f"`{default}`" if isinstance(default, int | float) or default == {} else f'`"{default}"`'
 
 
-def limits_of(schema: dict[str, Any]) -> str:
+def limits_of(schema: dict[str, Any], named: Mapping[str, Any] = MappingProxyType({})) -> str:
     """What the JSON schema of a key allows, in words; empty where it allows all of its kind."""
+    if "$ref" in schema:
+        return limits_of(named.get(schema["$ref"].rsplit("/", 1)[-1], {}), named)
     if "anyOf" in schema:
-        return limits_of(next(one for one in schema["anyOf"] if one.get("type") != "null"))
+        return limits_of(next(one for one in schema["anyOf"] if one.get("type") != "null"), named)
     if "prefixItems" in schema:
         return f"two numbers, each {limits_of(schema['prefixItems'][0])}"
     if "enum" in schema:

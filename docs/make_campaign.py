@@ -5,9 +5,10 @@ from pathlib import Path
 from generated import keep_up_to_date, key_table
 
 from gateway.calibration.axle_weights import DIVISION_KG, AxleWeights, sprung_of
-from gateway.calibration.campaign import CampaignTable, RunTable, VehicleTable
+from gateway.calibration.campaign import CampaignTable, RunTable
 from gateway.calibration.half_car.prior import ESTIMATED_UNSPRUNG_STD, UNSPRUNG_SHARE, WEIGHED_STD
 from gateway.cli.text.axle_weights import vehicle_block
+from gateway.core.vehicle import Vehicle
 
 PAGE = Path(__file__).with_name("campaign.md")
 WEIGHED = AxleWeights(front_kg=760.0, rear_kg=640.0)
@@ -86,7 +87,7 @@ def campaign_page() -> str:
         [
             INTRODUCTION,
             f"## Top of the file\n\n{key_table(CampaignTable, 'vehicle', 'runs')}",
-            f"## [vehicle]\n\nMasses and shares are of the sprung mass.\n\n{key_table(VehicleTable)}\n{RANGES}",
+            f"## [vehicle]\n\nMasses and shares are of the sprung mass.\n\n{key_table(Vehicle)}\n{RANGES}",
             f"## [[runs]]: one drive with a known load\n\n{key_table(RunTable)}\n{RUN_RULES}",
             _from_axle_weights(),
         ]

@@ -44,10 +44,16 @@ def _first_line(section: type[BaseModel]) -> str:
 
 
 def _table(title: str, fields: dict[str, FieldInfo], *, prefix: str) -> str:
-    rows = [f"| `{name}` | {default_of(field)} | {field.description} | `{prefix}{name.upper()}` |"
-            for name, field in fields.items()]  # fmt: skip
+    rows = [
+        f"| `{name}` | {_default(field)} | {field.description} | `{prefix}{name.upper()}` |"
+        for name, field in fields.items()
+    ]
     head = "| key | default | meaning | variable |\n|---|---|---|---|"
     return f"## {title}\n\n{head}\n" + "\n".join(rows) + "\n"
+
+
+def _default(field: FieldInfo) -> str:
+    return "required" if field.is_required() else default_of(field.get_default(call_default_factory=True))
 
 
 def main() -> None:

@@ -13,7 +13,6 @@ distance, f being its part of the load.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import product
 from math import log
 from types import MappingProxyType
@@ -21,18 +20,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import Carries, Vehicle
 from gateway.records import F64
-
-
-class Carries(StrEnum):
-    """What a fitter says that the vehicle usually carries."""
-
-    PALLETS = "pallets"
-    PARCELS = "parcels"
-    LONG_GOODS = "long_goods"
-    TOOLS = "tools"
-    MIXED = "mixed"
 
 
 @dataclass(frozen=True, slots=True)

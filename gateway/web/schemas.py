@@ -110,6 +110,15 @@ class Ready(BaseModel):
     warnings: list[str] = Field([], description="what is broken beside the weighing")
 
 
+def utf8_only(said: Any) -> Any:
+    """JSON can escape half of a character (a lone surrogate): that is no text, and UTF-8 cannot hold it."""
+    try:
+        json.dumps(said, ensure_ascii=False, default=str).encode()
+    except UnicodeEncodeError:
+        raise ValueError("holds half a character (a lone surrogate), which is no text") from None
+    return said
+
+
 class Body(BaseModel):
     """What a request may say in JSON: an unknown key is refused, and so is text that no answer could repeat."""
 
@@ -118,12 +127,7 @@ class Body(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _is_utf8(cls, said: Any) -> Any:
-        """JSON can escape half of a character (a lone surrogate): that is no text, and UTF-8 cannot hold it."""
-        try:
-            json.dumps(said, ensure_ascii=False, default=str).encode()
-        except UnicodeEncodeError:
-            raise ValueError("holds half a character (a lone surrogate), which is no text") from None
-        return said
+        return utf8_only(said)
 
 
 class Fault(BaseModel):

@@ -19,9 +19,10 @@ from gateway.web import create_app
 
 VIN = "VF1" + "0" * 14
 VAN = Vehicle(
-    "van",
-    1240.0,
-    2.8,
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
     unsprung_front_kg=90.0,
     unsprung_rear_kg=110.0,
     gross_limit_kg=1545.0,

@@ -31,7 +31,7 @@ def test_what_is_written_keeps_to_it() -> None:
     VALIDATOR.validate(json.loads(calibration_file().to_json()))
 
 
-def test_the_shipped_calibration_migrated_to_today_keeps_to_it() -> None:
+def test_the_shipped_calibration_keeps_to_it() -> None:
     VALIDATOR.validate(json.loads(load_calibration(ROOT / "gateway" / "demo" / "paper_van.json").to_json()))
 
 

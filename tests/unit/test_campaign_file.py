@@ -71,7 +71,7 @@ def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> N
 def test_a_sensor_whose_place_to_the_side_is_not_stated_is_unsure(tmp_path: Path) -> None:
     def placed(**keys: str) -> tuple[float, float]:
         vehicle = loaded(tmp_path, campaign_text(vehicle=keys)).vehicle
-        return vehicle.sensor_offset_left_m, vehicle.sensor_offset_left_std_m
+        return vehicle.sensor_left_m, vehicle.sensor_left_std_m
 
     assert placed() == (0.0, UNKNOWN_OFFSET_STD_M)
     assert placed(sensor_offset_left_m="0.0") == (0.0, MEASURED_OFFSET_STD_M)

@@ -18,12 +18,11 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.half_car.directions import directions_of
-from gateway.calibration.half_car.inherited import Inherited
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
 from gateway.calibration.half_car.left_out import MISFIT_MARGIN, LeftOut, left_out_errors, limits_shown_by
 from gateway.calibration.half_car.model_error import model_error
 from gateway.calibration.half_car.most_probable_vehicle import fit_vehicle, seen_by
-from gateway.calibration.half_car.prior import Prior, can_roll, prior_of
+from gateway.calibration.half_car.prior import Inherited, Prior, can_roll, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import moves_of, weigh
@@ -208,8 +207,8 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         known_loads=tuple(run.load for run in runs),
         usual_log_amplitude=reading.usual_log_amplitude,
         track_width_m=vehicle.track_width_m,
-        sensor_left_m=vehicle.sensor_offset_left_m,
-        sensor_left_std_m=vehicle.sensor_offset_left_std_m,
+        sensor_left_m=vehicle.sensor_left_m,
+        sensor_left_std_m=vehicle.sensor_left_std_m,
         least_slack=known[0].whittle.ground.least_slack,
         usual_stroke_mps=reading.usual_stroke_mps,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),

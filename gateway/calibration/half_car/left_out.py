@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.half_car.known_spectra import KnownSpectra
-from gateway.calibration.half_car.limits import Limits
 from gateway.calibration.half_car.model_error import RunError, model_error
+from gateway.calibration.inheritance import Limits
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import MOST_TENSION
 from gateway.core.cross_spectrum.estimator import weigh

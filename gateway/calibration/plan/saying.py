@@ -7,11 +7,11 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 from gateway.calibration.plan.design import BATCH_S
-from gateway.core.cargo import Carries, is_said, shape_prior
+from gateway.core.cargo import is_said, shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.predicted import predicted
-from gateway.core.vehicle import Load, Vehicle, front_share_pct
+from gateway.core.vehicle import Carries, Load, Vehicle, front_share_pct
 from gateway.posterior import PAYLOAD
 
 TYPICAL_PART: Final = 0.5  # of the most payload

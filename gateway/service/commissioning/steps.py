@@ -86,7 +86,7 @@ def _underway(underway: Underway, present: Present) -> dict[str, Any]:
         "by": underway.by,
         "note": underway.note,
         "line": None if underway.line is None else underway.line.model_dump(include={"name", "id", "source"}),
-        "vehicle": None if underway.vehicle is None else underway.vehicle.model_dump(mode="json"),
+        "vehicle": None if underway.vehicle is None else asdict(underway.vehicle),
         "inspection": None
         if looked is None
         else {
