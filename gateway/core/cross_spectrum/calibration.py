@@ -1,12 +1,12 @@
 """What the cross-spectral estimator knows of a vehicle: the half-car that its known-load drives taught."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Final
 
 import numpy as np
 from annotated_types import Ge, Gt
 
-from gateway.core.cross_spectrum.model.parameters import INDEX, LEAST_SLACK, Ground, mount_of
+from gateway.core.cross_spectrum.model.parameters import INDEX, LEAST_SLACK, PARAMETERS, Ground, mount_of
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
 from gateway.core.weights import Unsprung
@@ -81,6 +81,18 @@ class CrossSpectrumCalibration:
         """The vehicle as stated, in the core's terms."""
         share = self.empty_front_share_pct / 100.0
         return Ground(self.empty_mass_kg, share, self.wheelbase_m, self.track_width_m, self.least_slack)
+
+    @property
+    def upright(self) -> "CrossSpectrumCalibration":
+        """What it says of a vehicle that only heaves and pitches."""
+        n = len(PARAMETERS)
+        return replace(
+            self,
+            names=self.names[:n],
+            parameters=self.parameters[:n],
+            covariance=self.covariance[:n, :n],
+            directions=self.directions[:n],
+        )
 
     @property
     def known_shape(self) -> tuple[float, float]:

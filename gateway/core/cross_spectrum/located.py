@@ -21,7 +21,7 @@ from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ, Sideways, s
 from gateway.core.cross_spectrum.lateral.unseen import sideways_columns
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Curvature, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra
-from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll, level, upright
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll, level
 from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.cross_spectrum.packing import Packing, packings
 from gateway.core.cross_spectrum.search import Found, most_probable
@@ -118,7 +118,7 @@ def locate(
         unseen = sideways_columns(whittle.spectra, as_known, calibration, weigh)
         return replace(located, columns={**located.columns, Source.SIDEWAYS: unseen})
     placed = replace(calibration, parameters=level(calibration.parameters))
-    _, peak = _best(spectra.without_roll, replace(calibration, parameters=upright(calibration.parameters)))
+    _, peak = _best(spectra.without_roll, calibration.upright)
     moving = _moving(spectra, peak.found.x, placed)
     whittle = Whittle(moving.without_roll, calibration.ground)
     rolling = Whittle(moving.within(ROLL_BAND_HZ), calibration.ground)
