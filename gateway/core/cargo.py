@@ -86,6 +86,11 @@ class ShapePrior:
         return float(self.probability @ self.log_s)
 
     @property
+    def median(self) -> float:
+        """Of log s."""
+        return float(np.interp(0.5, np.cumsum(self.probability), self.log_s))
+
+    @property
     def variance(self) -> float:
         """Of log s."""
         return float(self.probability @ (self.log_s - self.mean) ** 2)
