@@ -6,7 +6,7 @@ from typing import Final
 from generated import keep_up_to_date
 
 from gateway.estimate import PLACES, Lack
-from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, REASONS, SPECTRA, WEIGHTS, EstimateField
+from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, SPECTRA, WEIGHTS, EstimateField
 
 PAGE = Path(__file__).with_name("estimate.md")
 
@@ -163,7 +163,7 @@ def unit_of(one: EstimateField) -> str:
     """The unit in which the field's number is; empty for words and pure numbers."""
     if one.name in SHARES:
         return "0 to 1"
-    if one.kind in (INSTANT, REASONS, SPECTRA, BY_NAME, WEIGHTS):
+    if one.kind in (INSTANT, REASONS, SPECTRA, NUMBERS_BY_NAME, WEIGHTS):
         return ""
     return next((unit for ending, unit in UNITS if one.name.endswith(ending)), "")
 
