@@ -52,7 +52,6 @@ from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_l
 from gateway.web.routes.metrics import metrics_registry
 from gateway.web.routes.reasons import reasons_router
 from gateway.web.routes.record import FrameLog, record_router
-from gateway.web.routes.rfms import rfms_router
 from gateway.web.routes.spectra import spectra_router
 from gateway.web.routes.vehicle import vehicle_router
 from gateway.web.routes.vss import vss_router
@@ -129,7 +128,6 @@ def create_app(
         cab_router(board, reader, status, scales),
         j1939_router(board, scales, draws_trailers=draws_trailers),
         vss_router(board, scales),
-        rfms_router(board, reader, status, scales),
         health_router(status, metrics),
     ]
     if known_loads is not None:

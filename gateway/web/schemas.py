@@ -7,7 +7,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from gateway.estimate import Lack
-from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, SPECTRA, WEIGHTS, EstimateField, Presence
+from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, SPECTRA, WEIGHTS, EstimateField, Presence
 
 
 class Spectra(BaseModel):
@@ -58,7 +58,7 @@ def _described(one: EstimateField) -> Any:
     if one.kind is INSTANT:
         described["json_schema_extra"] = {"format": "date-time"}
     if one.presence is not Presence.ALWAYS:
-        described |= {"default_factory": dict} if one.kind is BY_NAME else {"default": None}
+        described |= {"default_factory": dict} if one.kind is NUMBERS_BY_NAME else {"default": None}
     return _SHAPES.get(one.kind, one.kind.shape), Field(**described)
 
 

@@ -20,7 +20,6 @@ from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, 
 from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
 from gateway.cli import springscale
 from gateway.cli.text.plan import plan_sentences, widths_sentence
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
 from gateway.core.vehicle import Carries
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError, CampaignError
@@ -93,7 +92,6 @@ def test_what_is_known_of_roll_changes_no_advice_and_widens_no_promise(outcome: 
     roll = prior_of(replace(VAN, track_width_m=1.5), with_roll=True).roll
     rolling = replace(
         known,
-        names=PARAMETERS + ROLL_PARAMETERS,
         parameters=np.r_[known.parameters, roll.mean],
         covariance=block_diag(known.covariance, np.diag(roll.std**2)),
         directions=np.r_[known.directions, np.zeros((len(roll.mean), known.directions.shape[1]))],

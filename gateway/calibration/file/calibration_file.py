@@ -3,9 +3,9 @@
 import hashlib
 import json
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from gateway.calibration.file.line_part import LinePart
 from gateway.calibration.file.parts import ExpectedErrorsPart, Part, ProvenancePart, SeenPart
@@ -18,6 +18,7 @@ from gateway.core.ratio_index.regression import TERMS
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, UntrustedFileError
 from gateway.files.signed import Read
+from gateway.schema import check_shapes
 from gateway.toml_file import describe_faults
 
 Content = dict[str, Any]
@@ -42,6 +43,18 @@ class CalibrationFile(Part):
     )
     warnings: tuple[str, ...] = ()
     provenance: ProvenancePart
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        known = self.cross_spectrum
+        if known is not None:
+            n = len(known.names)
+            check_shapes(
+                parameters=(known.parameters, (n,)),
+                covariance=(known.covariance, (n, n)),
+                directions=(known.directions, (n, known.directions.shape[-1])),
+            )
+        return self
 
     @property
     def id(self) -> str:

@@ -12,7 +12,7 @@ from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
 from gateway.core.weights import Unsprung
 from gateway.estimate import Quantity
 from gateway.records import F64
-from gateway.schema import STRICT, check_shapes
+from gateway.schema import STRICT
 
 SCORE: Final = 6.0  # six standard deviations are no chance; a calibration that shows more of its own allows more
 
@@ -67,14 +67,6 @@ class CrossSpectrumCalibration:
     sensor_left_std_m: float = field(default=UNKNOWN_OFFSET_STD_M, metadata=_POSITIVE)
     least_slack: float = field(default=LEAST_SLACK, metadata=_POSITIVE)
     usual_stroke_mps: tuple[Positive, Positive] | None = None
-
-    def __post_init__(self) -> None:
-        n, k = len(self.names), self.directions.shape[-1]
-        check_shapes(
-            parameters=(self.parameters, (n,)),
-            covariance=(self.covariance, (n, n)),
-            directions=(self.directions, (n, k)),
-        )
 
     @property
     def ground(self) -> Ground:

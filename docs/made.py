@@ -1,8 +1,7 @@
-"""What every made page has in common: it is written, or with --check compared with what it should say."""
+"""What every made page has in common: marks that are filled, tables, and how it is compared."""
 
 import re
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -15,15 +14,40 @@ ROOT = Path(__file__).parents[1]
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
 
 
-def keep_up_to_date(page: Path, text: str, source: str, *, tolerance: float = 0.0) -> None:
-    """Write ``page``; with --check end with a clear line where it does not say what ``source`` does.
+class StaleError(Exception):
+    """A page that does not say what its source does."""
+
+
+def keep_up_to_date(page: Path, text: str, *, is_check: bool, tolerance: float = 0.0) -> None:
+    """Write ``page``, or where ``is_check`` raise StaleError where it says something else.
 
     What is computed from a simulation may differ by ``tolerance`` in each number: machines round differently.
     """
-    if "--check" not in sys.argv[1:]:
+    if not is_check:
         page.write_text(text, encoding="utf-8")
     elif not page.is_file() or not agrees(page.read_text(encoding="utf-8"), text, lambda number: tolerance):
-        sys.exit(f"{page.relative_to(ROOT)} does not say what {source} does: run `make docs`")
+        raise StaleError(f"{page.relative_to(ROOT)} does not say what its source does: run `make docs`")
+
+
+def filled(text: str, parts: Mapping[str, Callable[[], str]]) -> str:
+    """``text`` with what stands between <!-- made: NAME --> and <!-- end: NAME --> made anew.
+
+    Raises ValueError for a part without its marks, or marks without their part.
+    """
+    marks = set(re.findall(r"<!-- made: ([\w -]+?) -->", text))
+    if marks != set(parts):
+        raise ValueError(f"marks and parts differ: {sorted(marks ^ set(parts))}")
+    for name, make in parts.items():
+        between = re.compile(rf"(<!-- made: {name} -->\n).*?(<!-- end: {name} -->)", re.DOTALL)
+        made = make()
+        text = between.sub(lambda found, made=made: f"{found[1]}{made}{found[2]}", text)  # type: ignore[misc]
+    return text
+
+
+def table(heading: str, rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown; ``heading`` names its columns, ``a | b``."""
+    lines = [f"| {heading} |", "|" + "---|" * (heading.count("|") + 1), *(f"| {' | '.join(row)} |" for row in rows)]
+    return "\n".join(lines) + "\n"
 
 
 def agrees(one: str, other: str, tolerance: Callable[[str], float]) -> bool:
@@ -41,13 +65,17 @@ def key_table(model: type, *without: str) -> str:
     """
     schema = TypeAdapter(model).json_schema()
     required = schema.get("required", ())
-    rows = [
-        f"| `{name}` | {'required' if name in required else default_of(key.get('default', _none_of(key)))} | "
-        f"{limits_of(key, schema.get('$defs', {}))} | {key['description']} |"
+    rows = (
+        (
+            f"`{name}`",
+            "required" if name in required else default_of(key.get("default", _none_of(key))),
+            limits_of(key, schema.get("$defs", {})),
+            key["description"],
+        )
         for name, key in sorted(schema["properties"].items(), key=lambda one: one[0] not in required)
         if name not in without
-    ]
-    return "| key | default | limits | meaning |\n|---|---|---|---|\n" + "\n".join(rows) + "\n"
+    )
+    return table("key | default | limits | meaning", rows)
 
 
 def _none_of(key: dict[str, Any]) -> dict[str, Any] | None:

@@ -1,16 +1,12 @@
 """Writes docs/faults.md from tests/faults.toml and from what `make test-vm` and `make soak` measured.
 
---record takes the measurements of the last runs from build/ into docs/*.json first; --check only tells whether the page
-is up to date.
+python docs/make.py --record takes the measurements of the last runs from build/ into docs/*.json first.
 """
 
 import json
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
-
-from generated import keep_up_to_date
 
 DOCS = Path(__file__).parent
 PAGE, MEASURED = DOCS / "faults.md", DOCS / "faults.json"
@@ -27,7 +23,7 @@ RECORDED = (
 INTRODUCTION = """\
 # Faults
 
-Generated from `tests/faults.toml` and from the last recorded run by `python docs/make_faults.py`; do not edit by hand.
+Generated from `tests/faults.toml` and from the last recorded run by `python docs/make.py`; do not edit by hand.
 
 Every row is a test. Those under `tests/vm` run the installed Debian package under real systemd on a real SocketCAN
 interface, in a small virtual machine (`make test-vm`); the others run everywhere (`make test`). Recovery is measured
@@ -171,14 +167,3 @@ def record() -> None:
             for name, new in json.loads(found.read_text()).items():
                 measured[name] = measured.get(name, {}) | new if isinstance(new, dict) else new
             kept.write_text(json.dumps(measured, indent=1, sort_keys=True) + "\n")
-
-
-def main() -> None:
-    """Write the page, or compare it."""
-    if "--record" in sys.argv[1:]:
-        record()
-    keep_up_to_date(PAGE, faults_page(), "docs/faults.json with tests/faults.toml")
-
-
-if __name__ == "__main__":
-    main()

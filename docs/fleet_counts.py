@@ -1,27 +1,16 @@
-"""Writes what `make fleet-test` counted into docs/fleet.md; with --check only tells whether it stands there.
-
-The counts are those of docs/fleet_test.json, the last run with each number of vehicles;
-`python docs/make_fleet.py build/fleet-test.json` takes new ones.
-"""
+"""What `make fleet-test` counted (docs/fleet.md): docs/fleet_test.json, the last run with each number of vehicles."""
 
 import json
-import re
-import sys
 from pathlib import Path
 from typing import Any, Final
 
-from generated import keep_up_to_date
-
 DOCS: Final = Path(__file__).parent
-PAGE: Final = DOCS / "fleet.md"
 COUNTS: Final = DOCS / "fleet_test.json"
-PART: Final = re.compile(r"(<!-- fleet test: [^\n]* -->\n).*?(<!-- end of fleet test -->)", re.DOTALL)
 
 
-def fleet_page() -> str:
-    """The whole page with the counts in their place."""
-    told = table(json.loads(COUNTS.read_text(encoding="utf-8")))
-    return PART.sub(lambda found: found[1] + told + found[2], PAGE.read_text(encoding="utf-8"))
+def counted() -> str:
+    """What was done and what came of it, of the last run with each number of vehicles."""
+    return table(json.loads(COUNTS.read_text(encoding="utf-8")))
 
 
 def table(runs: list[dict[str, Any]]) -> str:
@@ -61,14 +50,3 @@ def take(counts: dict[str, Any]) -> None:
     others = [run for run in json.loads(COUNTS.read_text(encoding="utf-8")) if run["vehicles"] != counts["vehicles"]]
     runs = sorted([*others, counts], key=lambda run: int(run["vehicles"]))
     COUNTS.write_text(json.dumps(runs, indent=1) + "\n", encoding="utf-8")
-
-
-def main() -> None:
-    """Take new counts where a file is named; write the page, or compare it."""
-    for named in (argument for argument in sys.argv[1:] if not argument.startswith("--")):
-        take(json.loads(Path(named).read_text(encoding="utf-8")))
-    keep_up_to_date(PAGE, fleet_page(), COUNTS.name)
-
-
-if __name__ == "__main__":
-    main()

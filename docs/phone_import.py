@@ -1,15 +1,12 @@
-"""Writes what `springscale import` prints into docs/phone.md, for a drive that is simulated; --check compares."""
+"""What `springscale import` prints (docs/phone.md), for a drive that is simulated."""
 
 import contextlib
-import re
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
 
 import numpy as np
 from click.testing import CliRunner
-from generated import keep_up_to_date
 
 from gateway.cli import springscale
 from gateway.sim.drive import rural, urban
@@ -18,9 +15,6 @@ from gateway.sim.road import iso_road
 from gateway.sim.scenario import simulate_drive
 from gateway.sim.vans import SMALL_VAN
 from gateway.workbench.phones import PHONE, Lying, write_export
-
-PAGE: Final = Path(__file__).with_name("phone.md")
-OUTPUT: Final = re.compile(r"(<!-- output: springscale import .*?-->\n).*?(<!-- end of output -->)", re.DOTALL)
 
 
 def printed() -> str:
@@ -34,14 +28,4 @@ def printed() -> str:
         result = CliRunner().invoke(springscale, ["import", "drive1.zip", "1.log"], catch_exceptions=False)
     if result.exit_code:
         sys.exit(result.output)
-    return result.stdout
-
-
-def main() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    text = OUTPUT.sub(lambda found: f"{found[1]}```text\n{printed()}```\n{found[2]}", page)
-    keep_up_to_date(PAGE, text, "springscale import", tolerance=0.01)
-
-
-if __name__ == "__main__":
-    main()
+    return f"```text\n{result.stdout}```\n"

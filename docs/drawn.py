@@ -12,7 +12,6 @@ from drawings.mounting import mounting
 from drawings.rooms import rooms
 from drawings.service import service
 from drawings.spectra import spectra
-from generated import keep_up_to_date
 
 TOLERANCE_PX: Final = 1.0  # of the spectra, which machines round differently
 IMAGES: Final = Path(__file__).with_name("images")
@@ -23,13 +22,3 @@ DRAWINGS: Final[Mapping[str, Callable[[], str]]] = {
     "service.svg": service,
     "spectra.svg": spectra,
 }
-
-
-def main() -> None:
-    """Write the drawings, or compare them."""
-    for name, draw in DRAWINGS.items():
-        keep_up_to_date(IMAGES / name, draw(), "docs/drawings", tolerance=TOLERANCE_PX)
-
-
-if __name__ == "__main__":
-    main()
