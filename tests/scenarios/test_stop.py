@@ -8,9 +8,11 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
+import httpx
 import pytest
 from support.log import names
 from support.paper_van import paper_van_config
@@ -94,6 +96,30 @@ def test_a_held_lock_of_the_commissioning_does_not_keep_the_stop_from_the_pipeli
     assert time.monotonic() - begun_s < PATIENCE_S
     assert not gateways[0].pipeline.is_alive()
     assert not gateways[0].store.is_alive()
+
+
+def test_a_question_of_a_client_that_hangs_does_not_keep_the_process_from_ending(config: Path) -> None:
+    """Every thread of the loop's pool was waited for, however long: systemd had to kill it."""
+    port = re.search(r"port = (\d+)", config.read_text())
+    assert port is not None
+    asked = f"http://127.0.0.1:{port[1]}/api/v1/calibration/commissioning"
+    with subprocess.Popen(
+        [sys.executable, "-m", "support.held_service", "run", "--config", str(config)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=ROOT / "tests",
+    ) as process:
+        try:
+            first_answer(f"http://127.0.0.1:{port[1]}/health/live")
+            with suppress(httpx.TimeoutException):
+                httpx.get(asked, timeout=1.0)  # nobody answers: it waits for the lock
+            process.send_signal(signal.SIGTERM)
+            told, _ = process.communicate(timeout=PATIENCE_S)
+        finally:
+            process.kill()
+    assert process.returncode == 0, told
+    assert '"event": "stopped"' in told
 
 
 @pytest.mark.parametrize("name", ["webhook", "uplink", "broadcaster"])
