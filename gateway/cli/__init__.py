@@ -110,7 +110,7 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         _call(arguments)
     except SystemExit as leaving:
-        if arguments is None and any(thread.daemon for thread in threading.enumerate()):
+        if arguments is None and threading.active_count() > 1:
             _leave_threads_behind(leaving)
         raise
 
