@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import Final
 
 from gateway.bus.logs import LogReport, motion_of_log
+from gateway.core.events import Entry, Ledger, Rules
 from gateway.core.settings import BatchSettings
+from gateway.errors import LogUnreadableError
 from gateway.estimate import Estimate
 from gateway.setup import Setup
 
@@ -31,3 +33,23 @@ def estimates_of_logs(
         report.require_frames()
         on_read(report)
         yield from flow.flush()
+
+
+def entries_of_logs(
+    logs: Sequence[Path | str], setup: Setup, settings: BatchSettings = AS_THE_SERVICE
+) -> Iterator[Entry]:
+    """Every event and trip of the logs in turn, as their last batch left them.
+
+    Raises LogUnreadableError at the first log of which nothing can be read, once those of the logs before are told.
+    """
+    ledger = Ledger(Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules())
+    told: dict[str, Entry] = {}
+    unreadable: LogUnreadableError | None = None
+    try:
+        for estimate in estimates_of_logs(logs, setup, settings):
+            told |= {entry.id: entry for entry in ledger.add(estimate)}
+    except LogUnreadableError as fault:
+        unreadable = fault
+    yield from sorted(told.values(), key=lambda entry: (entry.t_end_ns, entry.kind, entry.id))
+    if unreadable is not None:
+        raise unreadable

@@ -150,6 +150,16 @@ class _Application(FastAPI):
         return self._wrap(super().build_middleware_stack())
 
 
+def _summarize(schema: dict[str, Any]) -> None:
+    """Each operation's summary is the first line of its description, not the name of a function."""
+    for path in schema["paths"].values():
+        for operation in path.values():
+            summary, _, rest = operation.pop("description", "").partition("\n")
+            operation["summary"] = summary.rstrip(".") or operation.get("summary", "")
+            if rest.strip():
+                operation["description"] = rest.strip()
+
+
 def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
     """Let the description say that problems come as application/problem+json, and when tokens are needed."""
     describe = app.openapi
@@ -161,6 +171,7 @@ def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
             app.openapi_schema = None
             schema = told[is_guarded] = describe()
             problems.describe_problems(schema)
+            _summarize(schema)
             if is_guarded:
                 describe_guard(schema)
         return told[is_guarded]

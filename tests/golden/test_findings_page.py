@@ -7,7 +7,7 @@ import pytest
 
 from gateway.calibration.inspection import Severity
 from gateway.calibration.inspection.explained import EXPLAINED, finding_of
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Kind
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "findings.md").read_text(encoding="utf-8")

@@ -8,9 +8,8 @@ from click.testing import CliRunner, Result
 from support.archive import MIDNIGHT_NS, write_drive, write_manifest
 
 from gateway.archive.receipts import Slot
-from gateway.archive.reprocess import Summary
+from gateway.archive.reprocess import Progress, Summary
 from gateway.archive.run import Outcome, Status
-from gateway.archive.turns import Progress
 from gateway.cli import main, springscale
 from gateway.cli.text.reprocess import duration, how_far, size, summary_in_words
 

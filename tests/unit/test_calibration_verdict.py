@@ -10,7 +10,7 @@ from support.calibrated import calibration_file
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import Finding, Inspection, RunVerdict, Severity
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.judgement import Assessment, Grade, Judged, Judgement, Part, Verdict, error_table, verdicts_of
 from gateway.calibration.plan import Expected
 from gateway.core.vehicle import Vehicle

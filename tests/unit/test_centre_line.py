@@ -18,7 +18,7 @@ from gateway.core.ratio_index.index import (
     mean_spectrum,
 )
 from gateway.core.settings import BatchSettings
-from gateway.offline.batches import batches_of_motion
+from gateway.offline.campaigns import batches_of_motion
 from gateway.records import F64, Batch
 from gateway.sim.drive import constant
 from gateway.sim.road import iso_road

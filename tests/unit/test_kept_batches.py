@@ -33,8 +33,7 @@ from gateway.core.settings import BatchSettings
 from gateway.errors import KeptBatchError
 from gateway.estimate import Estimate
 from gateway.log import Event
-from gateway.offline.batches import read_whole_log
-from gateway.offline.campaigns import calibrate
+from gateway.offline.campaigns import calibrate, read_whole_log
 from gateway.records import Batch, Motion, Why
 from gateway.service.keeper import MOST_WAITING, BatchKeeper
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from gateway.calibration.half_car.known_spectra import N_SEGMENT
 from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.core.spectrum import BAND_HZ, frequencies_hz, segment_starts, segment_transforms
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Z95

@@ -41,7 +41,7 @@ def ratio_index_section(
         "Ratio indexes R_a and R_g of every batch over the load and over the front share. Lines: the static regression "
         "that answers from both indexes, drawn along one of them with the other held; the ribbon is the 95 % interval "
         "of a new batch. Where points of one payload spread, it is the share (or the road) that moves them.",
-        f"Ratio indexes over load and share. {len(fitted.run)} batches identify, {len(later.run)} validate.",
+        f"Ratio indexes over load and share. {len(fitted.run)} batches for fitting, {len(later.run)} for validation.",
         tuple(panels),
     )
     return Section(

@@ -143,7 +143,7 @@ class AlarmDesk:
 def remembered(reader: StoreReader) -> tuple[list[Alarm], list[Estimate]]:
     """The last alarms and the last batches, oldest first. Raises what the store's reader raises.
 
-    An alarm that cannot be read is passed over: what is the matter is told anew.
+    An alarm that cannot be read is passed over: what is wrong is reported again.
     """
     told = reader.entries(kind=ENTRY_KIND, limit=REMEMBERED, newest_first=True)
     page = reader.estimates(limit=DRIVEN, newest_first=True, with_spectra=False)

@@ -185,7 +185,7 @@ TABLE: Final = (
     Row("springscale_verification_passed", "1 where the last of this calibration passed.", _passed),
     by("springscale_alarm", "0 while nothing is the matter, 1 told early, 2 confirmed.", "alarm", _levels),
     one("springscale_alarms_unacknowledged", "Alarms that nobody has seen.", "now.alarms.n_unacknowledged"),
-    one("springscale_alarms_told_total", "Early and final words since the start.", "now.alarms.n_told"),
+    one("springscale_alarms_told_total", "Alarms sent since the start, provisional and final.", "now.alarms.n_told"),
     Row(
         "springscale_record_refused",
         "1 while frames cannot be recorded.",
