@@ -6,7 +6,7 @@ from pathlib import Path
 from gateway.core.events import Entry, Ledger, Rules
 from gateway.core.settings import BatchSettings
 from gateway.errors import LogUnreadableError
-from gateway.offline.estimates import AS_THE_SERVICE, estimates_of_logs
+from gateway.offline.estimates import AS_THE_SERVICE, with_remainders
 from gateway.setup import Setup
 
 
@@ -21,7 +21,7 @@ def entries_of_logs(
     told: dict[str, Entry] = {}
     unreadable: LogUnreadableError | None = None
     try:
-        for estimate in estimates_of_logs(logs, setup, settings):
+        for estimate in with_remainders(logs, setup, settings):
             told |= {entry.id: entry for entry in ledger.add(estimate)}
     except LogUnreadableError as fault:
         unreadable = fault

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from gateway.core.change import EVEN, Rules, probability
-from gateway.core.events.halts import Link
-from gateway.core.events.load import Load, Weighing, load_of
+from gateway.core.loads.halts import Link
+from gateway.core.loads.load import Load, Weighing, load_of
 
 
 @dataclass(frozen=True, slots=True)
