@@ -33,6 +33,7 @@ SEED: Final = 20_300
 ESTIMATOR: Final = "cross_spectrum"
 STANDSTILL_MPS: Final = 0.5
 START_NS: Final = 1_790_000_000_000_000_000
+HOUR_S: Final = 3600.0
 HOP_S: Final = (100.0, 280.0)
 
 Hop = tuple[Drive, float]  # how it is driven, and how many seconds the vehicle then stands
@@ -61,10 +62,10 @@ def _slow(
 
 
 def _delivery(rng: np.random.Generator) -> list[Hop]:
-    """Ten short hops in town with a minute or two at each door: none is long enough for a batch."""
+    """Twenty short hops in town with a minute or two at each door: none is long enough for a batch."""
     return [
         (_slow(rng, (20.0, 45.0), (8.0, 40.0), 0.4, float(rng.uniform(*HOP_S))), float(rng.uniform(75.0, 150.0)))
-        for _ in range(10)
+        for _ in range(20)
     ]
 
 
@@ -74,8 +75,8 @@ def _changing(rng: np.random.Generator) -> list[Hop]:
 
 
 WORLDS: Final = (
-    World("town, 15 to 30 km/h", lambda rng: [(_slow(rng, (15.0, 30.0), (8.0, 50.0), 0.6, 1800.0), 0.0)]),
-    World("stop and go, below 30 km/h", lambda rng: [(_slow(rng, (8.0, 30.0), (5.0, 25.0), 1.0, 1800.0), 0.0)]),
+    World("town, 15 to 30 km/h", lambda rng: [(_slow(rng, (15.0, 30.0), (8.0, 50.0), 0.6, HOUR_S), 0.0)]),
+    World("stop and go, below 30 km/h", lambda rng: [(_slow(rng, (8.0, 30.0), (5.0, 25.0), 1.0, HOUR_S), 0.0)]),
     World("delivery: hops of 2 to 5 minutes", _delivery),
     World("load changes during a stop of 20 s", _changing, is_changed=True),
 )

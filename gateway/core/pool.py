@@ -28,6 +28,7 @@ from gateway.units import NS_PER_S
 LEAST_RUN_S: Final = 6.0  # of unbroken usable driving, in which a segment of a spectrum fits
 LEAST_SIDE_S: Final = 30.0  # usable on one side of a border, to be weighed against the other
 LEAST_LOAD_S: Final = 60.0  # usable with one load after a change, to be told: as early as an early look
+PARTED_FROM: Final = 0.9  # as likely must a change be, as for an event to be told: stretches are short, and scatter
 MOST_DRIVEN_S: Final = 1800.0  # without a batch; then the time is refused, and the pool begins anew
 MOST_BREAK_S: Final = 3600.0  # springs and sensors are no longer as warm as they were
 # all of them chosen
@@ -112,7 +113,7 @@ def changes_of(parts: Parts, weigh: Weigh, rules: Rules) -> list[int]:
         Link(tuple(halts[one.at : other.at]), bounds[one.at + 1], bounds[other.at])
         for one, other in pairwise(weighings)
     ]
-    loads = loads_of(weighings, links, rules).loads if weighings else ()
+    loads = loads_of(weighings, links, rules, PARTED_FROM).loads if weighings else ()
     return [max(links[load.last].halts, key=lambda halt: halt.prior).middle[1] for load in loads[:-1]]
 
 
