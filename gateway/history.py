@@ -26,6 +26,7 @@ class Kind:
 ESTIMATE: Final = "estimate"
 REJECTION: Final = "rejection"
 ALARM: Final = "alarm"
+REMAINDER: Final = "remainder"  # too short to be a batch: kept for the trips, never sent
 SERVICE: Final = "service"  # what happened to the service itself: kept and asked for, never sent
 
 KINDS: Final = {

@@ -92,6 +92,7 @@ class Why(StrEnum):
     SENSOR_DISAGREEMENT = "sensor_disagreement"
     SENSOR_CHANGED = "sensor_changed"
     WRONG_SIGN = "wrong_sign"
+    LOAD_CHANGED = "load_changed"
 
 
 @dataclass(frozen=True, slots=True)

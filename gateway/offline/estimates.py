@@ -23,8 +23,19 @@ def estimates_of_logs(
 ) -> Iterator[Estimate]:
     """Every batch of every log in turn; each log is a drive of its own. Raises LogUnreadableError.
 
-    ``on_read`` hears of each log, once it is read, what its reader met.
+    ``on_read`` hears of each log, once it is read, what its reader met. What is too short to be a batch is left out.
     """
+    return (one for one in with_remainders(logs, setup, settings, on_read=on_read) if not one.is_remainder)
+
+
+def with_remainders(
+    logs: Sequence[Path | str],
+    setup: Setup,
+    settings: BatchSettings = AS_THE_SERVICE,
+    *,
+    on_read: Callable[[LogReport], None] = lambda report: None,
+) -> Iterator[Estimate]:
+    """Likewise, and between the batches what is too short to be one (``is_remainder``): it has a way."""
     for log in logs:
         flow = setup.flow(settings)
         motions, report, _ = motion_of_log(log, setup.signal_map)
@@ -46,7 +57,7 @@ def entries_of_logs(
     told: dict[str, Entry] = {}
     unreadable: LogUnreadableError | None = None
     try:
-        for estimate in estimates_of_logs(logs, setup, settings):
+        for estimate in with_remainders(logs, setup, settings):
             told |= {entry.id: entry for entry in ledger.add(estimate)}
     except LogUnreadableError as fault:
         unreadable = fault

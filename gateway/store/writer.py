@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, SERVICE, Delivery
+from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
@@ -80,6 +80,10 @@ class Store:
             raise ValueError("provisional estimates go to latest and the stream, not into the store")
         kind = REJECTION if record["rejected"] else ESTIMATE
         return self._append(kind, record["id"], record["t_end_ns"], json_line(record))
+
+    def write_remainder(self, record: Mapping[str, Any]) -> None:
+        """Accept what is too short to be a batch; no history shows it, and no uplink sends it."""
+        self._append(REMAINDER, record["id"], record["t_end_ns"], json_line(record))
 
     def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
         """Accept a load event, trip or alarm in a new revision -> its cursor; it takes the place of the one before."""

@@ -71,6 +71,8 @@ class AlarmDesk:
 
     def __call__(self, found: Estimate) -> None:
         """One more batch, by the pipeline once it is stored."""
+        if found.is_remainder:
+            return
         calibrated = self._subject.calibrated
         with self._lock:
             if calibrated is None:

@@ -156,6 +156,7 @@ TABLE: Final = (
         estimate="n_estimates",
         rejected="n_rejected",
         provisional="n_provisional",
+        remainder="n_remainders",
     ),
     by(
         "springscale_rejections_total",

@@ -10,7 +10,7 @@ from itertools import accumulate, pairwise
 from typing import Final
 
 from gateway.core.change import ROLLING
-from gateway.core.events.load import Weighing
+from gateway.core.loads.load import Weighing
 from gateway.estimate import NOWHERE, UNWATCHED, Estimate, Place, Watched
 from gateway.units import NS_PER_S
 
@@ -99,12 +99,12 @@ class Link:
 
 def follows(before: Estimate, after: Estimate) -> bool:
     """Whether two batches are of one drive, one right behind the other."""
-    return abs(after.t_start_ns - before.t_end_ns) <= 1_000
+    return abs(after.way_start_ns - before.t_end_ns) <= 1_000
 
 
 def clocks_of(estimates: Sequence[Estimate]) -> list[int]:
     """By which clock each batch is stamped: how many times it was put back among those before."""
-    put_back = (after.t_start_ns < before.t_end_ns - SLACK_NS for before, after in pairwise(estimates))
+    put_back = (after.way_start_ns < before.t_end_ns - SLACK_NS for before, after in pairwise(estimates))
     return list(accumulate(put_back, initial=0))[: len(estimates)]
 
 
@@ -147,9 +147,9 @@ def _halts(estimates: Sequence[Estimate]) -> Iterator[Halt]:
         if after is not None and not follows(one, after):
             before = after.way.before if after.way else UNWATCHED
             place = one.way.end if one.way else NOWHERE
-            begin_ns, end_ns = one.t_end_ns, max(one.t_end_ns, after.t_start_ns)
+            begin_ns, end_ns = one.t_end_ns, max(one.t_end_ns, after.way_start_ns)
             if clocks[i + 1] > clocks[i]:  # nobody knows how long it stood
-                begin_ns = end_ns = after.t_start_ns
+                begin_ns = end_ns = after.way_start_ns
             yield Halt(begin_ns, end_ns, before, place, is_between_drives=True, clock=clocks[i + 1])
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from gateway.core.change import EVEN, Rules, probability
-from gateway.core.events.halts import Link
-from gateway.core.events.load import Load, Weighing, load_of
+from gateway.core.loads.halts import Link
+from gateway.core.loads.load import Load, Weighing, load_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,11 +23,14 @@ class Loads:
     probabilities: tuple[float, ...]
 
 
-def loads_of(weighings: Sequence[Weighing], links: Sequence[Link], rules: Rules) -> Loads:
-    """Loads of weighings with ``links`` between them. Other calibrations cannot be compared: there a load ends."""
+def loads_of(weighings: Sequence[Weighing], links: Sequence[Link], rules: Rules, parted_from: float = EVEN) -> Loads:
+    """Loads of weighings with ``links`` between them; a change less likely than ``parted_from`` is none.
+
+    Other calibrations cannot be compared: there a load ends.
+    """
     loads = [load_of(weighings, i, i) for i in range(len(weighings))]
     odds = [_between(one, other, weighings, links, rules) for one, other in pairwise(loads)]
-    while odds and min(odds) < EVEN:
+    while odds and min(odds) < parted_from:
         at = odds.index(min(odds))
         loads[at : at + 2] = [load_of(weighings, loads[at].first, loads[at + 1].last)]
         del odds[at]
