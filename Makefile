@@ -40,23 +40,8 @@ check: .venv/.development
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python docs/make_settings.py --check
-	$(BIN)/python docs/make_signal_map.py --check
-	$(BIN)/python docs/make_campaign.py --check
-	$(BIN)/python docs/make_estimate.py --check
-	$(BIN)/python docs/make_archive.py --check
-	$(BIN)/python docs/make_faults.py --check
-	$(BIN)/python docs/make_reasons.py --check
-	$(BIN)/python docs/make_findings.py --check
-	$(BIN)/python docs/make_calibration_schema.py --check
-	$(BIN)/python docs/make_performance.py --check
-	$(BIN)/python docs/make_readme_table.py --check
-	$(BIN)/python docs/make_scale.py --check
-	$(BIN)/python docs/make_fleet.py --check
-	$(BIN)/python docs/make_phone.py --check
-	$(BIN)/python docs/make_hardware.py --check
+	$(BIN)/python docs/make.py --check
 	$(BIN)/python docs/make_site.py
-	$(BIN)/python docs/make_drawings.py --check
 	$(BIN)/python deploy/dist/audit_locks.py --advisory
 
 # Known weaknesses of the locked packages; fails where there is one, or where nobody can be asked.
@@ -67,7 +52,7 @@ audit: .venv/.development
 # writes docs/performance.json and its page. A quarter of an hour and ten gigabytes of disk.
 bench: .venv/.development deb
 	$(BIN)/python -m benchmarks.speed --output docs/performance.json
-	$(BIN)/python docs/make_performance.py
+	$(BIN)/python docs/make.py docs/performance.md
 
 # Fifty vehicles, or `make fleet-test VEHICLES=500`, into a broker and a database that are killed meanwhile; wants
 # Debian's mosquitto and postgresql. Some minutes; writes docs/fleet_test.json and its place in docs/fleet.md.
@@ -75,7 +60,7 @@ VEHICLES := 50
 fleet-test: .venv/.development
 	rm -f build/fleet-test.json
 	SPRINGSCALE_FLEET=$(VEHICLES) $(BIN)/python -m pytest tests/fleet
-	test ! -e build/fleet-test.json || $(BIN)/python docs/make_fleet.py build/fleet-test.json
+	test ! -e build/fleet-test.json || $(BIN)/python docs/make.py --counts build/fleet-test.json docs/fleet.md
 
 # The installed package on a real vcan0 under real systemd, in a small virtual machine: wants root, /dev/net/tun and the
 # Debian packages that .ci/run names; skips with a reason without them. One machine on each of two processors.
@@ -122,23 +107,8 @@ screenshots: .venv/.development
 	$(BIN)/python docs/make_screenshots.py
 
 docs: .venv/.development
-	$(BIN)/python docs/make_settings.py
-	$(BIN)/python docs/make_signal_map.py
-	$(BIN)/python docs/make_campaign.py
-	$(BIN)/python docs/make_estimate.py
-	$(BIN)/python docs/make_archive.py
-	$(BIN)/python docs/make_faults.py
-	$(BIN)/python docs/make_reasons.py
-	$(BIN)/python docs/make_findings.py
-	$(BIN)/python docs/make_calibration_schema.py
-	$(BIN)/python docs/make_performance.py
 	$(BIN)/python docs/make_tutorial.py
-	$(BIN)/python docs/make_readme_table.py
-	$(BIN)/python docs/make_scale.py
-	$(BIN)/python docs/make_fleet.py
-	$(BIN)/python docs/make_phone.py
-	$(BIN)/python docs/make_hardware.py
-	$(BIN)/python docs/make_drawings.py
+	$(BIN)/python docs/make.py
 
 # The documents as a site, in build/site.
 site: .venv/.development

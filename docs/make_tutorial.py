@@ -18,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
-from generated import ROOT, agrees
+from made import ROOT, agrees
 
 PAGE: Final = Path(__file__).with_name("tutorial.md")
 PORT: Final = "8000"

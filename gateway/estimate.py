@@ -126,7 +126,8 @@ class Way:
     """The way of one batch. ``distance_m`` is of the ``known_s`` in which the speed was known.
 
     Odometer readings are the first and the last within the batch. ``before`` is what was seen between the drive before
-    and this one, in the first batch of a drive alone.
+    and this one, in the first batch of a drive alone. ``since_ns`` is where the way begins, if later than the batch:
+    what was pooled from windows before has its way with their records.
     """
 
     distance_m: float = math.nan
@@ -138,6 +139,7 @@ class Way:
     end: Place = NOWHERE
     stops: tuple[Stop, ...] = ()
     before: Watched = UNWATCHED
+    since_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +150,8 @@ class Estimate:
     ``left_share``, its share on the left wheels (%), and ``roll_share_front``, the part of a sideways load's moment
     that the front axle's springs and bar take (0 to 1). ``posterior`` carries all of these errors by their sources;
     ``measured`` is what it was before known weights were taken into account (None: there were none), and
-    ``known_weights_id`` names these.
+    ``known_weights_id`` names these. A remainder is neither an answer nor a refusal: a window, or a piece of one, with
+    too little driving in it to be a batch, kept for its way; ``rejected`` says what it lacks.
     """
 
     t_start_ns: int
@@ -167,6 +170,7 @@ class Estimate:
     shares: Mapping[str, float] = field(default_factory=dict)
     rejected: tuple[Why, ...] = ()
     is_provisional: bool = False
+    is_remainder: bool = False
     spectra: Spectra | None = None
     diagnostics: Mapping[str, float] = field(default_factory=dict)
     epoch: Epoch | None = None
@@ -215,6 +219,12 @@ class Estimate:
             front_share=posterior.quantity(FRONT_SHARE),
             cg_left=posterior.quantity(CG_LEFT),
         )
+
+    @property
+    def way_start_ns(self) -> int:
+        """Where its way begins; those of one drive touch."""
+        since_ns = None if self.way is None else self.way.since_ns
+        return self.t_start_ns if since_ns is None else since_ns
 
     @property
     def raw_payload(self) -> Quantity | None:

@@ -1,11 +1,10 @@
-"""The history as rooms hand it to each other: the kinds of its records, and who reads or follows them.
+"""The history as rooms hand it to each other: the kinds of its records, and pieces of it.
 
 The store keeps one journal. The web sends it, the uplink and the webhook deliver it, and all follow it the same way.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +26,7 @@ class Kind:
 ESTIMATE: Final = "estimate"
 REJECTION: Final = "rejection"
 ALARM: Final = "alarm"
+REMAINDER: Final = "remainder"  # too short to be a batch: kept for the trips, never sent
 SERVICE: Final = "service"  # what happened to the service itself: kept and asked for, never sent
 
 KINDS: Final = {
@@ -90,79 +90,3 @@ class Delivery:
     n_waiting: int
     oldest_ns: int | None = None
     n_pruned_entries: int = 0
-
-
-class Follower(Protocol):
-    """Follows the journal from a place on. One thread reads; any thread may close it."""
-
-    @property
-    def place(self) -> str:
-        """Cursor of the last record read, or of the place from which it follows."""
-        ...
-
-    def read(self, limit: int) -> list[Record]:
-        """The next records of its kinds in order of their numbers; none where there is nothing new.
-
-        Asks the disk only for what is no longer in memory. Raises StoreError or TimeoutError.
-        """
-        ...
-
-    def go_to(self, cursor: str | None) -> None:
-        """Follow from behind another place; None: from the first record."""
-        ...
-
-    def close(self) -> None:
-        """Follow no more."""
-        ...
-
-
-class Journal(Protocol):
-    """What a sender needs of the store."""
-
-    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> Follower:
-        """Follow these kinds from behind a cursor. ``on_news`` is called with each record that is accepted, from the
-        thread that writes it: quick, and never blocking. Raises ValueError for a cursor that is none.
-        """
-        ...
-
-    def head(self) -> str:
-        """Cursor of the newest record accepted."""
-        ...
-
-    def delivery(self, uplink: str, kinds: Sequence[str]) -> Delivery:
-        """How far ``uplink`` has delivered, and what of these kinds waits. Raises StoreError or TimeoutError."""
-        ...
-
-    def write_delivery(self, uplink: str, cursor: str) -> bool:
-        """Remember that ``uplink`` has delivered everything up to ``cursor``."""
-        ...
-
-
-class Reader(Protocol):
-    """What the web asks of the store. Blocking questions, each from a thread of its own.
-
-    Raises ValueError for a cursor that is none, TimeoutError for a question that takes too long,
-    StoreError for a store that cannot be read.
-    """
-
-    def page(
-        self,
-        kinds: Sequence[str],
-        *,
-        since_ns: int | None = None,
-        until_ns: int | None = None,
-        limit: int = 100,
-        cursor: str | None = None,
-        newest_first: bool = False,
-        with_spectra: bool = True,
-    ) -> Page:
-        """Records of these kinds with since_ns <= t_end_ns < until_ns, in the order of their arrival."""
-        ...
-
-    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> Follower:
-        """As ``Journal.follow``."""
-        ...
-
-    def head(self) -> str:
-        """Cursor of the newest record accepted."""
-        ...

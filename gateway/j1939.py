@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.estimate import Estimate, Weights
+from gateway.quantities import QUANTITIES
 
 # SAE J1939-71, table 1, numbers of two bytes
 NOT_AVAILABLE: Final = 0xFFFF
@@ -27,6 +28,7 @@ AXLE_WEIGHT: Final = Parameter(65258, 582, "Axle Weight", 0.5, "AxleWeight")
 CARGO_WEIGHT: Final = Parameter(65258, 181, "Cargo Weight", 2.0, "CargoWeight")
 POWERED_WEIGHT: Final = Parameter(65136, 1585, "Powered Vehicle Weight", 10.0, "PoweredVehicleWeight")
 GROSS_WEIGHT: Final = Parameter(65136, 1760, "Gross Combination Vehicle Weight", 10.0, "GrossCombinationVehicleWeight")
+PARAMETERS: Final = (AXLE_WEIGHT, CARGO_WEIGHT, POWERED_WEIGHT, GROSS_WEIGHT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,23 +48,25 @@ class Count:
 def counts_of(shown: Estimate | None, weights: Weights, *, draws_trailers: bool) -> list[Count]:
     """Every parameter of an estimate and its ``weights``; what is not known is "not available".
 
-    An early look at a batch is not told: J1939 has no word for "provisional". A payload that an estimate finds a little
-    below nothing is 0. What a vehicle draws its springs do not tell: with ``draws_trailers`` the combination's weight
-    stays unknown.
+    A provisional estimate is not sent: J1939 has no word for it. Springs say nothing of a trailer: with
+    ``draws_trailers`` the combination's weight stays unknown.
     """
-    is_told = shown is not None and not shown.is_provisional
-    payload_kg = shown.payload.number if shown is not None else math.nan
-    gross_kg = weights.gross.kg
-    found = (
-        (AXLE_WEIGHT, 1, weights.front_axle.kg),
-        (AXLE_WEIGHT, 2, weights.rear_axle.kg),
-        (CARGO_WEIGHT, None, 0.0 if payload_kg < 0.0 else payload_kg),
-        (POWERED_WEIGHT, None, gross_kg),
-        (GROSS_WEIGHT, None, math.nan if draws_trailers else gross_kg),
-    )
-    return [
-        Count(parameter, axle, _raw(kg if is_told else math.nan, parameter.kg_per_bit)) for parameter, axle, kg in found
-    ]
+    is_final = shown is not None and not shown.is_provisional
+    counts = []
+    for parameter in PARAMETERS:
+        for one in QUANTITIES:
+            if parameter.spn in one.spns:
+                kg = getattr(weights, one.name).kg if one.is_weight else _payload_kg(shown)
+                is_known = is_final and not (parameter is GROSS_WEIGHT and draws_trailers)
+                raw = _raw(kg if is_known else math.nan, parameter.kg_per_bit)
+                counts.append(Count(parameter, one.axle, raw))
+    return counts
+
+
+def _payload_kg(shown: Estimate | None) -> float:
+    """Not below 0: an empty vehicle may be found a little lighter."""
+    payload_kg = math.nan if shown is None else shown.payload.number
+    return 0.0 if payload_kg < 0.0 else payload_kg
 
 
 def _raw(kg: float, kg_per_bit: float) -> int:

@@ -11,7 +11,7 @@ so that a common cause cancels in a difference, and whatever is learned of z nar
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
@@ -175,34 +175,39 @@ def fused(parts: Sequence[Posterior]) -> Posterior:
     if len(parts) == 1:
         return parts[0]
     size = max(part.size for part in parts)
-    precisions = [_padded(np.linalg.inv(part.own), size) for part in parts]
-    own = np.linalg.inv(sum(precisions, np.zeros((size, size))))
-    weights = [own @ precision for precision in precisions]
-    mean = sum(
-        (weight[:, : part.size] @ part.mean for weight, part in zip(weights, parts, strict=True)), np.zeros(size)
-    )
+    precisions = np.zeros((len(parts), size, size))
+    for known in {part.size for part in parts}:
+        alike = [i for i, part in enumerate(parts) if part.size == known]
+        precisions[alike, :known, :known] = np.linalg.inv(np.array([parts[i].own for i in alike]))
+    own = np.linalg.inv(precisions.sum(axis=0))
+    weights = own @ precisions
+    mean = np.einsum("nij,nj->i", weights, _stacked([part.mean for part in parts], size))
     sources = {
-        name: _averaged(name, parts, weights, size) for name in Source if any(name in one.sources for one in parts)
+        name: _averaged([part.sources.get(name) for part in parts], weights)
+        for name in Source
+        if any(name in part.sources for part in parts)
     }
-    by_payload = [float(weight[PAYLOAD, PAYLOAD]) for weight in weights]
-    tails = tuple(float(np.average([one.tails[i] for one in parts], weights=np.abs(by_payload))) for i in (0, 1))
-    return Posterior(mean, 0.5 * (own + own.T), sources, (tails[0], tails[1]))
+    tails = np.average([part.tails for part in parts], axis=0, weights=np.abs(weights[:, PAYLOAD, PAYLOAD]))
+    return Posterior(mean, 0.5 * (own + own.T), sources, (float(tails[0]), float(tails[1])))
 
 
-def _padded(matrix: np.ndarray, size: int) -> F64:
-    whole = np.zeros((size, size))
-    whole[: len(matrix), : len(matrix)] = matrix
+def _averaged(columns: Sequence[F64 | None], weights: F64) -> F64:
+    """Columns (c, size) of one source from those of each part, None where a part has none; weights (n, size, size)."""
+    size = weights.shape[-1]
+    n_columns = max(len(each) for each in columns if each is not None)
+    whole = np.zeros((len(columns), n_columns, size))
+    for i, each in enumerate(columns):
+        if each is not None:
+            whole[i, : len(each), : each.shape[1]] = each
+    averaged: F64 = np.einsum("nck,nik->ci", whole, weights)
+    return averaged
+
+
+def _stacked(rows: Sequence[F64], size: int) -> F64:
+    whole = np.zeros((len(rows), size))
+    for i, row in enumerate(rows):
+        whole[i, : len(row)] = row
     return whole
-
-
-def _averaged(name: Source, parts: Sequence[Posterior], weights: Iterable[F64], size: int) -> F64:
-    n_columns = max(len(one.sources[name]) for one in parts if name in one.sources)
-    total = np.zeros((n_columns, size))
-    for part, weight in zip(parts, weights, strict=True):
-        columns = part.sources.get(name)
-        if columns is not None:
-            total[: len(columns)] += columns @ weight[:, : part.size].T
-    return total
 
 
 def difference(before: Posterior, after: Posterior, *, is_one_load: bool) -> tuple[F64, F64]:

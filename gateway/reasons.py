@@ -137,6 +137,11 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "the sensor is not where, or not what, it was when it was calibrated: moved, turned, or with another gain",
             "mount it as it was, or calibrate again",
         ),
+        Why.LOAD_CHANGED: Explanation(
+            Cause.DRIVE,
+            "the load changed at a stop, and too little was driven with the load before it to weigh that (a minute)",
+            "nothing; the load after the stop is weighed",
+        ),
         Why.SENSOR_DISAGREEMENT: Explanation(
             Cause.SENSORS,
             "acceleration and pitch rate do not move together as one body does",

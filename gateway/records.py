@@ -10,16 +10,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.schema import AsLists
 from gateway.units import NS_PER_S
 
 _START: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
-F64 = NDArray[np.float64]
+F64 = Annotated[NDArray[np.float64], AsLists]
 I64 = NDArray[np.int64]
 U32 = NDArray[np.uint32]
 U8 = NDArray[np.uint8]
@@ -91,6 +92,7 @@ class Why(StrEnum):
     SENSOR_DISAGREEMENT = "sensor_disagreement"
     SENSOR_CHANGED = "sensor_changed"
     WRONG_SIGN = "wrong_sign"
+    LOAD_CHANGED = "load_changed"
 
 
 @dataclass(frozen=True, slots=True)

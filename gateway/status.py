@@ -108,6 +108,12 @@ class BatchCounts(_Told):
     n_estimates: int = 0
     n_rejected: int = 0
     n_provisional: int = 0
+    n_remainders: int = Field(
+        0, description="windows with too little driving to be batches, pooled with what follows under the same load"
+    )
+    missing_s: float | None = Field(
+        None, description="how many seconds of usable driving the next batch still lacks", examples=[42.0]
+    )
     rejected_by_reason: dict[str, int] = Field(default_factory=dict)
 
 

@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from math import isnan
 from pathlib import Path
@@ -73,7 +74,7 @@ def checked(
         raise error(describe_faults(path, fault, model)) from None
 
 
-def describe_faults(where: Path | str, fault: ValidationError, model: type[BaseModel]) -> str:
+def describe_faults(where: Path | str, fault: ValidationError, model: type) -> str:
     """One line a fault of ``model``: file, key, what is wrong and what stands there.
 
     A list is not reported as too short when the missing entries are already reported as wrong.
@@ -91,12 +92,12 @@ def _key(location: tuple[int | str, ...]) -> str:
     return key or "(file)"
 
 
-def _what(fault: dict[str, Any], model: type[BaseModel]) -> str:
-    if fault["type"] == "extra_forbidden":
+def _what(fault: dict[str, Any], model: type) -> str:
+    if fault["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         *table, key = fault["loc"]
         meant = get_close_matches(str(key), _keys_of(model, table), 1, SIMILAR)
         return f"unknown key; did you mean {meant[0]}?" if meant else "unknown key; remove it or check its spelling"
-    if fault["type"] == "missing":
+    if fault["type"] in ("missing", "missing_keyword_only_argument", "missing_argument"):
         return "missing; it must be given"
     if fault["type"] in _BEYOND:
         return _beyond(fault)
@@ -105,18 +106,25 @@ def _what(fault: dict[str, Any], model: type[BaseModel]) -> str:
     return message if fault["type"] == "value_error" or len(shown) > 60 else f"{message} (it says {shown})"
 
 
-def _keys_of(model: type[BaseModel], table: Sequence[int | str]) -> list[str]:
+def _keys_of(model: type, table: Sequence[int | str]) -> list[str]:
     """The keys that the table at this place may have; where there is a choice of models, those of all of them."""
     models = [model]
     for part in table:
-        fields = [one.model_fields[part] for one in models if isinstance(part, str) and part in one.model_fields]
-        inner = [found for each in fields for found in _models_in(each.annotation)]
+        types = [hints[part] for one in models if isinstance(part, str) and part in (hints := _fields_of(one))]
+        inner = [found for each in types for found in _models_in(each)]
         models = inner or models  # an index, or a name that the writer chose, leads no deeper
-    return [key for one in models for key in one.model_fields]
+    return [key for one in models for key in _fields_of(one)]
 
 
-def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _fields_of(model: type) -> dict[str, Any]:
+    """Types by key, of a pydantic model or of a dataclass."""
+    if issubclass(model, BaseModel):
+        return {name: field.annotation for name, field in model.model_fields.items()}
+    return {field.name: field.type for field in fields(model)} if is_dataclass(model) else {}
+
+
+def _models_in(annotation: Any) -> Iterator[type]:
+    if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         yield annotation
     for part in get_args(annotation):
         yield from _models_in(part)

@@ -35,7 +35,13 @@ WITHOUT_GAP: Final = 0.9  # a `clear_probability` that is the early one
 _BATCH_NS: Final = 300 * NS_PER_S
 _LIMIT_PAYLOAD_KG: Final = 700.0
 _VAN: Final = Vehicle(
-    "made up", 1600.0, 3.0, unsprung_front_kg=100.0, unsprung_rear_kg=100.0, gross_limit_kg=1800.0 + _LIMIT_PAYLOAD_KG
+    name="made up",
+    empty_mass_kg=1600.0,
+    wheelbase_m=3.0,
+    sensor_position_m=0.0,
+    unsprung_front_kg=100.0,
+    unsprung_rear_kg=100.0,
+    gross_limit_kg=1800.0 + _LIMIT_PAYLOAD_KG,
 )
 
 

@@ -17,7 +17,13 @@ from gateway.core.vehicle import Vehicle
 from gateway.units import STANDARD_GRAVITY_MPS2
 from gateway.workbench.campaigns import PAPER_PAYLOAD_KG, PAPER_ROUGHNESS_M3, PAPER_SPEED_MPS, PAPER_WHEELBASE_M
 
-PAPER_VAN: Final = Vehicle("paper_van", 1240.0, PAPER_WHEELBASE_M, 50.0, 3.1)
+PAPER_VAN: Final = Vehicle(
+    name="paper_van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=PAPER_WHEELBASE_M,
+    empty_front_share_pct=50.0,
+    sensor_position_m=3.1,
+)
 MODEL_SLACK: Final = 0.02
 SENSOR_NOISE: Final = (
     (150e-6 * STANDARD_GRAVITY_MPS2) ** 2,

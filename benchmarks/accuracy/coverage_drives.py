@@ -15,7 +15,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import MEASURED_OFFSET_STD_M
 from gateway.core.vehicle import Vehicle as StatedVehicle
-from gateway.offline.batches import batches_of_motion
+from gateway.offline.campaigns import batches_of_motion
 from gateway.records import Motion
 from gateway.sim.drive import Drive, constant, motorway, rural, urban
 from gateway.sim.obstacles import ObstacleRoad, UnevenRoad

@@ -21,9 +21,9 @@ from benchmarks.accuracy.vans import fresh_van
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cargo import Carries
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Carries
 from gateway.estimate_json import estimate_to_json
 from gateway.sim.drive import Drive, rural, urban
 from gateway.sim.obstacles import ObstacleRoad, UnevenRoad

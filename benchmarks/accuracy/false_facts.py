@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from benchmarks.accuracy.coverage_drives import AS_CALIBRATED, driven
 from benchmarks.accuracy.siblings.drives import MIXED, SCOPE, Drawn, draw_line, drawn_van, sister
@@ -207,7 +207,7 @@ def _answers(van: Drawn) -> Said:
         "kerb_rear_axle_kg": DIVISION_KG * round(rear_kg / DIVISION_KG),
         "wheelbase_m": round(van.van.wheelbase_m, 2),
         "sensor_position_m": round(van.vehicle.sensor_position_m, 2),
-        "sensor_offset_left_m": round(van.vehicle.sensor_offset_left_m, 2),
+        "sensor_offset_left_m": round(float(van.vehicle.sensor_offset_left_m or 0.0), 2),
         "track_width_m": round(float(van.vehicle.track_width_m or 0.0), 2),
     }
 
@@ -221,9 +221,9 @@ def _empty_drive(van: Drawn, aboard_kg: float, *, is_mixed: bool) -> KnownRun:
 def _commissioned(said: Mapping[str, Any], run: KnownRun, known: _Known | None) -> str:
     """What stops it or asks; ``PASSED`` where nothing does."""
     try:
-        answers = VehicleAnswers.model_validate(dict(said))
+        answers = TypeAdapter(VehicleAnswers).validate_python(dict(said))
         doubts = doubts_of(answers, known.facts if known else NO_LINE)
-        vehicle = vehicle_table(answers, "van").stated
+        vehicle = vehicle_table(answers, "van")
         if known is not None:
             known.line.prior_of(vehicle, with_roll=False)
     except ValidationError:

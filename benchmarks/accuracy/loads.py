@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.cargo import Carries
+from gateway.core.vehicle import Carries
 from gateway.sim.vehicle import Load, Vehicle
 
 FLOOR_M: Final = 0.6  # above the road, of the vans' load floors

@@ -3,7 +3,7 @@
     python -m benchmarks.speed [--only decode,formats] [--quick] [--output docs/performance.json]
 
 Each part is a program of its own (``python -m benchmarks.speed.PART``) and runs alone, one after the other. The figures
-go into a file as JSON, from which docs/performance.md is made (docs/make_performance.py). About a quarter of an hour,
+go into a file as JSON, from which docs/performance.md is made (docs/make.py). About a quarter of an hour,
 and ten gigabytes of disk for the day.
 """
 

@@ -22,7 +22,7 @@ from gateway.config.sections import CommissioningSection
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate
-from gateway.offline.batches import read_whole_log
+from gateway.offline.campaigns import read_whole_log
 from gateway.records import Batch, Motion
 from gateway.toml_file import checked, read_toml
 

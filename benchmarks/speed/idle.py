@@ -1,7 +1,8 @@
 """What the service costs while the vehicle is parked: processor time and disk writes of an hour, bus asleep.
 
 A thousand batches lie in the store; all of them are delivered to a broker and, as events, to nobody's webhook.
-``python -m benchmarks.speed.idle`` prints one JSON object; it wants Debian's mosquitto.
+``python -m benchmarks.speed.idle`` prints one JSON object; it wants Debian's mosquitto. Another version is measured
+with this file by ``PYTHONPATH=ITS_FOLDER python benchmarks/speed/idle.py``.
 """
 
 import argparse
@@ -90,7 +91,7 @@ def measured(seconds: float) -> dict[str, float]:
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         with (
             subprocess.Popen(["mosquitto", "-c", str(here / "mosquitto.conf")], **quiet) as mosquitto,  # type: ignore[call-overload]
-            subprocess.Popen(service, **quiet) as running,  # type: ignore[call-overload]
+            subprocess.Popen(service, cwd=here, **quiet) as running,  # type: ignore[call-overload]
         ):
             try:
                 time.sleep(SETTLE_S)

@@ -22,7 +22,7 @@ from gateway.bus.signals import Decoder
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.estimator import estimate
 from gateway.core.settings import BatchSettings
-from gateway.offline.batches import batches_of_motion
+from gateway.offline.campaigns import batches_of_motion
 from gateway.setup import load_setup
 from gateway.workbench import demo_drive, frames_of
 

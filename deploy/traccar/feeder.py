@@ -56,7 +56,7 @@ class History:
         self._cursor: str | None = None
         self._is_known = from_the_start
         if self._file.is_file():
-            self._cursor, self._is_known = json.loads(self._file.read_text())["cursor"], True
+            self._restore()
 
     def next(self) -> list[tuple[dict[str, Any], str]]:
         """Records with the place behind each; none where nothing is new. Raises OSError or ValueError."""
@@ -69,13 +69,25 @@ class History:
         return [(item, behind if i == len(items) - 1 else "") for i, item in enumerate(items)]
 
     def move_to(self, cursor: str | None) -> None:
-        """Keep a place, whole or not at all."""
+        """Keep a place, whole or not at all, also through a power cut."""
         if cursor is None:
             return
         self._cursor = cursor
         part = self._file.with_suffix(".part")
-        part.write_text(json.dumps({"cursor": cursor}))
+        with part.open("w") as file:
+            json.dump({"cursor": cursor}, file)
+            file.flush()
+            os.fsync(file.fileno())
         part.replace(self._file)
+
+    def _restore(self) -> None:
+        """The kept place; one that cannot be read counts as none."""
+        try:
+            self._cursor = str(json.loads(self._file.read_text())["cursor"])
+        except (OSError, ValueError, KeyError, TypeError) as fault:
+            tell(f"{self._file} cannot be read ({fault}): going on as at the first start")
+        else:
+            self._is_known = True
 
     def _asked(self, query: str) -> Any:
         token = os.environ.get("SPRINGSCALE_TOKEN")

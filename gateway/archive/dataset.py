@@ -13,7 +13,7 @@ from gateway.archive.places import MISSING, Place
 from gateway.archive.receipts import Slot
 from gateway.budget import OWN
 from gateway.errors import ConfigurationError
-from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, REASONS, WEIGHTS, EstimateField, Kind
+from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, WEIGHTS, EstimateField, Kind
 from gateway.estimate_json.kinds import COUNT, INTERVAL, OVER_LIMIT, TEXT, WHOLE, places_over_limit
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def _columns_of(one: EstimateField) -> dict[str, str]:
 
 def _kind_name(kind: Kind) -> str:
     named = ((TEXT, "text"), (WHOLE, "whole"), (COUNT, "whole"), (INSTANT, "instant"), (REASONS, "texts"))
-    return next((name for of, name in named if kind is of), "numbers by name" if kind is BY_NAME else "number")
+    return next((name for of, name in named if kind is of), "numbers by name" if kind is NUMBERS_BY_NAME else "number")
 
 
 def _cells_of(one: EstimateField, told: Any) -> dict[str, Any]:
@@ -164,7 +164,7 @@ def _cell(kind: Kind, told: Any) -> Any:
         return datetime.fromisoformat(told)
     if kind is COUNT:
         return int(told)
-    return list(told.items()) if kind is BY_NAME else told
+    return list(told.items()) if kind is NUMBERS_BY_NAME else told
 
 
 def _pyarrow() -> Any:

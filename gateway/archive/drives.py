@@ -79,10 +79,10 @@ class Drives:
         return Flow(job.settings, setup.signal_map.traits, setup.calibrated, setup.estimator, job.identity)
 
     def _weighed(self, flow: Flow, batches: Iterable[Batch]) -> list[Estimate]:
-        found = []
+        found: list[Estimate] = []
         for batch in batches:
             flow.knowledge = self._job.knowledge_at(batch.t_end_ns)
-            found.append(flow.weigh(batch))
+            found += (one for one in flow.weigh(batch) if not one.is_remainder)
         return found
 
     def _lead_in(self) -> None:

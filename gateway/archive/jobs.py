@@ -4,20 +4,22 @@ Where a log goes on where the one before it ended, the drive goes on: its window
 begins as the last logs before it leave the pipeline (``lead_in``), and leaves a window open that the next job ends.
 """
 
+import functools
 import hashlib
 import json
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from importlib.metadata import version
 from itertools import groupby, pairwise
+from pathlib import Path
 from typing import Any, Final
 
 from gateway.archive.dataset import SCHEMA_VERSION
 from gateway.archive.manifest import FOREVER_NS, Assignment
 from gateway.archive.places import Place
 from gateway.archive.receipts import Slot
-from gateway.archive.software import software
 from gateway.archive.survey import Facts, LogFacts, LogFile
 from gateway.calibration.known_weights_file import KnownWeights
 from gateway.core.flow import Identity
@@ -26,6 +28,42 @@ from gateway.core.settings import BatchSettings
 from gateway.records import ns_of
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
+
+WEIGHING: Final = (
+    "archive/dataset.py",
+    "archive/drives.py",
+    "bus/frames.py",
+    "bus/logs",
+    "bus/messages.py",
+    "bus/signals",
+    "core",
+    "estimate.py",
+    "estimate_json",
+    "records.py",
+    "units.py",
+)
+"""Of the package: files and folders between a log's bytes and a row."""
+
+
+@functools.cache
+def software() -> str:
+    """springscale 1.2.3 code 0123456789ab."""
+    return f"springscale {version('springscale')} code {code_id()}"
+
+
+def code_id() -> str:
+    """Hash of those files as they are installed."""
+    package = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for path in sorted(found for named in WEIGHING for found in _sources(package / named)):
+        digest.update(f"{path.relative_to(package).as_posix()}\0".encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _sources(path: Path) -> list[Path]:
+    return [path] if path.is_file() else list(path.rglob("*.py"))
+
 
 LEAD_IN_NS: Final = 25 * 3600 * NS_PER_S
 """Logs that began so long before a job's first may still be under way in its first drive: a day's log, and an hour."""

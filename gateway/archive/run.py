@@ -16,9 +16,8 @@ from typing import Any, Final
 
 from gateway.archive.dataset import SCHEMA_VERSION, parquet_of, row_of
 from gateway.archive.drives import Drives, followed, readable
-from gateway.archive.jobs import Job, JobLog
+from gateway.archive.jobs import Job, JobLog, software
 from gateway.archive.receipts import Slot, text_of
-from gateway.archive.software import software
 from gateway.bus.logs import LogReport
 from gateway.errors import ConfigurationError, LogUnreadableError
 from gateway.estimate import Estimate

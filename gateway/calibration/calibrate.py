@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 
@@ -10,23 +10,13 @@ import numpy as np
 
 from gateway.calibration.campaign import Campaign, file_sha256
 from gateway.calibration.contradicted import contradictions
-from gateway.calibration.file import (
-    CalibrationFile,
-    CrossSpectrumPart,
-    ExpectedErrorsPart,
-    LikeFile,
-    LinePart,
-    ProvenancePart,
-    RatioIndexPart,
-    RunPart,
-    SeenPart,
-    VehiclePart,
-    line_of_files,
-)
+from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, LikeFile, ProvenancePart, RunPart, SeenPart
 from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
+from gateway.calibration.inheritance import Seen
 from gateway.calibration.inspection import Inspection, Kind, Severity, SplitRun
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.line import Line, Seen
+from gateway.calibration.line import Line
+from gateway.calibration.line_files import line_of_files, line_part
 from gateway.calibration.ratio_index import BandChoice, RatioIndexFit, StructureChoice, fit_ratio_index
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.errors import CalibrationImpossibleError
@@ -88,11 +78,11 @@ def calibrate_inspected(
     )
     warnings += [f"{one.kind}: {one.sentence}" for one in doubts]
     file = CalibrationFile(
-        vehicle=VehiclePart(**asdict(campaign.vehicle)),
+        vehicle=campaign.vehicle,
         seen=_seen(runs, counted, line.seen if line and cross_spectrum else None),
-        cross_spectrum=CrossSpectrumPart.of(cross_spectrum.calibration) if cross_spectrum else None,
-        ratio_index=RatioIndexPart.of(ratio_index.calibration) if ratio_index else None,
-        line=LinePart.of(line) if line and cross_spectrum else None,
+        cross_spectrum=cross_spectrum.calibration if cross_spectrum else None,
+        ratio_index=ratio_index.calibration if ratio_index else None,
+        line=line_part(line) if line and cross_spectrum else None,
         expected_errors=_expected_errors(ratio_index=ratio_index, cross_spectrum=cross_spectrum),
         warnings=(*inspection.warnings, *warnings),
         provenance=_provenance(campaign, split, command),

@@ -9,28 +9,18 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gateway.calibration.axle_weights import AxleWeights, sprung_of
 from gateway.core.vehicle import (
-    MEASURED_OFFSET_STD_M,
     PAYLOAD_LEFT_STD_M,
-    UNKNOWN_OFFSET_STD_M,
+    Kilograms,
+    Metres,
+    MetresLeft,
+    Percent,
     Vehicle,
     cg_left_m,
     front_share_pct,
     left_share_pct,
-    sensor_offset_left,
 )
 from gateway.core.weights import unsprung_kg
 from gateway.errors import CampaignError
-from gateway.stated import (
-    CarriesAnswer,
-    Kilograms,
-    Metres,
-    MetresLeft,
-    PayloadHeightM,
-    PayloadLengthM,
-    Percent,
-    RoofRack,
-    TowBar,
-)
 from gateway.toml_file import checked, read_toml
 
 OnRun = Callable[[int, int], None]  # (runs done, runs in all)
@@ -41,89 +31,6 @@ LEAST_PAYLOAD_SHARE: Final = 0.004
 
 class _Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class VehicleTable(_Table):
-    """[vehicle]: masses and share are of the sprung mass."""
-
-    name: str = Field(min_length=1, description="what you call it; it stands in the calibration file and its report")
-    empty_mass_kg: float = Field(
-        ge=100.0, le=100_000.0, description="sprung mass of the empty vehicle, driver and tank as in service: M"
-    )
-    wheelbase_m: float = Field(ge=0.8, le=20.0, description="from axle to axle: l")
-    empty_front_share_pct: Percent = Field(50.0, description="share of `empty_mass_kg` that rests on the front axle")
-    sensor_position_m: Metres = Field(description="the sensor's, behind the front axle; negative: ahead of it")
-    payload_range_kg: tuple[Kilograms, Kilograms] = Field(
-        (0.0, 450.0),
-        description="payloads the vehicle may carry, rising; scales percentages, never clips; a plan asks for it",
-    )
-    front_share_range_pct: tuple[Percent, Percent] = Field(
-        (40.0, 60.0), description="front shares it may have, rising; scales percentages and plans, never clips"
-    )
-    sensor_position_std_m: float = Field(
-        0.1, gt=0.0, le=10.0, description="how sure the sensor's position is; the fit moves it that far"
-    )
-    empty_front_share_std_pct: float = Field(
-        0.5,
-        gt=0.0,
-        le=50.0,
-        description="how sure the front share is, in percentage points; front shares and axle loads are no surer",
-    )
-    sensor_offset_left_m: MetresLeft | None = Field(
-        None, description="of the sensor, left of the centre line, negative: right of it; absent: not known"
-    )
-    sensor_offset_left_std_m: float | None = Field(
-        None,
-        gt=0.0,
-        le=2.0,
-        description=f"how sure that is; absent: {MEASURED_OFFSET_STD_M:g} with an offset, by tape, "
-        f"{UNKNOWN_OFFSET_STD_M:g} without one",
-    )
-    track_width_m: float | None = Field(
-        None,
-        ge=0.5,
-        le=4.0,
-        description="between the middles of left and right tyres; weights of single wheels need it",
-    )
-    empty_cg_left_m: MetresLeft = Field(
-        0.0, description="centre of gravity of the empty vehicle, driver aboard, left of the centre line"
-    )
-    unsprung_front_kg: float | None = Field(
-        None, gt=0.0, description="front axle, wheels and brakes; taken as known to 10 %; absent: found by calibration"
-    )
-    unsprung_rear_kg: float | None = Field(None, gt=0.0, description="the same at the rear")
-    kerb_front_axle_kg: float | None = Field(
-        None, gt=0.0, description="what scales show under the empty vehicle's front axle, for weights on the road"
-    )
-    kerb_rear_axle_kg: float | None = Field(None, gt=0.0, description="the same at the rear")
-    wheel_radius_m: float | None = Field(None, gt=0.0, description="kept in the calibration file, not used")
-    carries: CarriesAnswer = None
-    payload_length_m: PayloadLengthM = None
-    payload_height_m: PayloadHeightM = None
-    roof_rack: RoofRack = False
-    tow_bar: TowBar = False
-    front_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the front axle")
-    rear_axle_limit_kg: float | None = Field(None, gt=0.0, description="permitted load of the rear axle")
-    gross_limit_kg: float | None = Field(None, gt=0.0, description="permitted gross weight")
-    front_wheel_limit_kg: float | None = Field(
-        None, gt=0.0, description="permitted load of each front wheel or its tyre, both of twin tyres"
-    )
-    rear_wheel_limit_kg: float | None = Field(None, gt=0.0, description="the same at the rear")
-
-    @model_validator(mode="after")
-    def _ranges_rise(self) -> "VehicleTable":
-        for name in ("payload_range_kg", "front_share_range_pct"):
-            low, high = getattr(self, name)
-            if low >= high:
-                raise ValueError(f"{name} must rise: [low, high]")
-        return self
-
-    @property
-    def stated(self) -> Vehicle:
-        """The vehicle in the core's terms."""
-        offset_m, offset_std_m = sensor_offset_left(self.sensor_offset_left_m, self.sensor_offset_left_std_m)
-        sensor = {"sensor_offset_left_m": offset_m, "sensor_offset_left_std_m": offset_std_m}
-        return Vehicle(**self.model_dump() | sensor)
 
 
 class RunTable(_Table):
@@ -168,7 +75,7 @@ class CampaignTable(_Table):
     identification_fraction: float = Field(
         0.667, ge=0.0, le=1.0, description="first part of each run that identifies; the rest validates"
     )
-    vehicle: VehicleTable = Field(description="the vehicle, empty")
+    vehicle: Vehicle = Field(description="the vehicle, empty")
     runs: tuple[RunTable, ...] = Field(min_length=1, description="the drives, numbered from 1 in this order")
 
 
@@ -182,12 +89,12 @@ class DraftTable(CampaignTable):
 class Campaign:
     """A campaign file with its paths resolved and its vehicle in the core's terms."""
 
-    def __init__(self, path: Path, table: CampaignTable) -> None:
+    def __init__(self, path: Path, table: CampaignTable, *, states_payload_range: bool = True) -> None:
         self.path = path
         self.runs = table.runs
         self.identification_fraction = table.identification_fraction
-        self.vehicle = table.vehicle.stated
-        self.states_payload_range = "payload_range_kg" in table.vehicle.model_fields_set
+        self.vehicle = table.vehicle
+        self.states_payload_range = states_payload_range
         self._signals = table.signals
 
     @property
@@ -213,7 +120,8 @@ def load_campaign(path: Path, *, may_lack_runs: bool = False) -> Campaign:
     """
     tables = read_toml(path, CampaignError)
     model = DraftTable if may_lack_runs and not tables.get("runs") else CampaignTable
-    campaign = Campaign(path, checked(_with_sprung(tables, path), path, model, CampaignError))
+    table = checked(_with_sprung(tables, path), path, model, CampaignError)
+    campaign = Campaign(path, table, states_payload_range="payload_range_kg" in tables["vehicle"])
     faults = [f"{path}: vehicle.{fault}" for fault in _range_faults(campaign.vehicle)]
     faults += [
         f"{path}: runs[{i}].{fault}" for i, run in enumerate(campaign.runs, 1) for fault in _faults(campaign, run)

@@ -22,10 +22,9 @@ from typing import Final
 import numpy as np
 from scipy.stats import chi2
 
-from gateway.calibration.half_car.inherited import Inherited
 from gateway.calibration.half_car.known_spectra import known_spectra
 from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
-from gateway.calibration.half_car.prior import Prior, prior_of
+from gateway.calibration.half_car.prior import Inherited, Prior, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, upright

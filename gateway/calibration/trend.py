@@ -18,7 +18,7 @@ from pydantic import Field
 
 from gateway.calibration.file.parts import Part
 from gateway.estimate import Estimate
-from gateway.records import Why
+from gateway.records import F64, Why
 from gateway.units import NS_PER_S
 
 FILE_NAME: Final = "trend.json"
@@ -162,22 +162,37 @@ def theil_sen(x: Sequence[float], y: Sequence[float], confidence: float = CONFID
     P. K. Sen, Estimates of the regression coefficient based on Kendall's tau (1968), with his correction for ties.
     scipy.stats has the same, and costs a vehicle's service a second and tens of megabytes to import.
     """
-    first, second = np.triu_indices(len(x), 1)
-    apart, rise = np.asarray(x)[second] - np.asarray(x)[first], np.asarray(y)[second] - np.asarray(y)[first]
-    slopes = np.sort(rise[apart != 0.0] / apart[apart != 0.0])
-    variance = (_pairs(len(x)) - sum(map(_pairs, _ties(x))) - sum(map(_pairs, _ties(y)))) / 18.0
+    slopes, variance = pair_slopes(x, y), variance_of_s(x, y)
     if variance < 0.0:  # so many ties that they say nothing of it
         return float(np.median(slopes)), math.nan, math.nan
     reach = NormalDist().inv_cdf(0.5 + confidence / 2.0) * math.sqrt(variance)
+    return float(np.median(slopes)), *around_the_median(slopes, reach)
+
+
+def pair_slopes(x: Sequence[float] | F64, y: Sequence[float] | F64) -> F64:
+    """Slopes between any two points (n,) that differ in x, rising."""
+    first, second = np.triu_indices(len(x), 1)
+    apart, rise = np.asarray(x)[second] - np.asarray(x)[first], np.asarray(y)[second] - np.asarray(y)[first]
+    slopes: F64 = np.sort(rise[apart != 0.0] / apart[apart != 0.0])
+    return slopes
+
+
+def variance_of_s(x: Sequence[float] | F64, y: Sequence[float] | F64) -> float:
+    """Of Kendall's S where there is no trend, with its correction for ties; below 0 where there is little but ties."""
+    return (_pairs(len(x)) - sum(map(_pairs, _ties(x))) - sum(map(_pairs, _ties(y)))) / 18.0
+
+
+def around_the_median(slopes: F64, reach: float) -> tuple[float, float]:
+    """The slopes that lie ``reach`` ranks of S to either side; the outermost where that is beyond them."""
     low = max(round((len(slopes) - reach) / 2.0) - 1, 0)
     high = min(round((len(slopes) + reach) / 2.0), len(slopes) - 1)
-    return float(np.median(slopes)), float(slopes[low]), float(slopes[high])
+    return float(slopes[low]), float(slopes[high])
 
 
 def _pairs(n: int) -> int:
     return n * (n - 1) * (2 * n + 5)
 
 
-def _ties(values: Sequence[float]) -> list[int]:
+def _ties(values: Sequence[float] | F64) -> list[int]:
     """How often each value occurs."""
     return [int(n) for n in np.unique(np.asarray(values), return_counts=True)[1]]

@@ -13,6 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads on
 
 import click
 
+from gateway.allocator import keep_freed_memory
 from gateway.errors import SpringscaleError
 
 _COMMANDS = {
@@ -105,10 +106,11 @@ def main(arguments: list[str] | None = None) -> None:
 
     Without ``arguments`` they are the process's own, and it ends with the command.
     """
+    keep_freed_memory()
     try:
         _call(arguments)
     except SystemExit as leaving:
-        if arguments is None and any(thread.daemon for thread in threading.enumerate()):
+        if arguments is None and threading.active_count() > 1:
             _leave_threads_behind(leaving)
         raise
 

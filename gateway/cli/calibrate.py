@@ -9,9 +9,10 @@ import click
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file import CalibrationFile, LikeFile, line_of_files, load_like
+from gateway.calibration.file import CalibrationFile, LikeFile, load_like
 from gateway.calibration.inspection import Inspection, Kind
 from gateway.calibration.judgement import LearningCurve, curve_of
+from gateway.calibration.line_files import line_of_files
 from gateway.calibration.plan import LoadPlan, StatedWidths, plan_first, plan_next, stated_widths, usual_drive
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, window

@@ -84,7 +84,7 @@ class _Driver:
         self.fault: Exception | None = None  # what ended the driving
 
     def known_loads(self) -> tuple[KnownLoad, ...]:
-        """What was truly aboard so far, for the dashboard to compare with; from any thread."""
+        """The actual loads so far, for the dashboard to compare with; from any thread."""
         return self._known_loads
 
     def start(self, gateway: Gateway) -> None:

@@ -86,7 +86,7 @@ class _Van:
         motion = Decoder(self._setup.signal_map).decode(frames_of(demo_drive(seed, start_ns)))
         calibrated = self._setup.calibrated
         for estimate in [*flow.feed(motion), *flow.flush()]:
-            if estimate.is_provisional:
+            if estimate.is_provisional or estimate.is_remainder:
                 continue
             yield estimate.t_end_ns, self._message("estimates", estimate_to_json(estimate))
             if calibrated is not None:

@@ -21,7 +21,7 @@ from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError, NothingWeighedError
 from gateway.estimate import Estimate
 from gateway.estimate_json import COLUMNS, estimate_to_json, table_row
-from gateway.offline import estimates_of_logs
+from gateway.offline.estimates import with_remainders
 from gateway.reasons import EXPLANATIONS
 from gateway.records import Why, json_line
 from gateway.setup import Setup, load_setup, setup_of
@@ -69,9 +69,10 @@ def estimate(
 
     def found() -> Found:
         for log in logs:
-            for weighed in estimates_of_logs([log], setup, settings, on_read=_tell):
+            for weighed in with_remainders([log], setup, settings, on_read=_tell):
                 reasons.update(weighed.rejected or [None])
-                yield log if len(logs) > 1 else None, weighed
+                if not weighed.is_remainder:
+                    yield log if len(logs) > 1 else None, weighed
 
     for line in lines(found()):
         click.echo(line)

@@ -56,7 +56,7 @@ trusted_keys = click.option(
     "--trusted-keys",
     type=FILE,
     default=None,
-    help="file of public keys, one of which must have signed the configuration [default: nobody need]",
+    help="file of public keys, one of which must have signed the configuration [default: signatures are not required]",
 )
 window = click.option(
     "--window-s", type=NumberRange(20.0, 3600.0), default=None, help="length of a batch [default: 300]"

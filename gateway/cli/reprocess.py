@@ -15,8 +15,8 @@ from gateway.archive.inventory import forecast, look
 from gateway.archive.manifest import load_manifest
 from gateway.archive.places import place_of
 from gateway.archive.processes import Processes
+from gateway.archive.reprocess import Progress
 from gateway.archive.reprocess import reprocess as reprocess_archive
-from gateway.archive.turns import Progress
 from gateway.cli.options import as_json, trusted_keys
 from gateway.cli.text.progress import StatusLine
 from gateway.cli.text.reprocess import forecast_in_words, how_far, summary_in_words

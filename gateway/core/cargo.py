@@ -13,7 +13,6 @@ distance, f being its part of the load.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import product
 from math import log
 from types import MappingProxyType
@@ -21,18 +20,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import Carries, Vehicle
 from gateway.records import F64
-
-
-class Carries(StrEnum):
-    """What a fitter says that the vehicle usually carries."""
-
-    PALLETS = "pallets"
-    PARCELS = "parcels"
-    LONG_GOODS = "long_goods"
-    TOOLS = "tools"
-    MIXED = "mixed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +84,11 @@ class ShapePrior:
     def mean(self) -> float:
         """Of log s."""
         return float(self.probability @ self.log_s)
+
+    @property
+    def median(self) -> float:
+        """Of log s."""
+        return float(np.interp(0.5, np.cumsum(self.probability), self.log_s))
 
     @property
     def variance(self) -> float:

@@ -3,6 +3,10 @@
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
 
 from gateway.budget import budget_of
 from gateway.core.batch import Traits
@@ -11,11 +15,26 @@ from gateway.core.cargo import is_said
 from gateway.core.change import Rules
 from gateway.core.estimator import estimate
 from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, WeighedLoad, epoch_of, fused_epoch, remembered
+from gateway.core.journey import way_of
 from gateway.core.known_weights import Knowledge
+from gateway.core.pool import (
+    LEAST_LOAD_S,
+    MOST_DRIVEN_S,
+    Part,
+    Parts,
+    can_be_pooled,
+    changes_of,
+    continued,
+    has_stretch,
+    is_batch,
+    missing_s,
+    spanned,
+    usable_s,
+)
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.core.weights import weighed
-from gateway.estimate import Estimate
+from gateway.estimate import UNWATCHED, Estimate, Way
 from gateway.posterior import Posterior
 from gateway.records import Batch, Motion, Why
 
@@ -29,14 +48,19 @@ class Identity:
 
 
 OnBatch = Callable[[Batch, Estimate, Motion], None]
+_TOO_LITTLE: Final = frozenset({Why.TOO_SHORT, Why.SPEED_SPREAD, Why.TOO_UNCERTAIN, Why.AMBIGUOUS})
+"""More driving mends these."""
 
 
 class Flow:
-    """Scheduler and estimator in a row. Feed it decoded rows in order of arrival.
+    """Scheduler, pool and estimator in a row. Feed it decoded rows in order of arrival.
+
+    What comes out are estimates and refusals, one after the other in time, and between them remainders: windows with
+    too little driving in them, which wait in the pool (core.pool) for what follows.
 
     ``knowledge``, what known weights taught, may be set from any thread and counts from the next batch on; ``weighed``
     is the last load epoch with a counted batch, as measured: what a known weight is of. ``on_batch`` hears of every
-    batch before its estimate leaves: with it, and with the rows it was made of.
+    window before its estimate leaves: with the last one that it gave, and with the rows it was made of.
     """
 
     def __init__(
@@ -50,12 +74,15 @@ class Flow:
     ) -> None:
         self.settings = settings
         self.scheduler = Scheduler(settings, traits)
+        self._traits = traits
         self._calibrated = calibrated
         self._estimator = estimator
         self._identity = identity
         self._epoch: LoadEpoch | None = None
         self._drive_start_ns: int | None = None
         self._is_epoch_over = False
+        self._pool: Parts = ()
+        self._open_s = 0.0  # usable, of the window that is open, as the last look at it has told
         self.knowledge = knowledge
         self.weighed: WeighedLoad | None = None
         self._rules = Rules.of(calibrated.vehicle) if calibrated else Rules()
@@ -69,6 +96,11 @@ class Flow:
             return False
         return self._is_epoch_over or drive_start_ns != weighed.drive_start_ns
 
+    @property
+    def missing_s(self) -> float:
+        """How much usable driving the next batch still lacks, as far as the window that is open was looked at."""
+        return max(0.0, missing_s(self._pool, self.settings) - self._open_s)
+
     def branch(self) -> "Flow":
         """Another that goes on from here: what either is fed leaves no trace in the other."""
         other = copy(self)
@@ -76,31 +108,112 @@ class Flow:
         return other
 
     def feed(self, motion: Motion) -> Iterator[Estimate]:
-        """Estimates and rejections of the batches that end with these rows, provisional ones among them."""
-        return map(self.weigh, self.scheduler.feed(motion))
+        """What the windows that end with these rows gave, provisional looks among it."""
+        for window in self.scheduler.feed(motion):
+            yield from self.weigh(window)
 
     def flush(self, ended_by: Why | None = None) -> Iterator[Estimate]:
         """The stream has ended, or something has broken it: what the open window still tells."""
-        return map(self.weigh, self.scheduler.flush(ended_by))
+        for window in self.scheduler.flush(ended_by):
+            yield from self.weigh(window)
 
-    def weigh(self, batch: Batch) -> Estimate:
-        """What a batch of ``scheduler`` taught; they come in order, each once. :meth:`feed` and :meth:`flush` do it."""
+    def weigh(self, window: Batch) -> list[Estimate]:
+        """What a window of ``scheduler`` taught, one estimate at least; they come in order, each once. :meth:`feed` and
+        :meth:`flush` do it.
+        """
         rows = self.scheduler.take_rows()
-        shown = self._answer(batch)
-        self.on_batch(batch, shown, rows)
-        return shown
+        found = [self._early(window)] if window.is_provisional else self._of_window(window, rows)
+        if len(found) > 1:
+            window = replace(window, rejected=(Why.LOAD_CHANGED,))
+        self.on_batch(window, found[-1], rows)
+        return found
 
-    def _answer(self, batch: Batch) -> Estimate:
-        found = estimate(batch, self._calibrated, self._estimator)
-        found = replace(found, vehicle_id=self._identity.vehicle_id, vin=self._identity.vin)
-        if batch.is_provisional:
-            self._is_epoch_over |= batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
-            return self._shown(found)
-        found = replace(found, way=self.scheduler.way_of_last)
-        shown = self._shown(found, self._fused(batch, found))
+    def _early(self, window: Batch) -> Estimate:
+        self._is_epoch_over |= window.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
+        self._open_s = float(np.count_nonzero(window.usable)) / window.rate_hz
+        parts = continued(self._pool, window)
+        if parts and can_be_pooled(window, self.settings):
+            window = spanned((*parts, Part(window, Way())), parts[0].batch.t_start_ns, window.t_end_ns)
+        return self._shown(self._named(estimate(window, self._calibrated, self._estimator)))
+
+    def _of_window(self, window: Batch, rows: Motion) -> list[Estimate]:
+        way, self._open_s = self.scheduler.way_of_last, 0.0
+        parts = continued(self._pool, window)
+        self._pool = ()
+        is_short = Why.TOO_SHORT in window.rejected and Why.TIME_STAMPS not in window.rejected
+        can_wait = self._calibrated is not None and can_be_pooled(window, self.settings)
+        if not (is_short or (can_wait and (parts or has_stretch(window)))):
+            return [self._counted(window, way, window.t_start_ns)]
+        if not can_wait:
+            return [self._remainder(window, way)]
+        parts = (*parts, Part(window, way))
+        if is_batch(parts, self.settings):
+            return self._of_parts(parts, rows)
+        if sum(part.driven_s for part in parts) >= MOST_DRIVEN_S:
+            whole = spanned(parts, parts[0].batch.t_start_ns, window.t_end_ns)
+            return [self._counted(replace(whole, rejected=(Why.TOO_SLOW,)), way, window.t_start_ns)]
+        self._pool = parts
+        return [self._remainder(window, way)]
+
+    def _of_parts(self, parts: Parts, rows: Motion) -> list[Estimate]:
+        """As much as a batch must have: one estimate, or one for each load where the load changed at a stop.
+
+        Loads that were gone before this window had too little for a batch, and are told no more.
+        """
+        window, way = parts[-1].batch, parts[-1].way
+        begin_ns, end_ns = parts[0].batch.t_start_ns, window.t_end_ns
+        changes_ns = changes_of(parts, self._posterior, self._rules)
+        if not changes_ns:
+            found = self._counted(spanned(parts, begin_ns, end_ns), way, window.t_start_ns)
+            may_wait = window.rejected and sum(part.driven_s for part in parts) < MOST_DRIVEN_S
+            if not (may_wait and found.rejected and _TOO_LITTLE.issuperset(found.rejected)):
+                return [found]
+            self._pool = parts
+            return [self._remainder(window, way)]
+        loads = pairwise([begin_ns, *changes_ns, end_ns])
+        return [self._of_load(parts, rows, *load) for load in loads if load[1] > window.t_start_ns]
+
+    def _of_load(self, parts: Parts, rows: Motion, begin_ns: int, end_ns: int) -> Estimate:
+        """One of several loads, from begin to end. The last one, where it is too short to be told, waits."""
+        window = parts[-1].batch
+        batch, piece = (spanned(which, begin_ns, end_ns) for which in (parts, parts[-1:]))
+        before = parts[-1].way.before if piece.t_start_ns == window.t_start_ns else UNWATCHED
+        way = way_of(rows, piece, self.settings, self._traits, before)
+        if usable_s(parts, begin_ns, end_ns) >= LEAST_LOAD_S:
+            return self._counted(batch, way, piece.t_start_ns, is_new_load=begin_ns > parts[0].batch.t_start_ns)
+        if end_ns < window.t_end_ns:
+            return self._counted(replace(batch, rejected=(Why.LOAD_CHANGED,)), way, piece.t_start_ns)
+        self._pool = tuple(
+            Part(spanned((part,), begin_ns, end_ns), part.way) for part in parts if part.batch.t_end_ns > begin_ns
+        )
+        return self._remainder(piece, way)
+
+    def _posterior(self, stretch: Batch) -> Posterior | None:
+        """As measured; None where it cannot be weighed."""
+        found = estimate(stretch, self._calibrated, self._estimator)
+        return found.posterior if found.counted else None
+
+    def _remainder(self, window: Batch, way: Way) -> Estimate:
+        """Of a window that is no batch, or a piece of one."""
+        blank = estimate(replace(window, rejected=window.rejected or (Why.TOO_SHORT,)), None, self._estimator)
+        calibration_id = self._calibrated.id if self._calibrated else None
+        found = replace(blank, rejected=window.rejected or (Why.TOO_SHORT,), calibration_id=calibration_id)
+        return self._finished(window, replace(self._named(found), is_remainder=True, way=way, spectra=None))
+
+    def _counted(self, batch: Batch, way: Way, way_start_ns: int, *, is_new_load: bool = False) -> Estimate:
+        """An estimate or a refusal; its way may begin later than the batch."""
+        since_ns = None if way_start_ns == batch.t_start_ns else way_start_ns
+        found = self._named(estimate(batch, self._calibrated, self._estimator))
+        return self._finished(batch, replace(found, way=replace(way, since_ns=since_ns)), is_new_load=is_new_load)
+
+    def _finished(self, batch: Batch, found: Estimate, *, is_new_load: bool = False) -> Estimate:
+        shown = self._shown(found, self._fused(batch, found, is_new_load))
         self.weighed = remembered(self.weighed, self._epoch, shown, batch.drive_start_ns)
         self._is_epoch_over = self._epoch is None
         return shown
+
+    def _named(self, found: Estimate) -> Estimate:
+        return replace(found, vehicle_id=self._identity.vehicle_id, vin=self._identity.vin)
 
     def _shown(self, found: Estimate, epoch: LoadEpoch | None = None) -> Estimate:
         """As it leaves: with what known weights taught, the weights that follow and the budget of the error."""
@@ -127,10 +240,10 @@ class Flow:
         )
         return replace(answer, epoch=None if epoch is None else epoch_of(known(epoch.posterior), epoch.n_batches))
 
-    def _fused(self, batch: Batch, found: Estimate) -> LoadEpoch | None:
-        """The load epoch that this batch belongs to; a new drive or a long stop opens a new one."""
+    def _fused(self, batch: Batch, found: Estimate, is_new_load: bool) -> LoadEpoch | None:
+        """The load epoch that this batch belongs to; a new drive, a long stop or a load changed at a stop opens one."""
         is_new_drive = batch.drive_start_ns != self._drive_start_ns
         self._drive_start_ns = batch.drive_start_ns
-        could_have_changed = is_new_drive or batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
+        could_have_changed = is_new_load or is_new_drive or batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
         self._epoch = fused_epoch(self._epoch, found, self._rules, could_have_changed)
         return self._epoch if found.counted else None

@@ -1,7 +1,12 @@
 """The vehicle as calibration knows it, and the statics that follow from it."""
 
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Annotated, Final, NamedTuple
+
+from annotated_types import Interval
+
+from gateway.schema import STRICT, described
 
 MEASURED_OFFSET_STD_M: Final = 0.02
 """Of a sensor's place measured with a tape, from a wall or sill to its case and half the vehicle's width."""
@@ -19,8 +24,7 @@ PAYLOAD_LEFT_NOTED_STD_M: Final = 0.02
 """Of a place that was noted, measured with a tape."""
 
 
-@dataclass(frozen=True, slots=True)
-class Load:
+class Load(NamedTuple):
     """A payload and the front share that it gives the sprung mass.
 
     The share is in percent, as people state it and files hold it; the half-car's formulas take ``front_share``,
@@ -36,59 +40,168 @@ class Load:
         return self.front_share_pct / 100.0
 
 
-@dataclass(frozen=True, slots=True)
-class Vehicle:
-    """What a fitter states of a vehicle. Masses and shares are of the sprung mass.
+class Carries(StrEnum):
+    """What a fitter says that the vehicle usually carries."""
 
-    sensor_position_m is behind the front axle (negative: ahead of it), empty_cg_left_m the empty vehicle's centre of
-    gravity left of the centre line, payload_length_m how far along the floor what it carries usually
-    reaches; the ``_std`` fields say how sure these figures are. The two ranges only normalise
-    errors, equation (12); they never gate.
+    PALLETS = "pallets"
+    PARCELS = "parcels"
+    LONG_GOODS = "long_goods"
+    TOOLS = "tools"
+    MIXED = "mixed"
+
+
+Kilograms = Annotated[float, Interval(ge=0.0, le=100_000.0)]
+Percent = Annotated[float, Interval(ge=1.0, le=99.0)]
+Metres = Annotated[float, Interval(ge=-10.0, le=30.0)]
+MetresLeft = Annotated[float, Interval(ge=-2.0, le=2.0)]
+WeightKg = Annotated[float, Interval(gt=0.0, le=100_000.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleFields:
+    """What a vehicle and the answers of who commissions it have in common; each field has its words and bounds once.
+
+    Campaign file, calibration file, web and pages are derived from the metadata, which names pydantic's constraints.
+    The bounds are beyond any road vehicle, so that a fraction for percent, millimetres or tonnes are named at once.
     """
 
-    name: str
-    empty_mass_kg: float
-    wheelbase_m: float
-    empty_front_share_pct: float = 50.0
-    sensor_position_m: float = 0.0
-    payload_range_kg: tuple[float, float] = (0.0, 450.0)
-    front_share_range_pct: tuple[float, float] = (40.0, 60.0)
-    sensor_position_std_m: float = 0.1
-    empty_front_share_std_pct: float = 0.5
-    sensor_offset_left_m: float = 0.0
-    sensor_offset_left_std_m: float = UNKNOWN_OFFSET_STD_M
-    track_width_m: float | None = None
-    empty_cg_left_m: float = 0.0
-    unsprung_front_kg: float | None = None
-    unsprung_rear_kg: float | None = None
-    kerb_front_axle_kg: float | None = None
-    kerb_rear_axle_kg: float | None = None
-    wheel_radius_m: float | None = None
-    payload_length_m: float | None = None
-    payload_height_m: float | None = None
-    carries: str | None = None
-    roof_rack: bool = False
-    tow_bar: bool = False
-    front_axle_limit_kg: float | None = None
-    rear_axle_limit_kg: float | None = None
-    gross_limit_kg: float | None = None
-    front_wheel_limit_kg: float | None = None
-    rear_wheel_limit_kg: float | None = None
+    __pydantic_config__ = STRICT
+
+    name: str = field(metadata=described("what you call it; the calibration file and its report show it", min_length=1))
+    wheelbase_m: float = field(metadata=described("from axle to axle: l", ge=0.8, le=20.0, examples=[2.75]))
+    sensor_position_m: Metres = field(
+        metadata=described("the sensor's, behind the front axle; negative: ahead of it", examples=[1.2])
+    )
+    sensor_position_std_m: float = field(
+        default=0.1, metadata=described("how sure the sensor's position is; the fit moves it that far", gt=0.0, le=10.0)
+    )
+    sensor_offset_left_m: MetresLeft | None = field(
+        default=None,
+        metadata=described("of the sensor, left of the centre line, negative: right of it; absent: not known"),
+    )
+    sensor_offset_left_std_m: float | None = field(
+        default=None,
+        metadata=described(
+            f"how sure that is; absent: {MEASURED_OFFSET_STD_M:g} with an offset, by tape, "
+            f"{UNKNOWN_OFFSET_STD_M:g} without one",
+            gt=0.0,
+            le=2.0,
+        ),
+    )
+    track_width_m: float | None = field(
+        default=None,
+        metadata=described(
+            "between the middles of left and right tyres; weights of single wheels and a roll rate need it",
+            ge=0.5,
+            le=4.0,
+        ),
+    )
+    empty_cg_left_m: MetresLeft = field(
+        default=0.0,
+        metadata=described("centre of gravity of the empty vehicle, driver aboard, left of the centre line"),
+    )
+    unsprung_front_kg: WeightKg | None = field(
+        default=None,
+        metadata=described("front axle, wheels and brakes; taken as known to 10 %; absent: found by calibration"),
+    )
+    unsprung_rear_kg: WeightKg | None = field(default=None, metadata=described("the same at the rear"))
+    carries: Carries | None = field(
+        default=None,
+        metadata=described(
+            "what it usually carries: `pallets`, `parcels` (all over the floor), `long_goods`, `tools` (in racks) or "
+            "`mixed`; absent: anything, often as compact as the known loads, with intervals that allow for it",
+            examples=["parcels"],
+        ),
+    )
+    payload_length_m: float | None = field(
+        default=None,
+        metadata=described(
+            "how far along the floor it usually reaches, where you know that better than `carries` says: 1.2 for a "
+            "pallet, the floor's length for parcels",
+            ge=0.1,
+            le=20.0,
+            examples=[2.4],
+        ),
+    )
+    payload_height_m: float | None = field(
+        default=None,
+        metadata=described("how high above the floor it usually reaches", ge=0.05, le=5.0, examples=[1.2]),
+    )
+    roof_rack: bool = field(default=False, metadata=described("part of the load may lie on the roof"))
+    tow_bar: bool = field(
+        default=False, metadata=described("part of the load may hang on a tow bar: a carrier, a trailer's tongue")
+    )
+    front_axle_limit_kg: WeightKg | None = field(default=None, metadata=described("permitted load of the front axle"))
+    rear_axle_limit_kg: WeightKg | None = field(default=None, metadata=described("permitted load of the rear axle"))
+    gross_limit_kg: WeightKg | None = field(default=None, metadata=described("permitted gross weight"))
+    front_wheel_limit_kg: WeightKg | None = field(
+        default=None, metadata=described("permitted load of each front wheel or its tyre, both of twin tyres")
+    )
+    rear_wheel_limit_kg: WeightKg | None = field(default=None, metadata=described("the same at the rear"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vehicle(VehicleFields):
+    """A vehicle as its campaign file states it. Masses and shares are of the sprung mass.
+
+    The two ranges only normalise errors, equation (12); they never gate.
+    """
+
+    empty_mass_kg: float = field(
+        metadata=described("sprung mass of the empty vehicle, driver and tank as in service: M", ge=100.0, le=100_000.0)
+    )
+    empty_front_share_pct: Percent = field(
+        default=50.0, metadata=described("share of `empty_mass_kg` that rests on the front axle")
+    )
+    empty_front_share_std_pct: float = field(
+        default=0.5,
+        metadata=described(
+            "how sure the front share is, in percentage points; front shares and axle loads are no surer",
+            gt=0.0,
+            le=50.0,
+        ),
+    )
+    payload_range_kg: tuple[Kilograms, Kilograms] = field(
+        default=(0.0, 450.0),
+        metadata=described(
+            "payloads the vehicle may carry, rising; scales percentages, never clips; a plan asks for it"
+        ),
+    )
+    front_share_range_pct: tuple[Percent, Percent] = field(
+        default=(40.0, 60.0),
+        metadata=described("front shares it may have, rising; scales percentages and plans, never clips"),
+    )
+    kerb_front_axle_kg: WeightKg | None = field(
+        default=None,
+        metadata=described("what scales show under the empty vehicle's front axle, for weights on the road"),
+    )
+    kerb_rear_axle_kg: WeightKg | None = field(default=None, metadata=described("the same at the rear"))
+    wheel_radius_m: float | None = field(
+        default=None, metadata=described("kept in the calibration file, not used", gt=0.0)
+    )
+
+    def __post_init__(self) -> None:
+        for name in ("payload_range_kg", "front_share_range_pct"):
+            low, high = getattr(self, name)
+            if low >= high:
+                raise ValueError(f"{name} must rise: [low, high]")
 
     @property
     def empty_front_share(self) -> float:
         """0..1."""
         return self.empty_front_share_pct / 100.0
 
+    @property
+    def sensor_left_m(self) -> float:
+        """The sensor's place left of the centre line; amidships where nobody stated it."""
+        return self.sensor_offset_left_m or 0.0
 
-def sensor_offset_left(offset_m: float | None, std_m: float | None = None) -> tuple[float, float]:
-    """The sensor's place left of the centre line and its standard deviation, from what was stated of it.
-
-    A place with no word of how sure it is was measured with a tape; without a place it is taken amidships, unsure.
-    """
-    if std_m is None:
-        std_m = UNKNOWN_OFFSET_STD_M if offset_m is None else MEASURED_OFFSET_STD_M
-    return offset_m or 0.0, std_m
+    @property
+    def sensor_left_std_m(self) -> float:
+        """How sure that place is: as stated, else measured with a tape, else unknown."""
+        if self.sensor_offset_left_std_m is not None:
+            return self.sensor_offset_left_std_m
+        return UNKNOWN_OFFSET_STD_M if self.sensor_offset_left_m is None else MEASURED_OFFSET_STD_M
 
 
 def front_share_pct(vehicle: Vehicle, payload_kg: float, position_m: float | None) -> float:

@@ -6,8 +6,8 @@
 from gateway.estimate_json.errors import posterior_from_json, posterior_to_json
 from gateway.estimate_json.fields import COLUMNS, FIELDS, EstimateField, Presence
 from gateway.estimate_json.kinds import (
-    BY_NAME,
     INSTANT,
+    NUMBERS_BY_NAME,
     REASONS,
     SPECTRA,
     WEIGHTS,
@@ -18,10 +18,10 @@ from gateway.estimate_json.kinds import (
 from gateway.estimate_json.objects import csv_cells, estimate_from_json, estimate_to_json, table_row
 
 __all__ = [
-    "BY_NAME",
     "COLUMNS",
     "FIELDS",
     "INSTANT",
+    "NUMBERS_BY_NAME",
     "REASONS",
     "SPECTRA",
     "WEIGHTS",

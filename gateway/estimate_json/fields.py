@@ -1,5 +1,6 @@
 """The names of an estimate's fields in JSON, their order, kinds, words and columns in a CSV file: one table."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
@@ -7,12 +8,12 @@ from typing import Any, Final
 from gateway.estimate import Weight, Weights
 from gateway.estimate_json.errors import BUDGET, POSTERIOR
 from gateway.estimate_json.kinds import (
-    BY_NAME,
     COUNT,
     FLAG,
     INSTANT,
     INTERVAL,
     NUMBER,
+    NUMBERS_BY_NAME,
     REASONS,
     ROUGH_NUMBER,
     SPECTRA,
@@ -24,6 +25,7 @@ from gateway.estimate_json.kinds import (
     weights_to_json,
 )
 from gateway.estimate_json.way import EXAMPLE, WAY
+from gateway.quantities import BY_NAME
 
 _INTERVAL95: Final = "95 % interval [low, high]"
 
@@ -32,7 +34,6 @@ class Presence(Enum):
     """Whether a field stands in every object."""
 
     ALWAYS = "always"
-    SINCE_LATER = "since_later"  # always now; not in what early versions stored
     WHERE_KNOWN = "where_known"
 
 
@@ -59,12 +60,26 @@ def _field(
     return EstimateField(name, path, kind, description, example, **{"columns": (name,), **more})
 
 
-_LATER: Final = Presence.SINCE_LATER
+def _found(name: str, number: float, std: float, interval95: list[float]) -> Iterator[EstimateField]:
+    """A quantity's number, standard deviation and interval, with examples of them."""
+    one = BY_NAME[name]
+    unit = one.suffix
+    yield _field(one.json_name, f"{name}.number", NUMBER, one.words, number)
+    yield _field(f"{name}_std_{unit}", f"{name}.std", NUMBER, _POINTS if unit == "pct" else _STD, std)
+    yield _field(
+        f"{name}_interval95_{unit}",
+        f"{name}.interval95",
+        INTERVAL,
+        _INTERVAL95,
+        interval95,
+        columns=(f"{name}_low95_{unit}", f"{name}_high95_{unit}"),
+    )
+
+
 _KNOWN: Final = Presence.WHERE_KNOWN
 _ID: Final = "1795233300000000000-0f3a9c2b11de"
-_SHARE: Final = "share of the sprung mass on the front axle"
-_CG_LEFT: Final = "the sprung mass's centre of gravity, left of the centre line"
-_LEFT_SHARE: Final = "share of the sprung mass on the left wheels"
+_SHARE: Final = BY_NAME["front_share"].words
+_CG_LEFT: Final = BY_NAME["cg_left"].words
 _ROLL_SHARE: Final = "part of a sideways load's moment that the front axle takes, 0 to 1"
 _POINTS: Final = "its standard deviation, in percentage points"
 _STD: Final = "its standard deviation"
@@ -109,38 +124,18 @@ FIELDS: Final = (
         WHOLE,
         "its beginning, likewise",
         1795233000000000000,
-        presence=_LATER,
         columns=(),
     ),
     _field("estimator", "estimator", TEXT, "who weighed: cross_spectrum or ratio_index", "ratio_index"),
     _field("calibration_id", "calibration_id", TEXT, "hash of the calibration used", "sha256:9f86d081"),
-    _field("payload_kg", "payload.number", NUMBER, "what is aboard besides the empty vehicle", 271.3),
-    _field("payload_std_kg", "payload.std", NUMBER, _STD, 6.1),
-    _field(
-        "payload_interval95_kg",
-        "payload.interval95",
-        INTERVAL,
-        _INTERVAL95,
-        [259.3, 283.3],
-        columns=("payload_low95_kg", "payload_high95_kg"),
-    ),
-    _field("front_share_pct", "front_share.number", NUMBER, _SHARE, 50.4),
-    _field("front_share_std_pct", "front_share.std", NUMBER, _POINTS, 0.1),
-    _field(
-        "front_share_interval95_pct",
-        "front_share.interval95",
-        INTERVAL,
-        _INTERVAL95,
-        [50.2, 50.6],
-        columns=("front_share_low95_pct", "front_share_high95_pct"),
-    ),
+    *_found("payload", 271.3, 6.1, [259.3, 283.3]),
+    *_found("front_share", 50.4, 0.1, [50.2, 50.6]),
     EstimateField(
         "payload_front_share_correlation",
         "payload_front_share_correlation",
         NUMBER,
         "of both errors, -1 to 1",
         0.62,
-        _LATER,
     ),
     _field("ratio_index_acceleration", "ratio_index_acceleration", NUMBER, "R_a of the paper", 0.97),
     _field("ratio_index_pitch_rate", "ratio_index_pitch_rate", NUMBER, "R_g of the paper", 1.21),
@@ -153,11 +148,10 @@ FIELDS: Final = (
         ROUGH_NUMBER,
         "of the road: rms vertical acceleration, 1 to 15 Hz, brought to 80 km/h",
         1.1,
-        _LATER,
     ),
-    EstimateField("shares", "shares", BY_NAME, "part of the batch that each cause masked", {}),
+    EstimateField("shares", "shares", NUMBERS_BY_NAME, "part of the batch that each cause masked", {}),
     _field("rejected", "rejected", REASONS, "why there is no answer; empty: this batch counted", []),
-    EstimateField("diagnostics", "diagnostics", BY_NAME, "the estimator's own figures", {}, _LATER),
+    EstimateField("diagnostics", "diagnostics", NUMBERS_BY_NAME, "the estimator's own figures", {}),
     EstimateField(
         "epoch_payload_kg", "epoch.payload.number", NUMBER, "all batches of this load together", 270.4, _KNOWN
     ),
@@ -178,36 +172,14 @@ FIELDS: Final = (
     EstimateField("raw_payload_std_kg", "raw_payload.std", NUMBER, _STD, presence=_KNOWN),
     EstimateField("raw_front_share_pct", "raw_front_share.number", NUMBER, _RAW, presence=_KNOWN),
     EstimateField("raw_front_share_std_pct", "raw_front_share.std", NUMBER, _POINTS, presence=_KNOWN),
-    # later ones stand last: whoever reads the CSV file by position finds the same
-    _field("cg_left_m", "cg_left.number", NUMBER, _CG_LEFT, 0.021, presence=_LATER),
-    _field("cg_left_std_m", "cg_left.std", NUMBER, _STD, 0.004, presence=_LATER),
-    _field(
-        "cg_left_interval95_m",
-        "cg_left.interval95",
-        INTERVAL,
-        _INTERVAL95,
-        [0.013, 0.029],
-        presence=_LATER,
-        columns=("cg_left_low95_m", "cg_left_high95_m"),
-    ),
-    _field("left_share_pct", "left_share.number", NUMBER, _LEFT_SHARE, 51.2, presence=_LATER),
-    _field("left_share_std_pct", "left_share.std", NUMBER, _POINTS, 0.2, presence=_LATER),
-    _field(
-        "left_share_interval95_pct",
-        "left_share.interval95",
-        INTERVAL,
-        _INTERVAL95,
-        [50.8, 51.7],
-        presence=_LATER,
-        columns=("left_share_low95_pct", "left_share_high95_pct"),
-    ),
+    *_found("cg_left", 0.021, 0.004, [0.013, 0.029]),
+    *_found("left_share", 51.2, 0.2, [50.8, 51.7]),
     EstimateField(
         "payload_cg_left_correlation",
         "payload_cg_left_correlation",
         NUMBER,
         "of the errors of payload and `cg_left_m`, -1 to 1",
         0.11,
-        _LATER,
     ),
     EstimateField(
         "front_share_cg_left_correlation",
@@ -215,17 +187,15 @@ FIELDS: Final = (
         NUMBER,
         "of the errors of front share and `cg_left_m`, -1 to 1",
         -0.06,
-        _LATER,
     ),
-    EstimateField("roll_share_front", "roll_share_front", NUMBER, _ROLL_SHARE, 0.58, _LATER),
-    EstimateField("roll_share_front_std", "roll_share_front_std", NUMBER, _STD, 0.07, _LATER),
+    EstimateField("roll_share_front", "roll_share_front", NUMBER, _ROLL_SHARE, 0.58),
+    EstimateField("roll_share_front_std", "roll_share_front_std", NUMBER, _STD, 0.07),
     _field(
         "weights",
         "weights",
         WEIGHTS,
         "on the road, standing on level ground, unsprung masses included",
         weights_to_json(_WEIGHTS),
-        presence=_LATER,
         columns=WEIGHT_COLUMNS,
     ),
     _field(
@@ -234,9 +204,8 @@ FIELDS: Final = (
         NUMBER,
         "share of `usable_share` with a known roll rate",
         0.99,
-        presence=_LATER,
     ),
-    EstimateField("way", "way", WAY, "how far it went, where it stood, what door and ignition did", EXAMPLE, _LATER),
+    EstimateField("way", "way", WAY, "how far it went, where it stood, what door and ignition did", EXAMPLE),
     _field(
         "epoch_payload_interval95_kg",
         "epoch.payload.interval95",
@@ -251,7 +220,6 @@ FIELDS: Final = (
         BUDGET,
         "what each source adds to the error, largest payload first: one standard deviation each",
         _BUDGET,
-        _LATER,
     ),
     EstimateField(
         "posterior",

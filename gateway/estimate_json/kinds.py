@@ -107,7 +107,7 @@ INSTANT: Final = Kind(str | None, iso_utc, ns_of)
 NUMBER: Final = Kind(float | None, lambda x: rounded(x, 9), float)
 ROUGH_NUMBER: Final = Kind(float | None, lambda x: rounded(x, 6), float)
 INTERVAL: Final = Kind(list[float] | None, _interval, tuple, cells=list)
-BY_NAME: Final = Kind(
+NUMBERS_BY_NAME: Final = Kind(
     dict[str, float | None],
     lambda numbers: {name: rounded(x, 6) for name, x in numbers.items()},
     lambda told: {name: math.nan if x is None else x for name, x in told.items()},

@@ -22,6 +22,7 @@ def way_to_json(way: Way) -> dict[str, Any]:
         "end": place_to_json(way.end),
         "stops": [_stop(stop) for stop in way.stops],
         "before": _watched(way.before),
+        "since": None if way.since_ns is None else INSTANT.write(way.since_ns),
     }
 
 
@@ -37,6 +38,7 @@ def way_from_json(told: Mapping[str, Any]) -> Way:
         end=_place_of(told["end"]),
         stops=tuple(map(_stop_of, told["stops"])),
         before=_watched_of(told["before"]),
+        since_ns=None if told["since"] is None else INSTANT.read(told["since"]),
     )
 
 

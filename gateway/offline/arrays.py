@@ -48,7 +48,7 @@ def estimate_arrays(
         columns[Signal.ROLL_RATE] = roll_rate_radps
     motion = _motion(t_s, columns)
     flow = Flow(settings, {}, calibration.for_core(), chosen, _NOBODY)
-    return [*flow.feed(motion), *flow.flush()]
+    return [one for one in (*flow.feed(motion), *flow.flush()) if not one.is_remainder]
 
 
 def _motion(t_s: F64, columns: Mapping[Signal, F64]) -> Motion:

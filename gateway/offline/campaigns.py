@@ -1,12 +1,13 @@
 """A campaign's drives: read, cut into identification and validation, inspected, calibrated from and judged by."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
 
-from gateway.bus.logs import LogReport
+from gateway.bus.logs import LogReport, motion_of_log
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
@@ -24,12 +25,47 @@ from gateway.calibration.judgement import Judged, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
-from gateway.offline.batches import Stretch, batches_of_motion, read_whole_log, rows_within
 from gateway.offline.look import unmapped_roll_rate, why_silent
-from gateway.records import Batch, Motion, Signal
+from gateway.records import Batch, Motion, Signal, joined
 from gateway.units import NS_PER_S
+
+
+def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]:
+    """All rows of one log that weigh, at once, and what the reader met.
+
+    Raises LogUnreadableError where nothing can be read.
+    """
+    motions, report, _ = motion_of_log(log, signal_map)
+    parts = list(motions)
+    report.require_frames()
+    return joined(parts).weighing, report
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Part of a log, in seconds from the first frame that tells motion; an open end is None."""
+
+    start_s: float = 0.0
+    end_s: float | None = None
+
+
+def rows_within(motion: Motion, stretch: Stretch) -> Motion:
+    """Rows whose stamps lie in [start, end) of the stretch."""
+    since_ns = motion.t_ns - motion.t_ns[0]
+    inside = since_ns >= round(stretch.start_s * NS_PER_S)
+    if stretch.end_s is not None:
+        inside &= since_ns < round(stretch.end_s * NS_PER_S)
+    return motion.rows(inside)
+
+
+def batches_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSettings) -> tuple[Batch, ...]:
+    """Every batch of rows that are already there."""
+    scheduler = Scheduler(settings, signal_map.traits)
+    return (*scheduler.feed(motion), *scheduler.flush())
+
 
 Split = Literal["identification", "validation", "all"]
 

@@ -1,11 +1,16 @@
 """Logs in, estimates out: what `springscale estimate` prints."""
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
 from gateway.bus.logs import LogReport, motion_of_log
+from gateway.bus.logs.open import open_log
+from gateway.bus.signals import SignalMap
+from gateway.core.events import Entry, Ledger, Rules
 from gateway.core.settings import BatchSettings
+from gateway.errors import LogUnreadableError
 from gateway.estimate import Estimate
 from gateway.setup import Setup
 
@@ -21,8 +26,19 @@ def estimates_of_logs(
 ) -> Iterator[Estimate]:
     """Every batch of every log in turn; each log is a drive of its own. Raises LogUnreadableError.
 
-    ``on_read`` hears of each log, once it is read, what its reader met.
+    ``on_read`` hears of each log, once it is read, what its reader met. What is too short to be a batch is left out.
     """
+    return (one for one in with_remainders(logs, setup, settings, on_read=on_read) if not one.is_remainder)
+
+
+def with_remainders(
+    logs: Sequence[Path | str],
+    setup: Setup,
+    settings: BatchSettings = AS_THE_SERVICE,
+    *,
+    on_read: Callable[[LogReport], None] = lambda report: None,
+) -> Iterator[Estimate]:
+    """Likewise, and between the batches what is too short to be one (``is_remainder``): it has a way."""
     for log in logs:
         flow = setup.flow(settings)
         motions, report, _ = motion_of_log(log, setup.signal_map)
@@ -31,3 +47,43 @@ def estimates_of_logs(
         report.require_frames()
         on_read(report)
         yield from flow.flush()
+
+
+def require_order(logs: Sequence[Path], signal_map: SignalMap) -> None:
+    """Raises LogUnreadableError where a log begins before the one that is named before it.
+
+    Loads and trips are told between drives, so that logs out of order would tell of loads that nobody moved.
+    """
+    begun = [(log, start_ns) for log in logs if (start_ns := _start_ns(log, signal_map)) is not None]
+    for (before, before_ns), (log, start_ns) in pairwise(begun):
+        if start_ns < before_ns:
+            raise LogUnreadableError(f"{log}: begins before {before}: name the logs in order of time")
+
+
+def _start_ns(log: Path, signal_map: SignalMap) -> int | None:
+    """Of the first frame that the map reads; None where there is none, of which the reader tells."""
+    try:
+        chunks, _ = open_log(log, signal_map)
+        return next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), None)
+    except LogUnreadableError:
+        return None
+
+
+def entries_of_logs(
+    logs: Sequence[Path | str], setup: Setup, settings: BatchSettings = AS_THE_SERVICE
+) -> Iterator[Entry]:
+    """Every event and trip of the logs in turn, as their last batch left them.
+
+    Raises LogUnreadableError at the first log of which nothing can be read, once those of the logs before are told.
+    """
+    ledger = Ledger(Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules())
+    told: dict[str, Entry] = {}
+    unreadable: LogUnreadableError | None = None
+    try:
+        for estimate in with_remainders(logs, setup, settings):
+            told |= {entry.id: entry for entry in ledger.add(estimate)}
+    except LogUnreadableError as fault:
+        unreadable = fault
+    yield from sorted(told.values(), key=lambda entry: (entry.t_end_ns, entry.kind, entry.id))
+    if unreadable is not None:
+        raise unreadable

@@ -21,6 +21,8 @@ class BatchLog:
 
     def __call__(self, found: Estimate) -> None:
         """A new estimate is a line; rejected and provisional ones are for those who look for a fault (debug)."""
+        if found.is_remainder:
+            return
         is_answer = found.counted and not found.is_provisional
         event = Event.PROVISIONAL if found.is_provisional else Event.ESTIMATE if found.counted else Event.REJECTED
         log_event(

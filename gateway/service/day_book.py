@@ -9,6 +9,7 @@ from gateway.core.events import HORIZON, Entry, EntryKind, Ledger, Rules
 from gateway.errors import StoreError
 from gateway.estimate import Estimate
 from gateway.estimate_json import INSTANT, estimate_from_json
+from gateway.history import BATCHES, REMAINDER
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.setup import Setup
@@ -40,7 +41,7 @@ class DayBook:
 
 def ledger_of(reader: StoreReader, rules: Rules) -> Ledger:
     """The ledger as it was when the service stopped. Raises what the store's reader raises."""
-    page = reader.estimates(limit=HORIZON, newest_first=True, with_spectra=False)
+    page = reader.page((*BATCHES, REMAINDER), limit=HORIZON, newest_first=True, with_spectra=False)
     estimates = [estimate_from_json(json.loads(text)) for text in reversed(page.items)]
     known: list[Entry] = []
     first_ns = min((one.t_start_ns for one in estimates), default=0)  # not the oldest's: clocks are put back

@@ -19,7 +19,7 @@ from gateway.service.alarm_desk import AlarmDesk, rules_of
 from gateway.service.changes import BatchLog, StateLog, told_in_turn
 from gateway.service.day_book import DayBook
 from gateway.service.last_good import keep_copy
-from gateway.service.part import CLOSE_WITHIN_S, Deadline, Part, Sending, in_own_thread, stop_in_turn
+from gateway.service.part import CLOSE_WITHIN_S, Deadline, Part, Questions, Sending, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     Forwarding,
     board_of,
@@ -230,6 +230,7 @@ class Gateway:
 
     async def _serve(self) -> None:
         loop = asyncio.get_running_loop()
+        loop.set_default_executor(Questions(thread_name_prefix="question"))
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.request_stop)
         loop.add_signal_handler(signal.SIGHUP, self._reload_told)

@@ -5,6 +5,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import ClassVar, Final, Protocol
@@ -60,6 +61,14 @@ class Deadline:
     def left_s(self, most_s: float = STOP_WITHIN_S, *, keep_s: float = 0.0) -> float:
         """What one part may take of what is left, without the last ``keep_s``."""
         return max(0.0, min(most_s, self._end_s - keep_s - self._clock_s()))
+
+
+class Questions(ThreadPoolExecutor):
+    """Threads in which clients' questions wait for a lock or a disk. Its end waits for none of them."""
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Leave behind what hangs: the event loop, which ends its executor, would wait for ever."""
+        super().shutdown(wait=False, cancel_futures=True)
 
 
 async def in_own_thread(work: Callable[[], object]) -> None:

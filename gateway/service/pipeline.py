@@ -50,7 +50,7 @@ class Pipeline:
         self.flow = flow
         self.watch = SignalWatch(decoder.signals)
         self.standing = StandingWatch(flow.settings.standstill_speed_mps)
-        self.n_estimates = self.n_rejected = self.n_provisional = 0
+        self.n_estimates = self.n_rejected = self.n_provisional = self.n_remainders = 0
         self.rejected_by_reason: Counter[str] = Counter()
         self.roll_rate_fault: str | None = None  # of the last batch, as people read it
         self.failure: BaseException | None = None
@@ -134,17 +134,22 @@ class Pipeline:
             self._count(found)
             if self.flow.weighed is not self._weighed_at[0]:
                 self._weighed_at = (self.flow.weighed, boot_clock_s())
-            self._board.publish(found)  # first: whoever hears of it by the journal finds it there
-            if not found.is_provisional:
-                self._store.write_estimate(estimate_to_json(found))
+            if found.is_remainder:
+                self._store.write_remainder(estimate_to_json(found))
+            else:
+                self._board.publish(found)  # first: whoever hears of it by the journal finds it there
+                if not found.is_provisional:
+                    self._store.write_estimate(estimate_to_json(found))
             self._on_batch(found)
 
     def _count(self, found: Estimate) -> None:
-        if math.isfinite(found.roll_usable_share) and Why.TOO_SHORT not in found.rejected:
+        if math.isfinite(found.roll_usable_share) and not found.is_remainder:
             is_lost = found.roll_usable_share < ROLL_RATE_KNOWN_SHARE
             self.roll_rate_fault = ROLL_RATE_LOST.format(found.roll_usable_share) if is_lost else None
         if found.is_provisional:
             self.n_provisional += 1
+        elif found.is_remainder:
+            self.n_remainders += 1
         elif found.counted:
             self.n_estimates += 1
         else:

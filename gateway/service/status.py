@@ -97,6 +97,8 @@ class StatusReport:
                 n_estimates=self._pipeline.n_estimates,
                 n_rejected=self._pipeline.n_rejected,
                 n_provisional=self._pipeline.n_provisional,
+                n_remainders=self._pipeline.n_remainders,
+                missing_s=round(self._pipeline.flow.missing_s, 1),
                 rejected_by_reason=dict(self._pipeline.rejected_by_reason),
             ),
             store=self._store.health(),

@@ -10,8 +10,10 @@ from gateway.store.write_buffer import WriteBuffer
 Link = Callable[[Sequence[JournalRow]], tuple[JournalRow, ...]]
 
 
-class StoreFollower:
-    """A place in the journal. It costs nothing while nothing comes: no thread, no connection, no question.
+class Follower:
+    """A place in the journal. One thread reads; any thread may close it.
+
+    It costs nothing while nothing comes: no thread, no connection, no question.
 
     Close behind the newest records it reads memory; further back it asks the disk. Where a database is found that had
     been out of reach, records in memory get new numbers, and the place moves with them; a place in a database that is
@@ -40,7 +42,10 @@ class StoreFollower:
         return self._after or f"{self._buffer.epoch}-0"
 
     def read(self, limit: int) -> list[Record]:
-        """As ``Follower.read``."""
+        """The next records of its kinds in order of their numbers; none where there is nothing new.
+
+        Raises StoreError or TimeoutError.
+        """
         memory = self._buffer.in_memory()
         seq = self._seq(memory.epoch)
         if seq >= self._buffer.newest(self._kinds):
@@ -64,7 +69,7 @@ class StoreFollower:
         return found
 
     def go_to(self, cursor: str | None) -> None:
-        """As ``Follower.go_to``."""
+        """Follow from behind another place; None: from the first record."""
         self._after = cursor
 
     def close(self) -> None:

@@ -5,17 +5,20 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, TypedDict, Unpack
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, SERVICE, Delivery, Follower, Page
+from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, SERVICE, Delivery, Page
 from gateway.store import questions
 from gateway.store.database import is_damaged
 from gateway.store.questions import LAST, Window, without_spectra
 from gateway.store.rows import Chain, JournalRow, checksum
 from gateway.store.schema import connect_reader
 from gateway.units import NS_PER_S
+
+if TYPE_CHECKING:
+    from gateway.store.follower import Follower
+    from gateway.store.writer import Store
 
 QUERY_LIMIT_S: Final = 2.0
 _STEPS_PER_LOOK: Final = 10_000  # SQLite instructions between two looks at the clock
@@ -43,18 +46,15 @@ class Event:
     detail: str
 
 
-class Behind(Protocol):
-    """The store as a reader sees it: what is in memory, and who hears what a question met on its way."""
+class Question(TypedDict, total=False):
+    """What :meth:`StoreReader.page` takes beside the kinds."""
 
-    @property
-    def path(self) -> Path: ...
-    def held(self) -> tuple[str, tuple[JournalRow, ...]]: ...
-    def boot(self) -> tuple[str, int]: ...
-    def head(self) -> str: ...
-    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> Follower: ...
-    def suspect_damage(self) -> None: ...
-    def suspect_loss(self) -> None: ...
-    def suspect_records(self, seqs: Sequence[int]) -> None: ...
+    since_ns: int | None
+    until_ns: int | None
+    limit: int
+    cursor: str | None
+    newest_first: bool
+    with_spectra: bool
 
 
 class StoreReader:
@@ -65,7 +65,7 @@ class StoreReader:
     raises StoreError.
     """
 
-    def __init__(self, store: Behind, limit_s: float = QUERY_LIMIT_S) -> None:
+    def __init__(self, store: "Store", limit_s: float = QUERY_LIMIT_S) -> None:
         self._store = store
         self._limit_s = limit_s
 
@@ -114,45 +114,16 @@ class StoreReader:
             last_cursor=cursors[0 if newest_first else -1] if shown else cursor,
         )
 
-    def estimates(
-        self,
-        *,
-        since_ns: int | None = None,
-        until_ns: int | None = None,
-        limit: int = 100,
-        cursor: str | None = None,
-        newest_first: bool = False,
-        with_spectra: bool = True,
-    ) -> Page:
+    def estimates(self, **question: Unpack[Question]) -> Page:
         """Estimates and rejections, as ``page``."""
-        return self.page(
-            BATCHES,
-            since_ns=since_ns,
-            until_ns=until_ns,
-            limit=limit,
-            cursor=cursor,
-            newest_first=newest_first,
-            with_spectra=with_spectra,
-        )
+        return self.page(BATCHES, **question)
 
-    def entries(
-        self,
-        *,
-        kind: str | None = None,
-        since_ns: int | None = None,
-        until_ns: int | None = None,
-        limit: int = 100,
-        cursor: str | None = None,
-        newest_first: bool = False,
-    ) -> Page:
+    def entries(self, *, kind: str | None = None, **question: Unpack[Question]) -> Page:
         """Load events, trips and alarms, each in its last revision, as ``page``; ``kind`` None: all."""
-        kinds = ENTRIES if kind is None else (kind,)
-        return self.page(
-            kinds, since_ns=since_ns, until_ns=until_ns, limit=limit, cursor=cursor, newest_first=newest_first
-        )
+        return self.page(ENTRIES if kind is None else (kind,), **question)
 
-    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> Follower:
-        """As ``Journal.follow``."""
+    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> "Follower":
+        """As :meth:`Store.follow`."""
         return self._store.follow(kinds, after, on_news)
 
     def head(self) -> str:

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, SERVICE, Delivery
+from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
 from gateway.store.database import FILE_NAME, Database, is_damaged
-from gateway.store.follower import StoreFollower
+from gateway.store.follower import Follower
 from gateway.store.reader import StoreReader
 from gateway.store.retention import Retention
 from gateway.store.rows import Chain, DocumentRow, JournalRow
@@ -81,6 +81,10 @@ class Store:
         kind = REJECTION if record["rejected"] else ESTIMATE
         return self._append(kind, record["id"], record["t_end_ns"], json_line(record))
 
+    def write_remainder(self, record: Mapping[str, Any]) -> None:
+        """Accept what is too short to be a batch; no history shows it, and no uplink sends it."""
+        self._append(REMAINDER, record["id"], record["t_end_ns"], json_line(record))
+
     def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
         """Accept a load event, trip or alarm in a new revision -> its cursor; it takes the place of the one before."""
         return self._append(kind, entry_id, t_end_ns, text, revision)
@@ -104,9 +108,12 @@ class Store:
         """
         return self._buffer.add_delivery(uplink, cursor)
 
-    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> StoreFollower:
-        """As ``Journal.follow``."""
-        return StoreFollower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
+    def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> Follower:
+        """Follow these kinds from behind a cursor (None: from the first record). ``on_news`` is called with each record
+        that is accepted, from the thread that writes it: quick, and never blocking. Raises ValueError for a cursor that
+        is none.
+        """
+        return Follower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
 
     def head(self) -> str:
         """Cursor of the newest record accepted."""

@@ -12,30 +12,32 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
+from gateway.quantities import BY_NAME, QUANTITIES, Outward, Unit
 from gateway.uplink.outbox import LATEST
 
-_WEIGHT: Final = {
-    "platform": "sensor",
-    "device_class": "weight",
-    "unit_of_measurement": "kg",
-    "state_class": "measurement",
+_SENSOR: Final[dict[Unit, dict[str, str]]] = {
+    "kg": {"device_class": "weight", "unit_of_measurement": "kg"},
+    "%": {"unit_of_measurement": "%"},
+    "m": {"device_class": "distance", "unit_of_measurement": "m"},
 }
-_SHARE: Final = {"platform": "sensor", "unit_of_measurement": "%", "state_class": "measurement"}
-_REST: Final = {"suggested_display_precision": 0}
 _DIAGNOSTIC: Final = {"entity_category": "diagnostic"}
 _OVERLOAD: Final = (
     "{{ 'None' if value_json.weights.gross.kg is none else "
     "'ON' if value_json.weights.values() | selectattr('is_over_limit') | list else 'OFF' }}"
 )
 _CONNECTED: Final = "{{ 'ON' if value_json.state == 'online' else 'OFF' }}"
+
+
+def _measured(one: Outward, path: str, label: str) -> tuple[str, str, dict[str, Any]]:
+    shown = {"platform": "sensor", "state_class": "measurement", "suggested_display_precision": one.digits}
+    return label, f"{{{{ value_json.{path} }}}}", _SENSOR[one.unit] | shown
+
+
+_STD: Final = _measured(BY_NAME["payload"], "payload_std_kg", "Payload standard deviation")
 # Name, template, and what Home Assistant has to know of it. None, an unknown number, is its "unknown"
 ENTITIES: Final[dict[str, tuple[str, str, dict[str, Any]]]] = {
-    "payload": ("Payload", "{{ value_json.payload_kg }}", _WEIGHT | _REST),
-    "payload_std": ("Payload standard deviation", "{{ value_json.payload_std_kg }}", _WEIGHT | _REST | _DIAGNOSTIC),
-    "front_share": ("Front share", "{{ value_json.front_share_pct }}", _SHARE | {"suggested_display_precision": 2}),
-    "gross": ("Gross weight", "{{ value_json.weights.gross.kg }}", _WEIGHT | _REST),
-    "front_axle": ("Front axle", "{{ value_json.weights.front_axle.kg }}", _WEIGHT | _REST),
-    "rear_axle": ("Rear axle", "{{ value_json.weights.rear_axle.kg }}", _WEIGHT | _REST),
+    **{one.name: _measured(one, one.json_path, one.label) for one in QUANTITIES if one.label},
+    "payload_std": (*_STD[:2], _STD[2] | _DIAGNOSTIC),
     "overload": ("Overload", _OVERLOAD, {"platform": "binary_sensor", "device_class": "problem"}),
     "weighed": ("Weighed", "{{ value_json.t_end }}", {"platform": "sensor", "device_class": "timestamp"}),
     "refused": (

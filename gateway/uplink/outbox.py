@@ -9,9 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from gateway.history import ALARM, ESTIMATE, KINDS, Delivery, Journal, Record
+from gateway.history import ALARM, ESTIMATE, KINDS, Delivery, Record
 from gateway.log import Event, log_event
 from gateway.records import json_line
+from gateway.store import Store
 
 SETTLES_S: Final = 30.0  # a record is on disk after that, or the disk refuses
 LATEST: Final = "latest"  # topic of the newest estimate, retained
@@ -65,7 +66,7 @@ class Outbox:
 
     def __init__(
         self,
-        journal: Journal,
+        journal: Store,
         name: str,
         *,
         with_places: bool = False,

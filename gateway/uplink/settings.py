@@ -84,16 +84,10 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
             "set [uplink] topic without {vehicle_id}, or another [vehicle] id"
         )
     settings = UplinkSettings(
-        host=section.host,
+        **section.model_dump(exclude={"port", "topic", "client_id"}),
         port=section.port if section.port is not None else (8883 if section.tls else 1883),
         topic=topic,
         client_id=section.client_id or f"springscale-{vehicle.id}",
-        **section.model_dump(include={"tls", "ca", "certificate", "key", "username", "password_file"}),
-        keep_alive_s=section.keep_alive_s,
-        back_off_max_s=section.back_off_max_s,
-        repeat_s=section.repeat_s,
-        wait_for_listener=section.wait_for_listener,
-        home_assistant=section.home_assistant,
     )
     if any(character in (section.home_assistant or "") for character in "+#\0"):
         raise ConfigurationError(
@@ -104,12 +98,17 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
         _check_name(name, text)
     settings.tls_context()  # a wrong file is told at the start
     settings.password()
+    require_own_id("[uplink] host", vehicle, "two of them would cut each other's link")
+    return settings
+
+
+def require_own_id(key: str, vehicle: VehicleSection, why: str) -> None:
+    """Raises ConfigurationError for a vehicle that was given no name, where ``key`` makes it send."""
     if vehicle.id == VehicleSection().id:
         raise ConfigurationError(
-            f"[uplink] host is set, but [vehicle] id is {vehicle.id!r}, that of every vehicle that was given none: "
-            "two of them would cut each other's link; set [vehicle] id to a name of its own"
+            f"{key} is set, but [vehicle] id is {vehicle.id!r}, that of every vehicle that was given none: "
+            f"{why}; set [vehicle] id to a name of its own"
         )
-    return settings
 
 
 def _check_name(name: str, text: str | None) -> None:

@@ -4,7 +4,7 @@ Estimates come in through the board, the history through a reader, the service's
 to whoever has a token. The application is made by ``create_app``, from the door, the live board and the routes.
 """
 
-from gateway.history import Reader
+from gateway.store import StoreReader
 from gateway.web.app import create_app
 from gateway.web.door import (
     Scope,
@@ -25,9 +25,9 @@ __all__ = [
     "KnownLoad",
     "KnownLoads",
     "LatestWeights",
-    "Reader",
     "Scales",
     "Scope",
+    "StoreReader",
     "Tls",
     "Token",
     "TokenFile",

@@ -9,10 +9,8 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.errors import AlarmRefusedError, CommissioningRefusedError
-from gateway.history import Reader
-from gateway.records import json_line
 from gateway.status import Status
+from gateway.store import StoreReader
 from gateway.web import pages
 from gateway.web.door import (
     AnswersHead,
@@ -26,13 +24,18 @@ from gateway.web.door import (
     problems,
 )
 from gateway.web.live import Board, LatestFirst
-from gateway.web.routes.absent import absent
+from gateway.web.routes.absent import (
+    NO_ALARMS,
+    NO_COMMISSIONING,
+    NO_KNOWN_WEIGHTS,
+    NO_RECORD,
+    NO_TREND,
+    NO_VERIFICATION,
+)
 from gateway.web.routes.alarms import AlarmDesk, alarms_router
 from gateway.web.routes.cab import cab_router
 from gateway.web.routes.calibration import (
     KnownWeightService,
-    NoKnownWeights,
-    NoVerificationDesk,
     TrendDesk,
     VerificationDesk,
     known_weights_router,
@@ -49,28 +52,12 @@ from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_l
 from gateway.web.routes.metrics import metrics_registry
 from gateway.web.routes.reasons import reasons_router
 from gateway.web.routes.record import FrameLog, record_router
-from gateway.web.routes.rfms import rfms_router
 from gateway.web.routes.spectra import spectra_router
 from gateway.web.routes.vehicle import vehicle_router
 from gateway.web.routes.vss import vss_router
 from gateway.web.routes.weights import Scales, weights_router
 from gateway.web.settings import WebSettings
 
-_NOT_HERE: Final = CommissioningRefusedError("not_allowed", "there is no service behind this page that could calibrate")
-_NO_ALARM: Final = AlarmRefusedError("no_such_alarm", "it is none of the alarms that can be acknowledged")
-NO_TREND: Final = json_line({"calibration_id": None, "parameters": []})
-NO_LINES: Final = json_line({"items": []})
-NOT_COMMISSIONED: Final = json_line(
-    {
-        "is_allowed": False,
-        "why_not": str(_NOT_HERE),
-        "is_offered": False,
-        "is_pending": False,
-        "underway": None,
-        "active": None,
-        "history": [],
-    }
-)
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
 
@@ -79,7 +66,7 @@ Units stand at the end of each name. Unknown is null. Errors are problem details
 
 def create_app(
     board: Board,
-    reader: Reader,
+    reader: StoreReader,
     status: Callable[[], Status],
     settings: WebSettings | None = None,
     calibrated: CalibratedVehicle | None = None,
@@ -129,19 +116,18 @@ def create_app(
         reasons_router(),
         vehicle_router(status, calibrated),
         spectra_router(board, calibrated),
-        known_weights_router(known_weights or NoKnownWeights()),
-        verification_router(verification or NoVerificationDesk()),
-        trend_router(trend or absent(told=NO_TREND)),
-        commissioning_router(commissioning or absent(_NOT_HERE, told=NOT_COMMISSIONED, lines=NO_LINES)),
+        known_weights_router(known_weights or NO_KNOWN_WEIGHTS),
+        verification_router(verification or NO_VERIFICATION),
+        trend_router(trend or NO_TREND),
+        commissioning_router(commissioning or NO_COMMISSIONING),
         export_router(reader),
         events_router(reader),
-        alarms_router(reader, alarms or absent(_NO_ALARM, standing="[]")),
-        record_router(record or absent(segments=(), open=None)),
+        alarms_router(reader, alarms or NO_ALARMS),
+        record_router(record or NO_RECORD),
         weights_router(board, scales),
         cab_router(board, reader, status, scales),
         j1939_router(board, scales, draws_trailers=draws_trailers),
         vss_router(board, scales),
-        rfms_router(board, reader, status, scales),
         health_router(status, metrics),
     ]
     if known_loads is not None:
@@ -164,6 +150,16 @@ class _Application(FastAPI):
         return self._wrap(super().build_middleware_stack())
 
 
+def _summarize(schema: dict[str, Any]) -> None:
+    """Each operation's summary is the first line of its description, not the name of a function."""
+    for path in schema["paths"].values():
+        for operation in path.values():
+            summary, _, rest = operation.pop("description", "").partition("\n")
+            operation["summary"] = summary.rstrip(".") or operation.get("summary", "")
+            if rest.strip():
+                operation["description"] = rest.strip()
+
+
 def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
     """Let the description say that problems come as application/problem+json, and when tokens are needed."""
     describe = app.openapi
@@ -175,6 +171,7 @@ def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
             app.openapi_schema = None
             schema = told[is_guarded] = describe()
             problems.describe_problems(schema)
+            _summarize(schema)
             if is_guarded:
                 describe_guard(schema)
         return told[is_guarded]

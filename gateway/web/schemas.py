@@ -7,7 +7,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from gateway.estimate import Lack
-from gateway.estimate_json import BY_NAME, FIELDS, INSTANT, SPECTRA, WEIGHTS, EstimateField, Presence
+from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, SPECTRA, WEIGHTS, EstimateField, Presence
 
 
 class Spectra(BaseModel):
@@ -58,7 +58,7 @@ def _described(one: EstimateField) -> Any:
     if one.kind is INSTANT:
         described["json_schema_extra"] = {"format": "date-time"}
     if one.presence is not Presence.ALWAYS:
-        described |= {"default_factory": dict} if one.kind is BY_NAME else {"default": None}
+        described |= {"default_factory": dict} if one.kind is NUMBERS_BY_NAME else {"default": None}
     return _SHAPES.get(one.kind, one.kind.shape), Field(**described)
 
 
@@ -110,6 +110,15 @@ class Ready(BaseModel):
     warnings: list[str] = Field([], description="what is broken beside the weighing")
 
 
+def utf8_only(said: Any) -> Any:
+    """JSON can escape half of a character (a lone surrogate): that is no text, and UTF-8 cannot hold it."""
+    try:
+        json.dumps(said, ensure_ascii=False, default=str).encode()
+    except UnicodeEncodeError:
+        raise ValueError("holds half a character (a lone surrogate), which is no text") from None
+    return said
+
+
 class Body(BaseModel):
     """What a request may say in JSON: an unknown key is refused, and so is text that no answer could repeat."""
 
@@ -118,12 +127,7 @@ class Body(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _is_utf8(cls, said: Any) -> Any:
-        """JSON can escape half of a character (a lone surrogate): that is no text, and UTF-8 cannot hold it."""
-        try:
-            json.dumps(said, ensure_ascii=False, default=str).encode()
-        except UnicodeEncodeError:
-            raise ValueError("holds half a character (a lone surrogate), which is no text") from None
-        return said
+        return utf8_only(said)
 
 
 class Fault(BaseModel):

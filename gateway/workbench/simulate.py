@@ -28,8 +28,25 @@ from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg, payl
 from gateway.toml_file import load_toml
 from gateway.units import NS_PER_S
 from gateway.workbench.campaigns import PLANS, Carried, Plan, PlannedDrive, plan_of, share_range_pct
-from gateway.workbench.sideways import sideways
 from gateway.workbench.wiring import Wiring, unrelated_traffic
+
+
+def sideways(plan: Plan, most_m: float, rng: np.random.Generator) -> Plan:
+    """The same plan with every load somewhere within most_m of the centre line, at one place throughout a drive."""
+    return replace(plan, drives=tuple(_sideways(planned, most_m, rng) for planned in plan.drives))
+
+
+def _sideways(planned: PlannedDrive, most_m: float, rng: np.random.Generator) -> PlannedDrive:
+    moved = {
+        loads: tuple(replace(load, left_m=float(rng.uniform(-most_m, most_m))) for load in loads)
+        for loads in dict.fromkeys(step.loads for step in planned.steps)
+    }
+    return replace(
+        planned,
+        carried=tuple(replace(carried, loads=moved[carried.loads]) for carried in planned.carried),
+        steps=tuple(replace(step, loads=moved[step.loads]) for step in planned.steps),
+    )
+
 
 OnDrive = Callable[[int, int], None]  # (drives done, drives in all)
 

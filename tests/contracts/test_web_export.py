@@ -65,7 +65,7 @@ def test_a_wrong_question_is_a_problem(tmp_path: Path, query: str) -> None:
 
 CALIBRATED = CalibratedVehicle(
     id="sha256:ab",
-    vehicle=Vehicle("van", 1240.0, 2.8, gross_limit_kg=1900.0),
+    vehicle=Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0, gross_limit_kg=1900.0),
     payload_seen_kg=(0.0, 420.0),
     front_share_seen_pct=(42.0, 55.0),
     ratio_index=RatioIndexCalibration(

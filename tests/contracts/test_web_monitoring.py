@@ -40,7 +40,14 @@ RULES = [
 DASHBOARD = json.loads((DEPLOY / "grafana" / "springscale.json").read_text())
 TARGETS = [(panel["title"], target["expr"]) for panel in DASHBOARD["panels"] for target in panel["targets"]]
 VAN = Vehicle(
-    "van", 1240.0, 2.8, unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1900.0, front_axle_limit_kg=900.0
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
+    unsprung_front_kg=90.0,
+    unsprung_rear_kg=110.0,
+    gross_limit_kg=1900.0,
+    front_axle_limit_kg=900.0,
 )
 BY_PROMETHEUS = {"up"}
 LABELS_BY_PROMETHEUS = {"instance", "job"}

@@ -1,4 +1,4 @@
-"""Our weights in the words of others: rFMS, VSS, and our own figures behind both."""
+"""Our weights in the words of others: VSS, J1939, and our own figures behind both."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 import yaml
-from support.estimates import make_estimate, make_record, posterior_of
+from support.estimates import make_estimate, posterior_of
 from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
@@ -19,9 +19,10 @@ from gateway.web import create_app
 
 VIN = "VF1" + "0" * 14
 VAN = Vehicle(
-    "van",
-    1240.0,
-    2.8,
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
     unsprung_front_kg=90.0,
     unsprung_rear_kg=110.0,
     gross_limit_kg=1545.0,
@@ -29,7 +30,6 @@ VAN = Vehicle(
     track_width_m=1.5,
     front_wheel_limit_kg=400.0,
 )
-STATUSES = "/rfms/vehiclestatuses"
 Ask = Callable[..., Any]
 
 
@@ -153,106 +153,6 @@ def test_vss_speaks_core_paths_and_exactly_those_of_the_overlay(gateway: Gateway
         "Vehicle.GrossWeight": 1545,
     }
     assert points["Vehicle.Chassis.Axle.Row1.Load"]["value"] == 760.0
-
-
-def test_rfms_tells_whole_kilograms_of_good_batches(gateway: Gateway) -> None:
-    gateway.publish(loaded(0), make_estimate(1, Why.GAP), loaded(2, 130.6))
-    answer = client(gateway).get(f"{STATUSES}?starttime=1970-01-01T00:00:00Z").json()
-    statuses = answer["vehicleStatusResponse"]["vehicleStatuses"]
-    assert [status["grossCombinationVehicleWeight"] for status in statuses] == [1540, 1571]
-    assert statuses[0]["snapshotData"]["vehicleAxles"] == [
-        {"vehicleAxlePosition": 1, "vehicleAxleLoad": 760},
-        {"vehicleAxlePosition": 2, "vehicleAxleLoad": 780},
-    ]
-    assert statuses[0]["vin"] == VIN
-    assert statuses[0]["createdDateTime"] == "1970-01-01T00:05:00.000000Z"
-    assert statuses[0]["triggerType"] == {"context": "RFMS", "type": "TIMER"}
-    assert answer["moreDataAvailable"] is False
-    assert answer["requestServerDateTime"].endswith("Z")
-
-
-def test_rfms_latest_only_is_the_estimate_shown(gateway: Gateway) -> None:
-    ask = client(gateway)
-    assert ask.get(f"{STATUSES}?latestOnly=true").json()["vehicleStatusResponse"]["vehicleStatuses"] == []
-    gateway.publish(loaded(0), loaded(1))
-    (status,) = ask.get(f"{STATUSES}?latestOnly=true&vin={VIN}").json()["vehicleStatusResponse"]["vehicleStatuses"]
-    assert status["createdDateTime"] == make_record(1)["t_end"]
-
-
-def test_rfms_says_where_more_is_and_nothing_is_missed(gateway: Gateway) -> None:
-    gateway.publish(*(loaded(n) for n in range(1101)))
-    ask, seen = client(gateway), []
-    link = f"{STATUSES}?starttime=1970-01-01T00:00:00Z&triggerFilter=TIMER"
-    while link:
-        answer = ask.get(link).json()
-        seen += [status["createdDateTime"] for status in answer["vehicleStatusResponse"]["vehicleStatuses"]]
-        assert answer["moreDataAvailable"] is ("moreDataAvailableLink" in answer)
-        link = answer.get("moreDataAvailableLink")
-    assert seen == [make_record(n)["t_end"] for n in range(1101)]
-
-
-@pytest.mark.parametrize(
-    "query",
-    [
-        "",
-        "latestOnly=false",
-        "stoptime=2026-01-01T00:00:00Z",
-        "latestOnly=true&starttime=2026-01-01T00:00:00Z",
-        "latestOnly=true&stoptime=2026-01-01T00:00:00Z",
-        "starttime=2026-01-02T00:00:00Z&stoptime=2026-01-01T00:00:00Z",
-        "starttime=yesterday",
-        "latestOnly=perhaps",
-        "latestonly=true",
-    ],
-)
-def test_rfms_refuses_with_400(gateway: Gateway, query: str) -> None:
-    answer = client(gateway).get(f"{STATUSES}?{query}")
-    assert (answer.status_code, answer.headers["content-type"]) == (400, "application/problem+json")
-
-
-def test_rfms_knows_its_own_vehicle_only(gateway: Gateway) -> None:
-    ask = client(gateway)
-    assert ask.get(f"{STATUSES}?latestOnly=true&vin=WDB00000000000000").status_code == 404
-    (vehicle,) = ask.get("/rfms/vehicles").json()["vehicleResponse"]["vehicles"]
-    assert (vehicle["vin"], vehicle["customerVehicleName"]) == (VIN, "van-17")
-    assert ask.get(f"/rfms/vehicles?lastVin={VIN}").json()["vehicleResponse"]["vehicles"] == []
-
-
-def test_rfms_without_a_vin_has_no_vehicle(gateway: Gateway) -> None:
-    gateway.publish(loaded(0))
-    gateway.status = gateway.status.model_copy(update={"vin": None})
-    ask = client(gateway)
-    assert ask.get("/rfms/vehicles").json()["vehicleResponse"]["vehicles"] == []
-    assert ask.get(f"{STATUSES}?latestOnly=true").json()["vehicleStatusResponse"]["vehicleStatuses"] == []
-
-
-def test_rfms_filters_by_trigger(gateway: Gateway) -> None:
-    gateway.publish(loaded(0))
-    for filtered, n in (("TIMER", 1), ("ignition_on,timer", 1), ("IGNITION_ON", 0)):
-        answer = client(gateway).get(f"{STATUSES}?latestOnly=true&triggerFilter={filtered}").json()
-        assert len(answer["vehicleStatusResponse"]["vehicleStatuses"]) == n
-
-
-@pytest.mark.parametrize(
-    ("accept", "given"),
-    [
-        ("*/*", "application/json"),
-        ("application/json; charset=utf-8", "application/json"),
-        ("application/vnd.fmsstandard.com.Vehiclestatuses.v2.1+json", None),
-        ("application/vnd.fmsstandard.com.vehiclestatuses.v3.0+json; q=0.9", None),
-        ("text/html, application/vnd.FMSstandard.com.VehicleStatuses.v4.0+JSON", None),
-    ],
-)
-def test_rfms_media_types_count_in_any_case(gateway: Gateway, accept: str, given: str | None) -> None:
-    answer = client(gateway).get(f"{STATUSES}?latestOnly=true", headers={"Accept": accept})
-    assert answer.status_code == 200
-    expected = given or accept.rsplit(",", maxsplit=1)[-1].split(";", maxsplit=1)[0].strip()
-    assert answer.headers["content-type"] == expected
-
-
-@pytest.mark.parametrize("accept", ["text/html", "application/vnd.fmsstandard.com.vehicles.v3.0+json", ""])
-def test_rfms_refuses_other_media_types(gateway: Gateway, accept: str) -> None:
-    assert client(gateway).get(f"{STATUSES}?latestOnly=true", headers={"Accept": accept}).status_code == 406
 
 
 def test_j1939_counts_are_the_weights_in_its_resolutions(gateway: Gateway) -> None:

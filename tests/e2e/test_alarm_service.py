@@ -110,6 +110,6 @@ def test_an_alarm_from_the_bus_to_who_must_know_and_back(service: Service, recei
     assert receiver.wrong == []
     said = [json.loads(line[3:])["event"] for line in service.lines]
     assert [one for one in said if one.startswith("alarm")] == [
-        "alarm told early", "alarm confirmed", "alarm acknowledged",
+        "alarm raised, provisional", "alarm confirmed", "alarm acknowledged",
     ]  # fmt: skip
     assert "webhook not taken" in said

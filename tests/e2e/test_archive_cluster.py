@@ -15,8 +15,7 @@ from gateway.archive import failures, place_of, receipts, rows_of, slots_done
 from gateway.archive.cluster import Cluster, cluster
 from gateway.archive.manifest import load_manifest
 from gateway.archive.places import PlaceError
-from gateway.archive.reprocess import reprocess
-from gateway.archive.turns import Progress
+from gateway.archive.reprocess import Progress, reprocess
 from gateway.cli import springscale
 from gateway.errors import ConfigurationError
 

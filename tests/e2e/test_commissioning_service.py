@@ -113,7 +113,7 @@ def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, 
     assert (made["by"], made["note"], made["n_batches"]) == ("local", "in the yard", 2)
     assert box.cross_spectrum is not None
     assert desk.cross_spectrum is not None
-    assert box.cross_spectrum.model_dump_json() == desk.cross_spectrum.model_dump_json()
+    assert box.model_dump_json(include={"cross_spectrum"}) == desk.model_dump_json(include={"cross_spectrum"})
     assert box.warnings == desk.warnings
     assert said["undone"]["active"] is None
     assert said["after"]["calibration_id"] is None

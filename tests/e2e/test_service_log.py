@@ -105,8 +105,7 @@ def test_every_change_of_state_is_a_line(journal: Journal) -> None:
     assert events.index("ready") < events.index("bus receiving") < events.index("estimate")
     assert events.count("estimate") == 3  # of 20 s each; what is left of the drive is too short
     assert {entry["payload_kg"] for entry in entries if entry["event"] == "estimate"} == {12.0}
-    [reasons] = [entry for entry in entries if entry["event"] == "reasons of rejection changed"]
-    assert (reasons["rejected"], reasons["before"]) == (["too_short"], [])
+    assert "reasons of rejection changed" not in events
     assert events.count("uplink not reached") == 1  # tried again and again, told once
     states = [entry["state"] for entry in entries if entry["event"] == "state"]
     assert all(one != other for one, other in pairwise(states))

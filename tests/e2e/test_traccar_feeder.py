@@ -181,3 +181,13 @@ def test_a_device_that_traccar_does_not_know_is_named_and_nothing_is_lost(tmp_pa
             fake.devices = {DEVICE}
             assert wait_until(lambda: len(fake.positions) == 1)
         assert (tmp_path / "log").read_text().count("does not know") == 1
+
+
+def test_a_place_that_cannot_be_read_is_told_and_counts_as_none(tmp_path: Path, gateway: Gateway) -> None:
+    (tmp_path / "place").mkdir()
+    (tmp_path / "place/cursor.json").write_text('{"cur')
+    with traccar() as fake, serving(gateway.app) as service:
+        gateway.publish(make_estimate(0))
+        with feeding(service.url, fake.port, tmp_path, "--from-the-start"):
+            assert wait_until(lambda: len(fake.positions) == 1)
+    assert "cannot be read" in (tmp_path / "log").read_text()

@@ -1,7 +1,7 @@
 """`make fleet-test`: fifty vehicles, and everything between them and the database killed in turn, the broker thrice.
 
 `make fleet-test VEHICLES=500` has more of them, a hundred in each process. Writes what it counted to
-build/fleet-test.json, which docs/fleet.md shows (docs/make_fleet.py).
+build/fleet-test.json, which docs/fleet.md shows (docs/make.py).
 """
 
 import json

@@ -1,6 +1,5 @@
-"""docs/faults.md is what its sources make of it, and every row names a test that exists."""
+"""Every row of docs/faults.md names a test that exists."""
 
-import runpy
 import tomllib
 from pathlib import Path
 
@@ -8,11 +7,6 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 ROWS = tomllib.loads((ROOT / "tests" / "faults.toml").read_text())["row"]
-
-
-def test_the_page_is_up_to_date() -> None:
-    made = runpy.run_path(str(ROOT / "docs" / "make_faults.py"))["faults_page"]()
-    assert (ROOT / "docs" / "faults.md").read_text(encoding="utf-8") == made, "make docs"
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row["fault"][:40])

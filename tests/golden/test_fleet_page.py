@@ -4,15 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-import make_fleet
+import fleet_counts
 import pytest
 
-
-def test_the_page_shows_the_counts() -> None:
-    assert make_fleet.fleet_page() == make_fleet.PAGE.read_text(encoding="utf-8"), "run `make docs`"
-
-
-RUNS = json.loads(make_fleet.COUNTS.read_text(encoding="utf-8"))
+RUNS = json.loads(fleet_counts.COUNTS.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("counts", RUNS, ids=lambda counts: str(counts["vehicles"]))
@@ -26,9 +21,9 @@ def test_nothing_was_lost_and_nothing_doubled(counts: dict[str, Any]) -> None:
 def test_a_run_takes_the_place_of_the_last_with_as_many_vehicles(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(make_fleet, "COUNTS", tmp_path / "fleet_test.json")
-    make_fleet.COUNTS.write_text(json.dumps(RUNS[:1]))
+    monkeypatch.setattr(fleet_counts, "COUNTS", tmp_path / "fleet_test.json")
+    fleet_counts.COUNTS.write_text(json.dumps(RUNS[:1]))
     for n, seconds in ((500, 9.0), (RUNS[0]["vehicles"], 7.0), (500, 8.0)):
-        make_fleet.take({**RUNS[0], "vehicles": n, "seconds": seconds})
-    told = [(run["vehicles"], run["seconds"]) for run in json.loads(make_fleet.COUNTS.read_text())]
+        fleet_counts.take({**RUNS[0], "vehicles": n, "seconds": seconds})
+    told = [(run["vehicles"], run["seconds"]) for run in json.loads(fleet_counts.COUNTS.read_text())]
     assert told == [(RUNS[0]["vehicles"], 7.0), (500, 8.0)]

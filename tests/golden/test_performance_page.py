@@ -3,14 +3,7 @@
 import json
 from pathlib import Path
 
-from make_performance import performance_page
-
 DOCS = Path(__file__).parents[2] / "docs"
-
-
-def test_the_page_is_made_from_the_figures() -> None:
-    found = json.loads((DOCS / "performance.json").read_text(encoding="utf-8"))
-    assert (DOCS / "performance.md").read_text(encoding="utf-8") == performance_page(found)
 
 
 def test_everybody_of_the_comparison_stands_in_it() -> None:

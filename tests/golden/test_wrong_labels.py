@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from support.recordings import recordings
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.inspection.loads import compare_loads
 from gateway.calibration.known_run import KnownRun
 from gateway.cli import springscale

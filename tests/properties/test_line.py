@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from gateway.calibration.half_car.prior import Prior
 from gateway.calibration.line import Evidence
-from gateway.calibration.line.siblings import scatter_found
+from gateway.calibration.line.scatter import scatter_found
 from gateway.core.cross_spectrum.model.friction import RATES
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.records import F64, Bool

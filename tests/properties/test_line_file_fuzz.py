@@ -9,11 +9,12 @@ import pytest
 from support.half_car_road import VAN
 from support.odd_content import GONE, ODD, changed, places
 
-from gateway.calibration.file import LineFile, LinePart, SiblingPart, line_of_files, load_like
+from gateway.calibration.file import LineFile, SiblingPart, load_like
 from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.half_car import prior_of
 from gateway.calibration.line import Evidence, Limits, Line, Seen, Usual
 from gateway.calibration.line.scatter import default_scatter_std, is_inherited
+from gateway.calibration.line_files import line_of_files, line_part
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
 from gateway.core.vehicle import Load
 from gateway.errors import CalibrationFileError
@@ -41,7 +42,7 @@ def line() -> Line:
 
 def line_file() -> LineFile:
     sibling = SiblingPart(id="sha256:" + 64 * "a", name="van", empty_mass_kg=1240.0, n_runs=10)
-    return LineFile(software="springscale", siblings=(sibling,), line=LinePart.of(line()))
+    return LineFile(software="springscale", siblings=(sibling,), line=line_part(line()))
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:

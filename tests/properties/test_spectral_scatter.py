@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gateway.calibration.ratio_index.scatter import bin_covariance, integral_covariance
+from gateway.calibration.ratio_index.bands import bin_covariance, integral_covariance
 from gateway.core.ratio_index.index import SpectrumKind, mean_spectrum
 from gateway.records import F64
 

@@ -19,7 +19,14 @@ from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.posterior import Posterior, exactly
 
 PAPER_VAN = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
-UNSTATED = Vehicle("van", 1240.0, 2.8, empty_front_share_pct=52.0, track_width_m=1.5)
+UNSTATED = Vehicle(
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
+    empty_front_share_pct=52.0,
+    track_width_m=1.5,
+)
 STATED = replace(UNSTATED, unsprung_front_kg=90.0, unsprung_rear_kg=110.0)
 KERB = replace(UNSTATED, kerb_front_axle_kg=740.0, kerb_rear_axle_kg=700.0)
 FOUND = Unsprung(Quantity(75.0, 5.0), Quantity(85.0, 6.0), 0.8)

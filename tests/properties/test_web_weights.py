@@ -23,7 +23,15 @@ from gateway.estimate import PLACES, Z95, Estimate, Lack, Quantity, Weights
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source, exactly
 from gateway.records import F64
 
-VAN = Vehicle("van", 1240.0, 2.8, empty_front_share_pct=52.0, unsprung_front_kg=90.0, unsprung_rear_kg=110.0)
+VAN = Vehicle(
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
+    empty_front_share_pct=52.0,
+    unsprung_front_kg=90.0,
+    unsprung_rear_kg=110.0,
+)
 
 payloads = st.floats(0.0, 800.0)
 positions = st.floats(-0.5, 3.5)
@@ -93,12 +101,20 @@ def test_deviations_are_those_of_many_draws(correlation: float) -> None:
 
 
 def test_an_unsprung_mass_follows_from_the_kerb_weight() -> None:
-    kerb = Vehicle("van", 1240.0, 2.8, 52.0, kerb_front_axle_kg=0.52 * 1240.0 + 90.0, kerb_rear_axle_kg=705.2)
+    kerb = Vehicle(
+        name="van",
+        empty_mass_kg=1240.0,
+        wheelbase_m=2.8,
+        empty_front_share_pct=52.0,
+        sensor_position_m=0.0,
+        kerb_front_axle_kg=0.52 * 1240.0 + 90.0,
+        kerb_rear_axle_kg=705.2,
+    )
     assert unsprung_kg(kerb) == pytest.approx((90.0, 110.0))
 
 
 def test_what_is_not_stated_is_unknown_and_never_zero() -> None:
-    half = Vehicle("van", 1240.0, 2.8, unsprung_front_kg=90.0)
+    half = Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0, unsprung_front_kg=90.0)
     weights = axle_loads(half, 100.0, 5.0, 50.0, 0.5)
     assert weights.front_axle.is_known
     assert not weights.rear_axle.is_known

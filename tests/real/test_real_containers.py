@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 from support.parts import found
+from support.patience import wait_until
 
 ROOT = Path(__file__).parents[2]
 COMPOSE = ROOT / "deploy/fleet/compose.yaml"
 CONTAINERFILE = ROOT / "deploy/container/Containerfile"
 BUILD_S = 1800
+TAG = "springscale-test"
 
 
 def engine() -> str | None:
@@ -42,18 +44,33 @@ def test_a_compose_tool_reads_the_stack(tmp_path: Path) -> None:
         assert service in read.stdout
 
 
-def test_the_image_is_built_with_its_health_check() -> None:
+def test_the_image_is_built_runs_unprivileged_and_keeps_its_health_check() -> None:
     """OCI images keep no HEALTHCHECK: podman wants --format docker for it."""
     program = engine()
     if program is None:
         pytest.skip("no container engine answers: neither podman nor a docker daemon")
-    tag = "springscale-test"
     more = ["--format", "docker"] if Path(program).name == "podman" else []
-    command = [program, "build", *more, "--file", str(CONTAINERFILE), "--tag", tag, str(ROOT)]
+    command = [program, "build", *more, "--file", str(CONTAINERFILE), "--tag", TAG, str(ROOT)]
     built = subprocess.run(command, capture_output=True, text=True, timeout=BUILD_S, check=False)
     assert built.returncode == 0, built.stderr[-3000:]
-    seen = json.loads(subprocess.run([program, "inspect", tag], capture_output=True, text=True, check=True).stdout)
-    config = seen[0]["Config"] | {"Healthcheck": seen[0]["Config"].get("Healthcheck") or seen[0].get("HealthCheck")}
-    assert "health/live" in " ".join(config["Healthcheck"]["Test"])
-    told = subprocess.run([program, "run", "--rm", tag, "--version"], capture_output=True, text=True, check=True)
-    assert "springscale" in told.stdout
+    seen = json.loads(_said(program, "inspect", TAG))[0]
+    check = seen["Config"].get("Healthcheck") or seen["Healthcheck"]  # docker's place, and podman's
+    assert check["Test"][0] == "CMD"
+    assert "health/live" in check["Test"][-1]
+    assert "springscale" in _said(program, "run", "--rm", TAG, "--version")
+    as_told = ("--read-only", "--cap-drop", "all", "--tmpfs", "/var/lib/springscale:mode=1777")
+    name = _said(program, "run", "--rm", "--detach", *as_told, TAG).strip()
+    try:
+        assert wait_until(lambda: _is_well(program, name, check["Test"][1:])), _said(program, "logs", name)
+        assert "uid=880" in _said(program, "exec", name, "id")
+    finally:
+        _said(program, "stop", name)
+
+
+def _said(program: str, *arguments: str) -> str:
+    return subprocess.run([program, *arguments], capture_output=True, text=True, check=True).stdout
+
+
+def _is_well(program: str, name: str, check: list[str]) -> bool:
+    """The image's own check, inside: without systemd podman runs none by itself."""
+    return subprocess.run([program, "exec", name, *check], capture_output=True, check=False).returncode == 0

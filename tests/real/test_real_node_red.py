@@ -68,7 +68,7 @@ def test_an_overload_raises_one_alarm_until_it_is_over(tmp_path: Path, broker: B
     assert settings is not None
     store = Store.open(tmp_path / "state")
     alarms = Listener(broker.port, "alarms/#")
-    uplink = Uplink(settings, Outbox(store.reader(), store, "fleet"), {"vehicle_id": "van-17"})
+    uplink = Uplink(settings, Outbox(store, "fleet"), {"vehicle_id": "van-17"})
     uplink.start()
     try:
         light, heavy, still = weighing(0, 2400.0), weighing(1, 2600.5), weighing(2, 2610.0)

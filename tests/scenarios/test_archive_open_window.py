@@ -49,13 +49,13 @@ def test_the_log_before_is_weighed_to_its_end(
 ) -> None:
     """As where no log follows, whatever of the bad one was read until then."""
     second = tmp_path / "van" / "2.log"
-    write_cut_drive(tmp_path / "van", begin_ns, 75.0, begin_ns + 45 * S)
+    write_cut_drive(tmp_path / "van", begin_ns, 75.0, begin_ns + 119 * S // 2)
     write_manifest(tmp_path, "van")
     content = second.read_text()
     second.unlink()
     assert done(tmp_path).is_good
     alone = rows_in(tmp_path)
-    assert [(row["log"], row["rejected"]) for row in alone] == [("van/1.log", why) for why in ([], [], ["too_short"])]
+    assert [(row["log"], row["rejected"]) for row in alone] == [("van/1.log", [])] * 3
     shutil.rmtree(tmp_path / "dataset")
 
     if fault == "trips its reader":

@@ -11,7 +11,7 @@ from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate
-from gateway.offline.batches import batches_of_motion
+from gateway.offline.campaigns import batches_of_motion
 from gateway.records import Frames, Why
 from gateway.service.pipeline import Pipeline
 from gateway.sim.drive import constant

@@ -8,9 +8,11 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
+import httpx
 import pytest
 from support.log import names
 from support.paper_van import paper_van_config
@@ -32,12 +34,13 @@ def config(tmp_path: Path) -> Path:
     return paper_van_config(tmp_path, free_port())
 
 
-def test_a_pipeline_that_does_not_end_is_left_behind_without_an_abort(config: Path) -> None:
-    """Before, Python unwound it inside scipy's C++ at its own end: SIGABRT, and a core instead of an exit code."""
+def told_until_stopped(module: str, config: Path, before: Callable[[str], object] = lambda url: None) -> str:
+    """Run the service of a module of support, stop it by SIGTERM after ``before``: it ends with 0 -> its output."""
     port = re.search(r"port = (\d+)", config.read_text())
     assert port is not None
+    url = f"http://127.0.0.1:{port[1]}"
     with subprocess.Popen(
-        [sys.executable, "-m", "support.stuck_service", "run", "--config", str(config)],
+        [sys.executable, "-m", f"support.{module}", "run", "--config", str(config)],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -45,14 +48,20 @@ def test_a_pipeline_that_does_not_end_is_left_behind_without_an_abort(config: Pa
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
     ) as process:
         try:
-            first_answer(f"http://127.0.0.1:{port[1]}/health/live")
+            first_answer(f"{url}/health/live")
+            before(url)
             process.send_signal(signal.SIGTERM)
             told, _ = process.communicate(timeout=PATIENCE_S)
         finally:
             process.kill()
     assert process.returncode == 0, told
-    assert "pipeline did not finish in time" in told
     assert '"event": "stopped"' in told
+    return told
+
+
+def test_a_pipeline_that_does_not_end_is_left_behind_without_an_abort(config: Path) -> None:
+    """Before, Python unwound it inside scipy's C++ at its own end: SIGABRT, and a core instead of an exit code."""
+    assert "pipeline did not finish in time" in told_until_stopped("stuck_service", config)
 
 
 def test_all_parts_together_may_take_no_longer_than_systemd_waits() -> None:
@@ -94,6 +103,16 @@ def test_a_held_lock_of_the_commissioning_does_not_keep_the_stop_from_the_pipeli
     assert time.monotonic() - begun_s < PATIENCE_S
     assert not gateways[0].pipeline.is_alive()
     assert not gateways[0].store.is_alive()
+
+
+def test_a_question_of_a_client_that_hangs_does_not_keep_the_process_from_ending(config: Path) -> None:
+    """Every thread of the loop's pool was waited for, however long: systemd had to kill it."""
+
+    def ask(url: str) -> None:
+        with pytest.raises(httpx.ReadTimeout):
+            httpx.get(f"{url}/api/v1/calibration/commissioning", timeout=1.0, trust_env=False)
+
+    told_until_stopped("held_service", config, ask)
 
 
 @pytest.mark.parametrize("name", ["webhook", "uplink", "broadcaster"])

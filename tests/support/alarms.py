@@ -20,9 +20,10 @@ from support.days import at, batch
 from support.estimates import posterior_of
 
 VAN = Vehicle(
-    "van",
+    name="van",
     empty_mass_kg=1600.0,
     wheelbase_m=3.0,
+    sensor_position_m=0.0,
     track_width_m=1.5,
     unsprung_front_kg=100.0,
     unsprung_rear_kg=100.0,

@@ -19,7 +19,8 @@ BEFORE = Status(
 VAN = CalibratedVehicle(
     id="sha256:ab",
     vehicle=Vehicle(
-        "van", 1240.0, 2.8, unsprung_front_kg=80.0, unsprung_rear_kg=80.0,
+        name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0,
+        unsprung_front_kg=80.0, unsprung_rear_kg=80.0,
         gross_limit_kg=2000.0, front_axle_limit_kg=1000.0, rear_axle_limit_kg=1050.0,
     ),
     payload_seen_kg=(0.0, 600.0),

@@ -7,7 +7,6 @@ import numpy as np
 
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.file.calibration_file import content_id
-from gateway.calibration.file.parts import RatioIndexPart
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 
@@ -70,7 +69,7 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
                 "speed_mps": [14.0, 16.0],
                 "roughness_mps2": None,
             },
-            "ratio_index": RatioIndexPart.of(ratio_index_calibration(payload_kg, front_share_pct)),
+            "ratio_index": ratio_index_calibration(payload_kg, front_share_pct),
             "provenance": {
                 "software": "springscale test",
                 "command": "springscale calibrate",

@@ -14,7 +14,7 @@ from gateway.records import F64, Batch
 
 RATE_HZ = 50.0
 VAN = Vehicle(
-    "van",
+    name="van",
     empty_mass_kg=1240.0,
     wheelbase_m=2.8,
     empty_front_share_pct=52.0,

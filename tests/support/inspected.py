@@ -52,7 +52,13 @@ def driven(
 
 def stated(van: SimulatedVehicle, position_m: float) -> Vehicle:
     """The van as a campaign file states it."""
-    return Vehicle(van.name, van.sprung_kg, van.wheelbase_m, van.empty_front_share_pct, position_m)
+    return Vehicle(
+        name=van.name,
+        empty_mass_kg=van.sprung_kg,
+        wheelbase_m=van.wheelbase_m,
+        empty_front_share_pct=van.empty_front_share_pct,
+        sensor_position_m=position_m,
+    )
 
 
 def scaled(motion: Motion, **factors: float) -> Motion:

@@ -1,12 +1,12 @@
 """A recorded sister of the line's van at the running service: her empty drive, her commissioning, her loads."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE
-from gateway.calibration.campaign import VehicleTable, load_campaign
+from gateway.calibration.campaign import load_campaign
 from gateway.calibration.commissioning import vehicle_table
 from gateway.config import load_settings
 from gateway.core.vehicle import Vehicle
@@ -107,9 +107,9 @@ def _typed(vehicle: Vehicle) -> dict[str, Any]:
     }
 
 
-def _campaign(path: Path, vehicle: VehicleTable, drives: Path, duration_s: float) -> Path:
+def _campaign(path: Path, vehicle: Vehicle, drives: Path, duration_s: float) -> Path:
     """The same vehicle and the same part of the drive, for `springscale calibrate`."""
-    typed = vehicle.model_dump(mode="json", exclude_none=True)
+    typed = {key: value for key, value in asdict(vehicle).items() if value is not None}
     lines = [
         f'signals = "{drives / "signals_roll.toml"}"',
         "identification_fraction = 1.0",

@@ -51,7 +51,7 @@ def test_an_alarm_is_stored_shown_and_logged(bench: AlarmBench, caplog: pytest.L
     )  # fmt: skip
     assert sent == ["alarm"] * 2
     told = [record.getMessage() for record in caplog.records]
-    assert told == ["alarm told early", "alarm confirmed"]
+    assert told == ["alarm raised, provisional", "alarm confirmed"]
     summary = bench.desk.summary()
     assert (summary.standing, summary.n_unacknowledged, summary.n_told) == ({"overload.gross": "final"}, 1, 2)
 

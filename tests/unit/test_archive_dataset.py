@@ -8,10 +8,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import duckdb
-import make_estimate as page
 import polars as pl
 import pyarrow.parquet as pq
 import pytest
+import reference as page
 from support.estimates import make_record, with_everything
 
 from gateway.archive import Slot, failures, place_of, receipts, rows_of, slots_done, trusted_tables

@@ -11,9 +11,8 @@ from support.calibrated import calibration_file
 from support.known_weights import with_all_sources
 
 from gateway.archive import Place, place_of
-from gateway.archive.jobs import Job, hash_of, plan
+from gateway.archive.jobs import Job, code_id, hash_of, plan, software
 from gateway.archive.manifest import Assignment, Manifest, load_manifest
-from gateway.archive.software import code_id, software
 from gateway.archive.survey import LogFacts, LogFile, in_goes
 from gateway.calibration.known_weights_file import KnownWeight, KnownWeights
 from gateway.core.known_weights import Knowledge

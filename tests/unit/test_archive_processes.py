@@ -10,7 +10,7 @@ import pytest
 from support.archive import die
 
 from gateway.archive.processes import Processes, WorkerKilledError
-from gateway.archive.turns import Progress, done_by
+from gateway.archive.reprocess import Progress, done_by
 
 
 @pytest.fixture(name="workers", scope="module")

@@ -115,7 +115,7 @@ def test_the_figures_of_a_regression_predict_what_it_predicts(ra: float, rg: flo
     file = load_calibration(SHIPPED)
     assert file.ratio_index is not None
     assert file.ratio_index.payload is not None
-    model = file.ratio_index.payload.for_core()
+    model = file.ratio_index.payload
     constant, *slopes = (figure.centre for figure in figures_of(file)["ratio_index.payload"])
     terms = term_columns(model.terms, np.array([ra]), np.array([rg]))[0]
     assert constant + float(np.dot(slopes, terms)) == pytest.approx(model.predict(ra, rg)[0], rel=1e-9, abs=1e-6)

@@ -12,7 +12,7 @@ from support.calibrated import calibration_file
 from gateway.budget import BudgetLine, Remedy
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import Finding, Inspection, RunVerdict, Severity
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.judgement import Assessment, Grade, Judged, Judgement, Part, Verdict, error_table, verdicts_of
 from gateway.calibration.plan import Expected
 from gateway.core.vehicle import Vehicle
@@ -20,7 +20,9 @@ from gateway.estimate import Estimate, Quantity
 from gateway.posterior import Posterior, Source
 from gateway.records import Why
 
-VAN = Vehicle("van", 1240.0, 2.8)  # ranges of 450 kg and of 20 points
+VAN = Vehicle(
+    name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0
+)  # ranges of 450 kg and of 20 points
 
 
 def judged(run: int, error_kg: float = 0.0, half_kg: float = 20.0, error_pp: float = 0.0) -> Judged:

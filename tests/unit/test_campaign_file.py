@@ -68,7 +68,7 @@ def test_axle_weights_stand_for_the_sprung_mass_as_in_the_commissioning(tmp_path
     said = VehicleAnswers(
         kerb_front_axle_kg=713.0, kerb_rear_axle_kg=704.0, wheelbase_m=2.8, sensor_position_m=3.2, name="van"
     )
-    assert vehicle == vehicle_table(said, "van").stated
+    assert vehicle == vehicle_table(said, "van")
     assert "weigh each axle with the body on it" in fault_of(tmp_path, text.replace("713.0", "20.0"))
     assert "vehicle.empty_mass_kg: missing" in fault_of(tmp_path, text.replace("kerb_rear_axle_kg = 704.0\n", ""))
 
@@ -85,7 +85,7 @@ def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> N
 def test_a_sensor_whose_place_to_the_side_is_not_stated_is_unsure(tmp_path: Path) -> None:
     def placed(**keys: str) -> tuple[float, float]:
         vehicle = loaded(tmp_path, campaign_text(vehicle=keys)).vehicle
-        return vehicle.sensor_offset_left_m, vehicle.sensor_offset_left_std_m
+        return vehicle.sensor_left_m, vehicle.sensor_left_std_m
 
     assert placed() == (0.0, UNKNOWN_OFFSET_STD_M)
     assert placed(sensor_offset_left_m="0.0") == (0.0, MEASURED_OFFSET_STD_M)

@@ -19,7 +19,7 @@ from gateway.core.cargo import (
 )
 from gateway.core.vehicle import Vehicle
 
-VAN = Vehicle("van", 1240.0, 2.8)
+VAN = Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0)
 KNOWN_S_M2 = 0.07  # a box of 0.8 m by 0.5 m
 
 

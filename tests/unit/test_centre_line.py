@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.calibration.file import RatioIndexPart
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.table import spectrum_table
 from gateway.core.ratio_index.index import (
@@ -19,7 +18,7 @@ from gateway.core.ratio_index.index import (
     mean_spectrum,
 )
 from gateway.core.settings import BatchSettings
-from gateway.offline.batches import batches_of_motion
+from gateway.offline.campaigns import batches_of_motion
 from gateway.records import F64, Batch
 from gateway.sim.drive import constant
 from gateway.sim.road import iso_road
@@ -142,10 +141,6 @@ def test_a_campaign_is_moved_as_a_whole_or_not_at_all() -> None:
     one_silent = spectrum_table(runs(rate, None), 0.3)
     assert one_silent.roll_lever_m == 0.0
     np.testing.assert_array_equal(one_silent.spectra[0], spectrum_table(runs(None, None), 0.3).spectra[0])
-
-
-def test_the_file_keeps_the_lever() -> None:
-    assert RatioIndexPart.of(calibration(-0.3)).for_core().roll_lever_m == -0.3
 
 
 def test_through_the_bus_a_sensor_far_left_tells_what_one_in_the_middle_does() -> None:

@@ -87,6 +87,15 @@ def test_a_change_is_stated_with_the_error_of_two_different_loads() -> None:
 
 
 def test_rules_follow_from_the_vehicle() -> None:
-    rules = Rules.of(Vehicle("van", 1240.0, 2.8, payload_range_kg=(0.0, 450.0)))
+    rules = Rules.of(
+        Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0, payload_range_kg=(0.0, 450.0))
+    )
     assert (rules.range_kg, rules.mass_kg, rules.spread_kg) == (450.0, 1465.0, 112.5)
-    assert Rules.of(Vehicle("van", 1240.0, 2.8, payload_range_kg=(0.0, 1.0))).range_kg == 100.0
+    assert (
+        Rules.of(
+            Vehicle(
+                name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0, payload_range_kg=(0.0, 1.0)
+            )
+        ).range_kg
+        == 100.0
+    )

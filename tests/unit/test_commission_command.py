@@ -59,7 +59,7 @@ def test_what_it_carries_can_be_said_and_reaches_the_vehicle_that_is_fitted(url:
     assert [said[key] for key in ("carries", "payload_length_m", "payload_height_m")] == ["parcels", 2.4, 1.2]
     assert (said["roof_rack"], said["tow_bar"]) == (True, False)
     bench.drive(0)
-    stated = bench.worker.jobs[-1].vehicle.stated
+    stated = bench.worker.jobs[-1].vehicle
     assert (stated.carries, stated.payload_length_m, stated.payload_height_m) == ("parcels", 2.4, 1.2)
     assert (stated.roof_rack, stated.tow_bar, is_said(stated)) == (True, False, True)
     assert run(url, "start", "--carries", "elephants").exit_code == 2

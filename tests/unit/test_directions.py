@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gateway.calibration.half_car.directions import MOST, SCALES, directions_of
+from gateway.calibration.half_car.fit import MOST, SCALES, directions_of
 
 
 def made(n: int, n_loads: int, seed: int) -> tuple[list[np.ndarray], np.ndarray]:

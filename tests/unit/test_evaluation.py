@@ -23,7 +23,15 @@ from gateway.estimate_json import estimate_to_json
 from gateway.posterior import exactly
 from gateway.records import Batch, Why
 
-VAN = Vehicle("van", 1240.0, 2.8, payload_range_kg=(0.0, 400.0), unsprung_front_kg=60.0, unsprung_rear_kg=100.0)
+VAN = Vehicle(
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
+    payload_range_kg=(0.0, 400.0),
+    unsprung_front_kg=60.0,
+    unsprung_rear_kg=100.0,
+)
 BATCH = build_batch(drive(100.0), Window(T0_NS, T0_NS + 100_000_000_000, T0_NS), BatchSettings(window_s=100.0), {})
 
 

@@ -18,9 +18,10 @@ from gateway.estimate import PLACES, Quantity, Weights
 from gateway.posterior import Posterior, Source
 
 VAN = Vehicle(
-    "van",
-    1240.0,
-    2.8,
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
     empty_front_share_pct=57.0,
     empty_front_share_std_pct=0.0,
     track_width_m=1.5,

@@ -17,7 +17,7 @@ from gateway.calibration.inspection import (
 )
 from gateway.calibration.inspection.campaign import load_findings
 from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.inspection.loads import _Labelled, compare_loads
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 from support.bus_drive import bus_drive
 from support.known_load_logs import write_known_loads
 from support.log import names
@@ -15,7 +16,6 @@ from support.power import KilledError, kill_at
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file import CrossSpectrumPart
 from gateway.calibration.inspection import row_facts
 from gateway.calibration.kept import (
     KeptBatch,
@@ -27,13 +27,13 @@ from gateway.calibration.kept import (
     packed,
     unpacked,
 )
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.errors import KeptBatchError
 from gateway.estimate import Estimate
 from gateway.log import Event
-from gateway.offline.batches import read_whole_log
-from gateway.offline.campaigns import calibrate
+from gateway.offline.campaigns import calibrate, read_whole_log
 from gateway.records import Batch, Motion, Why
 from gateway.service.keeper import MOST_WAITING, BatchKeeper
 
@@ -131,8 +131,8 @@ def test_a_fit_from_kept_batches_is_the_fit_from_the_logs_bit_for_bit(tmp_path: 
     assert from_kept.warnings == from_log.warnings
 
 
-def exact(part: CrossSpectrumPart | None) -> str:
-    return "" if part is None else part.model_dump_json()
+def exact(calibration: CrossSpectrumCalibration | None) -> bytes:
+    return TypeAdapter(CrossSpectrumCalibration | None).dump_json(calibration)
 
 
 def test_the_shelf_is_bounded_in_count_and_the_oldest_gives_way(tmp_path: Path, three: list[KeptBatch]) -> None:

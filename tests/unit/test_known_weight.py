@@ -13,8 +13,16 @@ from gateway.posterior import exactly
 from gateway.stated_weight import StatedWeight
 
 AT = "2026-11-21T04:00:00Z"
-VAN = Vehicle("van", 1240.0, 2.8, 52.0, unsprung_front_kg=80.0, unsprung_rear_kg=95.0)
-BARE = Vehicle("van", 1240.0, 2.8, 52.0)
+VAN = Vehicle(
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    empty_front_share_pct=52.0,
+    sensor_position_m=0.0,
+    unsprung_front_kg=80.0,
+    unsprung_rear_kg=95.0,
+)
+BARE = Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, empty_front_share_pct=52.0, sensor_position_m=0.0)
 
 
 @given(payload_kg=st.floats(0.0, 1200.0), position_m=st.floats(0.3, 3.2))

@@ -136,7 +136,7 @@ def test_where_nobody_answers_that_is_said() -> None:
     fault = run("show", "--url", "http://127.0.0.1:1").exception
     assert isinstance(fault, SpringscaleError)
     assert "http://127.0.0.1:1/api/v1/calibration/tare: no service answers there" in str(fault)
-    assert "nobody listens" in str(fault)
+    assert "nothing is listening" in str(fault)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from support.days import (
 from gateway.core.change import change_of, probability
 from gateway.core.events import Ledger
 from gateway.core.events.ledger import SETTLED
-from gateway.core.events.load import load_of, weighings_of
+from gateway.core.loads import load_of, weighings_of
 from gateway.estimate import Estimate, Place, Stop, Watched
 from gateway.posterior import Posterior, Source
 

@@ -5,7 +5,7 @@ import pytest
 
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.database import DatabaseSignal
-from gateway.offline.look.journey import journey_of
+from gateway.offline.look.look import journey_of
 from gateway.offline.look.readings import Reading
 from gateway.records import Signal
 

@@ -12,7 +12,7 @@ from gateway.bus.signals import load_signal_map
 from gateway.calibration.inspection import Severity, row_facts
 from gateway.calibration.inspection.rows import rate_findings
 from gateway.core.settings import BatchSettings
-from gateway.offline.batches import read_whole_log
+from gateway.offline.campaigns import read_whole_log
 from gateway.offline.look import why_silent
 from gateway.records import EXTENDED_ID, Frames, Signal
 from gateway.status import DecodeCount, SignalHealth, State, Status

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import stdtrit
 
-from gateway.calibration.half_car.model_error import (
+from gateway.calibration.half_car.left_out import (
     LEAST_PART,
     PRIOR_RUNS,
     USUAL_CG_LEFT_M,

@@ -20,7 +20,7 @@ from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, 
 from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
 from gateway.cli import springscale
 from gateway.cli.text.plan import plan_sentences, widths_sentence
-from gateway.core.cargo import Carries
+from gateway.core.vehicle import Carries
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError, CampaignError
 from gateway.posterior import exactly
@@ -86,7 +86,7 @@ def test_after_two_runs_a_heavy_load_comes_next(outcome: Outcome) -> None:
     assert plan.drive.duration_s == pytest.approx(200.0, rel=0.01)
 
 
-def test_what_is_known_of_roll_changes_no_plan(outcome: Outcome) -> None:
+def test_what_is_known_of_roll_changes_no_advice_and_widens_no_promise(outcome: Outcome) -> None:
     assert outcome.cross_spectrum is not None
     known = outcome.cross_spectrum.calibration
     roll = prior_of(replace(VAN, track_width_m=1.5), with_roll=True).roll
@@ -102,7 +102,8 @@ def test_what_is_known_of_roll_changes_no_plan(outcome: Outcome) -> None:
     assert [one.load for one in with_roll.advice] == [one.load for one in without.advice]
     assert with_roll.now is not None
     assert without.now is not None
-    assert with_roll.now.payload_std_kg == pytest.approx(without.now.payload_std_kg, rel=1e-3)
+    # a batch whose roll is taken out counts more against the load's shape
+    assert 0.9 * without.now.payload_std_kg < with_roll.now.payload_std_kg < without.now.payload_std_kg
 
 
 def test_a_plan_is_told_in_sentences_and_in_numbers(outcome: Outcome) -> None:
@@ -138,13 +139,14 @@ def test_what_it_costs_to_say_nothing_of_the_loads_is_stated(outcome: Outcome) -
     widths = stated_widths(known, VAN, 14.0)
     assert widths is not None
     assert widths.payload_kg == pytest.approx(0.5 * VAN.payload_range_kg[1])
-    assert widths.compact_kg < widths.now_kg  # whoever says that loads are like the known ones gains
+    for one in widths.carries.values():  # spread goods are weighed too low by who takes them for compact ones
+        assert one.unsaid.payload_kg < one.said.payload_kg < widths.payload_kg
     said = replace(VAN, carries=Carries.PARCELS)
     assert stated_widths(known, said, 14.0) is None
     text = widths_sentence(widths)
-    assert f"± {widths.now_kg:.0f} kg (95 %)" in text
-    assert f"± {widths.carries_kg[Carries.PARCELS]:.0f} with parcels" in text
-    assert set(json.loads(json.dumps(widths.to_json()))["carries_kg"]) == {"pallets", "parcels", "long_goods", "tools"}
+    parcels = widths.carries[Carries.PARCELS]
+    assert f"{parcels.unsaid.payload_kg:.0f} ± {parcels.unsaid.half_width_kg:.0f} kg with parcels" in text
+    assert set(json.loads(json.dumps(widths.to_json()))["carries"]) == {"pallets", "parcels", "long_goods", "tools"}
 
 
 def test_without_the_half_car_there_is_no_plan(outcome: Outcome) -> None:

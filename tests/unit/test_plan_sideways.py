@@ -7,7 +7,7 @@ from support.half_car_road import VAN, batch_over_road
 
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan import Advice, Expected, LoadPlan, PlacedLoad, SidewaysLoad
-from gateway.calibration.plan.sideways import sideways_load
+from gateway.calibration.plan.plan import sideways_load
 from gateway.cli.text.plan import plan_sentences
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.reports.calibration.runs import plan_section

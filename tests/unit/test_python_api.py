@@ -62,7 +62,7 @@ def test_every_public_name_is_there_and_told_in_the_page() -> None:
 
 def test_arrays_are_weighed_as_rows_of_a_bus_are(motion: Motion, calibration: gateway.CalibrationFile) -> None:
     flow = Flow(gateway.BatchSettings(), {}, calibration.for_core(), "cross_spectrum", Identity())
-    told = [*flow.feed(motion), *flow.flush()]
+    told = [one for one in (*flow.feed(motion), *flow.flush()) if not one.is_remainder]
     found = gateway.estimate_arrays(motion.t_ns / 1e9, *motion.columns.T, calibration, estimator="cross_spectrum")
     assert len(found) > 0
     assert [gateway.estimate_to_json(each) for each in found] == [gateway.estimate_to_json(each) for each in told]
@@ -71,7 +71,7 @@ def test_arrays_are_weighed_as_rows_of_a_bus_are(motion: Motion, calibration: ga
 def test_a_roll_rate_is_welcome_and_must_fit(motion: Motion, calibration: gateway.CalibrationFile) -> None:
     roll_rate = 0.01 * np.sin(motion.t_ns / 1e9)
     told = gateway.estimate_arrays(motion.t_ns / 1e9, *motion.columns.T, calibration, roll_rate_radps=roll_rate)
-    assert [each.t_end_ns for each in told] == [300_000_000_000, int(motion.t_ns[-1])]
+    assert [each.t_end_ns for each in told] == [300_000_000_000]
     with pytest.raises(ArraysError, match="shapes"):
         gateway.estimate_arrays(motion.t_ns / 1e9, *motion.columns.T, calibration, roll_rate_radps=roll_rate[1:])
 

@@ -13,9 +13,10 @@ from gateway.estimate import Z95, Weight, Weights
 from gateway.posterior import Posterior
 
 VAN = Vehicle(
-    "van",
-    1240.0,
-    2.8,
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
     unsprung_front_kg=80.0,
     unsprung_rear_kg=80.0,
     gross_limit_kg=2000.0,

@@ -23,8 +23,8 @@ from support.signing import Signer
 from support.web import Gateway, Server, serving
 
 from gateway.calibration.commissioning import Result
-from gateway.calibration.file import CrossSpectrumPart
 from gateway.config import Settings, load_settings
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.errors import ConfigurationError
 from gateway.log import LOGGER, set_log_level
@@ -185,7 +185,7 @@ def test_systemd_is_told_when_a_reload_begins(tmp_path: Path) -> None:
 
 def with_half_car() -> Result:
     """A fit as a commissioning makes it; what the half-car's parameters are is no matter here."""
-    part = CrossSpectrumPart(
+    part = CrossSpectrumCalibration(
         empty_mass_kg=1240.0,
         empty_front_share_pct=50.0,
         wheelbase_m=2.8,

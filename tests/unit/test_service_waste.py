@@ -20,7 +20,15 @@ from gateway.setup import setup_of
 from gateway.status import Status
 from gateway.web import Board, Scales, weigh_latest
 
-VAN = Vehicle("van", 1240.0, 2.8, unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1500.0)
+VAN = Vehicle(
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
+    unsprung_front_kg=90.0,
+    unsprung_rear_kg=110.0,
+    gross_limit_kg=1500.0,
+)
 
 
 def test_each_estimate_is_weighed_once_however_often_the_weights_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

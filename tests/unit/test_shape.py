@@ -12,6 +12,7 @@ from gateway.core.cross_spectrum.shape import (
     SHAPE_EVIDENCE,
     Node,
     Shaped,
+    Waypoint,
     shaped,
 )
 from gateway.posterior import NORMAL_TAILS
@@ -33,10 +34,10 @@ def weighed(evidence: float, best: float, std: float, prior: ShapePrior | None =
 
     def weighed_as(log_s: float, start: F64) -> Node:
         x = np.r_[log_s - MEAN, 300.0 + SLOPE[0] * (log_s - MEAN), 0.5 + SLOPE[1] * (log_s - MEAN)]
-        return Node(x, 0.5 * ((log_s - best) / std) ** 2, x, own_std_kg=1.0)
+        return Node(Waypoint(log_s, x, np.r_[1.0, SLOPE]), 0.5 * ((log_s - best) / std) ** 2, x, own_std_kg=1.0)
 
     start = log(NODES_PER_WHEELBASE2[2] * WHEELBASE_M**2)
-    return shaped(prior or gaussian(), WHEELBASE_M, (start, np.zeros(3)), weighed_as, evidence)
+    return shaped(prior or gaussian(), WHEELBASE_M, Waypoint(start, np.zeros(3), np.zeros(3)), weighed_as, evidence)
 
 
 def test_without_evidence_the_prior_is_left() -> None:

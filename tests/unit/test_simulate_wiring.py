@@ -10,7 +10,7 @@ from gateway.bus.logs import motion_of_log, write_candump
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.offline.batches import batches_of_motion, read_whole_log
+from gateway.offline.campaigns import batches_of_motion, read_whole_log
 from gateway.records import EXTENDED_ID, Motion, Signal
 from gateway.sim.drive import Drive, constant
 from gateway.sim.road import PaperRoad

@@ -64,7 +64,14 @@ def test_nothing_known_makes_no_probability(kg: float, std_kg: float, limit_kg: 
 
 
 def test_what_is_stated_stands_before_the_vehicles_own() -> None:
-    vehicle = Vehicle("v", 1240.0, 2.8, gross_limit_kg=2000.0, rear_axle_limit_kg=1100.0)
+    vehicle = Vehicle(
+        name="v",
+        empty_mass_kg=1240.0,
+        wheelbase_m=2.8,
+        sensor_position_m=0.0,
+        gross_limit_kg=2000.0,
+        rear_axle_limit_kg=1100.0,
+    )
     limited = Limits(gross_limit_kg=1900.0, front_wheel_limit_kg=500.0).on(vehicle)
     assert Limits.of(limited) == Limits(gross_limit_kg=1900.0, rear_axle_limit_kg=1100.0, front_wheel_limit_kg=500.0)
     assert Limits().on(vehicle) == vehicle

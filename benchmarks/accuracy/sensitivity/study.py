@@ -19,7 +19,7 @@ from benchmarks.accuracy.sensitivity.constants import CONSTANTS, FACTORS, Acts, 
 from benchmarks.accuracy.vans import FreshVan, OnVan, fresh_van, of_each_van
 from gateway.calibration.half_car import known_spectra
 from gateway.calibration.inspection.axes import apart_findings, phase_findings, phases
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.inspection.loads import compare_loads
 from gateway.calibration.judgement import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import rankdata
 
+from gateway.calibration.trend import around_the_median, pair_slopes, variance_of_s
 from gateway.estimate import Z95
 from gateway.records import F64, Bool
 
@@ -40,13 +41,11 @@ def trend_of(x: F64, y: F64) -> Trend | None:
     n = len(x)
     if n < LEAST_POINTS:
         return None
-    first, second = np.triu_indices(n, 1)
-    rises = y[second] - y[first]
-    slopes = np.sort(rises / (x[second] - x[first]))
+    slopes = pair_slopes(x, y)
     slope = float(np.median(slopes))
-    std = math.sqrt(_variance_of_s(y) * _repeated(y - slope * x))
-    low, high = _around_the_median(slopes, Z95 * std)
-    return Trend(slope, low, high, _chance(float(np.sign(rises).sum()), std), n)
+    std = math.sqrt(variance_of_s(x, y) * _repeated(y - slope * x))
+    low, high = around_the_median(slopes, Z95 * std)
+    return Trend(slope, low, high, _chance(float(np.sign(slopes).sum()), std), n)
 
 
 def believed(p: Sequence[float]) -> Bool:
@@ -62,13 +61,6 @@ def believed(p: Sequence[float]) -> Bool:
     if below.size:
         chosen[order[: below[-1] + 1]] = True
     return chosen
-
-
-def _variance_of_s(y: F64) -> float:
-    """Of Kendall's S where there is no trend, with its correction for ties."""
-    n = len(y)
-    _, ties = np.unique(y, return_counts=True)
-    return float(n * (n - 1) * (2 * n + 5) - np.sum(ties * (ties - 1) * (2 * ties + 5))) / 18.0
 
 
 def _repeated(left: F64) -> float:
@@ -88,13 +80,6 @@ def _repeated(left: F64) -> float:
     lags = np.arange(1, n - 2)
     counts = (n - lags) * (n - lags - 1.0) * (n - lags - 2.0) * alike**lags
     return 1.0 + 2.0 / (n * (n - 1.0) * (n - 2.0)) * float(np.sum(counts))
-
-
-def _around_the_median(slopes: F64, reach: float) -> tuple[float, float]:
-    """The slopes that lie ``reach`` ranks of S to either side; the outermost where that is beyond them."""
-    m = len(slopes)
-    low, high = math.floor((m - reach) / 2.0), math.ceil((m + reach) / 2.0)
-    return float(slopes[max(0, low - 1)]), float(slopes[min(m - 1, high)])
 
 
 def _chance(s: float, std: float) -> float:

@@ -1,13 +1,14 @@
 """The vehicle that follows from what a fitter typed, and from what its line says of all its vehicles."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any, Final
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from gateway.calibration.axle_weights import AxleWeights, sprung_of
-from gateway.calibration.campaign import VehicleTable
+from gateway.core.vehicle import Vehicle
 from gateway.errors import CampaignError
 from gateway.stated import VehicleAnswers
 from gateway.toml_file import describe_faults
@@ -24,20 +25,22 @@ OF_THE_LINE: Final = (
 )
 """What the vehicles of a line share beside what a fit inherits: taken from it where nothing else is said."""
 
+_VEHICLE: Final = TypeAdapter(Vehicle)
+
 NO_LINE: Final[Mapping[str, Any]] = MappingProxyType({})
 
 
-def vehicle_table(said: VehicleAnswers, name: str, of_the_line: Mapping[str, Any] = NO_LINE) -> VehicleTable:
+def vehicle_table(said: VehicleAnswers, name: str, of_the_line: Mapping[str, Any] = NO_LINE) -> Vehicle:
     """[vehicle] of a campaign; ``name`` where none was typed. Raises CampaignError in words for people."""
     if (said.empty_mass_kg is None) != (said.empty_front_share_pct is None):
         raise CampaignError("empty_mass_kg and empty_front_share_pct belong together: give both or neither")
-    typed = said.model_dump(exclude_none=True, exclude={"division_kg"})
+    typed = {name: answer for name, answer in asdict(said).items() if answer is not None and name != "division_kg"}
     weights = AxleWeights(
         said.kerb_front_axle_kg, said.kerb_rear_axle_kg, said.unsprung_front_kg, said.unsprung_rear_kg
     )
     try:
         sprung = sprung_of(weights, said.division_kg)
         named = {"name": said.name.strip() or name}
-        return VehicleTable.model_validate(sprung.vehicle_keys() | dict(of_the_line) | typed | named)
+        return _VEHICLE.validate_python(sprung.vehicle_keys() | dict(of_the_line) | typed | named)
     except ValidationError as fault:
-        raise CampaignError(describe_faults("the vehicle that follows", fault, VehicleTable)) from None
+        raise CampaignError(describe_faults("the vehicle that follows", fault, Vehicle)) from None

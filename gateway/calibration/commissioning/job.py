@@ -5,7 +5,7 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from gateway.calibration.campaign import VehicleTable
+from gateway.core.vehicle import Vehicle
 from gateway.stated.doubt import Doubt
 
 JOB: Final = "job.json"
@@ -30,7 +30,7 @@ class Drive(_Table):
 class Job(_Table):
     """Look at the drives, and fit them too where ``is_fit``; ``like`` are files of sister vehicles or of their line."""
 
-    vehicle: VehicleTable
+    vehicle: Vehicle
     drives: tuple[Drive, ...] = Field(min_length=1)
     settings: dict[str, Any]
     like: tuple[Path, ...] = ()

@@ -6,12 +6,12 @@ Nothing has been driven here: what a drive says of the same answers is in ``gate
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from math import inf
 from types import MappingProxyType
 from typing import Any, Final
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from gateway.calibration.axle_weights import AxleWeights, sprung_of
 from gateway.errors import CampaignError
@@ -78,6 +78,7 @@ class LineFacts:
 
 
 NO_LINE: Final = LineFacts()
+_ANSWERS: Final = TypeAdapter(VehicleAnswers)
 
 
 def doubts_of(said: VehicleAnswers, line: LineFacts = NO_LINE) -> tuple[Doubt, ...]:
@@ -96,7 +97,7 @@ def _meant(said: VehicleAnswers, line: LineFacts) -> dict[str, Any]:
     """The answers after which no doubt is left; empty where no single slip explains it."""
     for changed in _candidates(said):
         try:
-            fresh = VehicleAnswers.model_validate(said.model_dump(exclude_unset=True) | changed)
+            fresh = _ANSWERS.validate_python(asdict(replace(said, **changed)))
         except ValidationError:
             continue
         if next(_checked(fresh, line), None) is None and _has_wheelbase_of(line, fresh):

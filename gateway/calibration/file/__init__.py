@@ -7,42 +7,28 @@ from.
 
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.file.check import Check, check_against_campaign
-from gateway.calibration.file.comparison import Difference, differences
-from gateway.calibration.file.figures import Figure, figures_of
-from gateway.calibration.file.line_file import LikeFile, LineFile, SiblingPart, line_of_files, load_like
-from gateway.calibration.file.line_part import LinePart
-from gateway.calibration.file.parts import (
-    CrossSpectrumPart,
-    ExpectedErrorsPart,
-    ProvenancePart,
-    RatioIndexPart,
-    RegressionPart,
-    RunPart,
-    SeenPart,
-    VehiclePart,
-)
+from gateway.calibration.file.comparison import Difference, Figure, differences, figures_of
+from gateway.calibration.file.line_file import LikeFile, LineFile, SiblingPart, load_like
+from gateway.calibration.file.line_part import EvidencePart, LinePart
+from gateway.calibration.file.parts import ExpectedErrorsPart, ProvenancePart, RunPart, SeenPart
 
 __all__ = [
     "CalibrationFile",
     "Check",
-    "CrossSpectrumPart",
     "Difference",
+    "EvidencePart",
     "ExpectedErrorsPart",
     "Figure",
     "LikeFile",
     "LineFile",
     "LinePart",
     "ProvenancePart",
-    "RatioIndexPart",
-    "RegressionPart",
     "RunPart",
     "SeenPart",
     "SiblingPart",
-    "VehiclePart",
     "check_against_campaign",
     "differences",
     "figures_of",
-    "line_of_files",
     "load_calibration",
     "load_like",
 ]

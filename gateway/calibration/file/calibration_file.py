@@ -3,44 +3,38 @@
 import hashlib
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from gateway.calibration.file.line_part import LinePart
-from gateway.calibration.file.parts import (
-    CrossSpectrumPart,
-    ExpectedErrorsPart,
-    Part,
-    ProvenancePart,
-    RatioIndexPart,
-    SeenPart,
-    VehiclePart,
-)
+from gateway.calibration.file.parts import ExpectedErrorsPart, Part, ProvenancePart, SeenPart
 from gateway.calibration.file.sane import absurd
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
+from gateway.core.ratio_index.index import RatioIndexCalibration
+from gateway.core.ratio_index.regression import TERMS
 from gateway.core.vehicle import Vehicle
-from gateway.errors import CalibrationFileError, LineError, UntrustedFileError
+from gateway.errors import CalibrationFileError, UntrustedFileError
 from gateway.files.signed import Read
+from gateway.schema import check_shapes
 from gateway.toml_file import describe_faults
-
-if TYPE_CHECKING:
-    from gateway.calibration.line import Sister
 
 Content = dict[str, Any]
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 8
+VERSION: Final = 9
 
 
 class CalibrationFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-calibration"] = FORMAT
-    version: Literal[8] = VERSION
-    vehicle: VehiclePart
+    version: Literal[9] = VERSION
+    vehicle: Vehicle
     seen: SeenPart
-    cross_spectrum: CrossSpectrumPart | None = None
-    ratio_index: RatioIndexPart | None = None
+    cross_spectrum: CrossSpectrumCalibration | None = None
+    ratio_index: RatioIndexCalibration | None = None
     line: LinePart | None = Field(
         None, description="what sister vehicles told before it was driven; null: its own drives are all that it knows"
     )
@@ -49,6 +43,18 @@ class CalibrationFile(Part):
     )
     warnings: tuple[str, ...] = ()
     provenance: ProvenancePart
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        known = self.cross_spectrum
+        if known is not None:
+            n = len(known.names)
+            check_shapes(
+                parameters=(known.parameters, (n,)),
+                covariance=(known.covariance, (n, n)),
+                directions=(known.directions, (n, known.directions.shape[-1])),
+            )
+        return self
 
     @property
     def id(self) -> str:
@@ -61,27 +67,30 @@ class CalibrationFile(Part):
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
     def for_core(self) -> CalibratedVehicle:
-        """What the estimators need of it."""
+        """What the estimators need of it. Raises as :meth:`require_known` does."""
+        self.require_known()
         return CalibratedVehicle(
             id=self.id,
-            vehicle=Vehicle(**dict(self.vehicle)),
+            vehicle=self.vehicle,
             payload_seen_kg=self.seen.payload_kg,
             front_share_seen_pct=self.seen.front_share_pct,
-            ratio_index=self.ratio_index.for_core() if self.ratio_index else None,
-            cross_spectrum=self.cross_spectrum.for_core() if self.cross_spectrum else None,
+            ratio_index=self.ratio_index,
+            cross_spectrum=self.cross_spectrum,
         )
 
-    def sister(self) -> "Sister":
-        """What it tells of other vehicles of its line. Raises LineError where it holds no half-car."""
-        from gateway.calibration.line import Sister  # noqa: PLC0415 # a service reads, and loads nothing that fits
-
-        if self.cross_spectrum is None:
-            raise LineError(
-                f"{self.vehicle.name} ({self.id}): holds no cross_spectrum calibration, of which alone a line is made: "
-                "calibrate it again without --estimator ratio_index"
+    def require_known(self) -> None:
+        """Raises CalibrationFileError where the model has other parameters, or a regression other terms, today."""
+        if self.cross_spectrum and self.cross_spectrum.names not in (PARAMETERS, PARAMETERS + ROLL_PARAMETERS):
+            raise CalibrationFileError(
+                "the cross_spectrum part was fitted with another vehicle model than this springscale has: "
+                "calibrate again"
             )
-        line = self.line.for_core() if self.line else None
-        return Sister(self.id, Vehicle(**dict(self.vehicle)), self.cross_spectrum.for_core(), line)
+        regressions = (self.ratio_index.payload, self.ratio_index.front_share) if self.ratio_index else ()
+        unknown = sorted({term for one in regressions if one for term in one.terms} - set(TERMS))
+        if unknown:
+            raise CalibrationFileError(f"regression terms {unknown} are not known to this version of springscale")
+        if self.line is not None:
+            self.line.require_known()
 
     @property
     def estimators(self) -> tuple[str, ...]:
@@ -120,9 +129,7 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
         )
     try:
         held = CalibrationFile.model_validate({key: part for key, part in content.items() if key != "id"})
-        held.for_core()  # a term or a model of another springscale is told here, with the file's name
-        if held.line is not None:
-            held.line.require_known()
+        held.require_known()
         if (fault := absurd(held)) is not None:
             raise CalibrationFileError(fault)
     except CalibrationFileError as fault:

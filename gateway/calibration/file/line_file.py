@@ -1,9 +1,8 @@
 """The line file: what ``springscale line build`` makes of several calibration files, and ``--like`` takes."""
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 from pydantic import Field, ValidationError
 
@@ -16,15 +15,12 @@ from gateway.calibration.file.calibration_file import (
 )
 from gateway.calibration.file.line_part import LinePart
 from gateway.calibration.file.parts import ExpectedErrorsPart, Part
-from gateway.errors import CalibrationFileError, LineError
+from gateway.errors import CalibrationFileError
 from gateway.files.signed import Read
 from gateway.toml_file import describe_faults
 
-if TYPE_CHECKING:
-    from gateway.calibration.line import Line
-
 LINE_FORMAT: Final = "springscale-line"
-LINE_VERSION: Final = 3
+LINE_VERSION: Final = 4
 
 
 class SiblingPart(Part):
@@ -40,7 +36,7 @@ class LineFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-line"] = LINE_FORMAT
-    version: Literal[3] = LINE_VERSION
+    version: Literal[4] = LINE_VERSION
     software: str
     siblings: tuple[SiblingPart, ...] = Field(min_length=1)
     line: LinePart
@@ -87,19 +83,3 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
     return held
-
-
-def line_of_files(files: Sequence[LikeFile]) -> "Line":
-    """The line that these make together: calibrations of sister vehicles, and at most one line file.
-
-    Raises LineError where they make none.
-    """
-    from gateway.calibration.line import line_of  # noqa: PLC0415 # a service reads, and loads nothing that fits
-
-    lines = [one.line.for_core() for one in files if isinstance(one, LineFile)]
-    if len(lines) > 1:
-        raise LineError(
-            "two line files: whether their vehicles are of one line is for you to say: build one line of all "
-            "calibrations with `springscale line build`"
-        )
-    return line_of([one.sister() for one in files if isinstance(one, CalibrationFile)], *lines)

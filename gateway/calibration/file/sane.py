@@ -85,12 +85,6 @@ _COVARIANCE: Final = "symmetric and positive definite"
 _REGRESSIONS: Final = ("ratio_index.payload", "ratio_index.front_share")
 
 BOUNDS: Final = (
-    Bound("vehicle.empty_mass_kg", "between 10 kg and 100 t", _between(10.0, 1e5)),
-    Bound("vehicle.wheelbase_m", "between 0.3 and 20 m", _between(0.3, 20.0)),
-    Bound("vehicle.empty_front_share_pct", "between 0 and 100 %", _between(0.0, 100.0)),
-    Bound("vehicle.sensor_position_m", "within 30 m of the front axle", _between(-30.0, 30.0)),
-    Bound("vehicle.payload_range_kg", _LOADS, _rising(-1e5, 1e5, is_strict=True)),
-    Bound("vehicle.front_share_range_pct", _SHARES, _rising(0.0, 100.0, is_strict=True)),
     Bound("seen.payload_kg", _LOADS, _rising(-1e5, 1e5)),
     Bound("seen.front_share_pct", _SHARES, _rising(0.0, 100.0)),
     Bound("seen.speed_mps", _SPEEDS, _rising(1e-3, 100.0)),
@@ -100,8 +94,6 @@ BOUNDS: Final = (
     Bound("cross_spectrum.band_hz", "two frequencies up to 100 Hz, rising", _rising(1e-3, 100.0, is_strict=True)),
     Bound("cross_spectrum.parameters", "within +-50", _between(-50.0, 50.0)),
     Bound("cross_spectrum.covariance", _COVARIANCE, _covariance),
-    Bound("cross_spectrum.payload_inflation", "below 1000", _between(0.0, 1e3)),
-    Bound("cross_spectrum.front_share_inflation", "below 1000", _between(0.0, 1e3)),
     Bound("cross_spectrum.payload_seen_kg", _LOADS, _rising(-1e5, 1e5)),
     Bound("cross_spectrum.front_share_seen_pct", _SHARES, _rising(0.0, 100.0)),
     Bound("cross_spectrum.speed_seen_mps", _SPEEDS, _rising(1e-3, 100.0)),

@@ -11,10 +11,9 @@ from gateway.calibration.half_car.fit import (
     fit_cross_spectrum,
     half_car_calibration,
 )
-from gateway.calibration.half_car.inherited import Inherited
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
 from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
-from gateway.calibration.half_car.prior import Prior, prior_of
+from gateway.calibration.half_car.prior import Inherited, Prior, prior_of
 
 __all__ = [
     "CrossSpectrumFit",

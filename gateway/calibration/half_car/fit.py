@@ -17,13 +17,10 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car.directions import directions_of
-from gateway.calibration.half_car.inherited import Inherited
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
-from gateway.calibration.half_car.left_out import MISFIT_MARGIN, LeftOut, left_out_errors, limits_shown_by
-from gateway.calibration.half_car.model_error import model_error
+from gateway.calibration.half_car.left_out import MISFIT_MARGIN, LeftOut, left_out_errors, limits_shown_by, model_error
 from gateway.calibration.half_car.most_probable_vehicle import fit_vehicle, seen_by
-from gateway.calibration.half_car.prior import Prior, can_roll, prior_of
+from gateway.calibration.half_car.prior import Inherited, Prior, can_roll, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import moves_of, weigh
@@ -35,6 +32,22 @@ from gateway.core.cross_spectrum.search import Found
 from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Why
+
+MOST: Final = 8  # they carry 98 % and more of the variance of payload; the rest counts as the model's
+SCALES: Final = np.array([10.0, 0.2, 0.005])  # kg, %, m: what counts as equally much
+
+
+def directions_of(moves: Sequence[F64], covariance: F64) -> F64:
+    """(n, k) with independent causes of unit variance as columns, from ``moves``: (d, n) each, by how much payload
+    (kg), front share (%) and lateral place (m) of some load move with each of the n parameters.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    rows = np.concatenate([one / SCALES[: len(one), None] for one in moves])
+    _, _, directions = np.linalg.svd(rows @ root, full_matrices=False)
+    found: F64 = root @ directions[:MOST].T
+    return found
+
 
 LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
 SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
@@ -208,8 +221,8 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         known_loads=tuple(run.load for run in runs),
         usual_log_amplitude=reading.usual_log_amplitude,
         track_width_m=vehicle.track_width_m,
-        sensor_left_m=vehicle.sensor_offset_left_m,
-        sensor_left_std_m=vehicle.sensor_offset_left_std_m,
+        sensor_left_m=vehicle.sensor_left_m,
+        sensor_left_std_m=vehicle.sensor_left_std_m,
         least_slack=known[0].whittle.ground.least_slack,
         usual_stroke_mps=reading.usual_stroke_mps,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),

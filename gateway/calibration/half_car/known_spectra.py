@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car.usual import Usual
+from gateway.calibration.inheritance import Usual
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle

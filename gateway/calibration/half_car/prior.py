@@ -8,12 +8,14 @@ against measured cars.
 
 from dataclasses import dataclass
 from math import log, pi
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from gateway.calibration.axle_weights import ESTIMATED_UNSPRUNG_STD, UNSPRUNG_SHARE, WEIGHED_STD
+from gateway.calibration.inheritance import Usual
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import BEND_SHARES, INDEX, PARAMETERS, ROLL_PARAMETERS
 from gateway.core.cross_spectrum.model.usual_roll import usual_roll
 from gateway.core.vehicle import Vehicle
@@ -123,7 +125,7 @@ def can_roll(vehicle: Vehicle) -> bool:
     An unknown lever arm cannot be read off the roll itself: suspension mounts and the body bring roll into the
     acceleration that no lever arm of the sensor explains (docs/method.md).
     """
-    return vehicle.track_width_m is not None and vehicle.sensor_offset_left_std_m <= MOST_OFFSET_STD_M
+    return vehicle.track_width_m is not None and vehicle.sensor_left_std_m <= MOST_OFFSET_STD_M
 
 
 def prior_of(vehicle: Vehicle, *, with_roll: bool = False) -> Prior:
@@ -144,7 +146,7 @@ def _roll(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
     usual = usual_roll(vehicle.empty_mass_kg, vehicle.track_width_m)
     return {name: (mean, _ROLL_STD[name]) for name, mean in usual.items()} | {
         "noise_roll_rate_rad2ps": (log(NOISE_PITCH_RATE_RAD2PS), _LOG_STD["noise"]),
-        "sensor_left_m": (vehicle.sensor_offset_left_m, vehicle.sensor_offset_left_std_m),
+        "sensor_left_m": (vehicle.sensor_left_m, vehicle.sensor_left_std_m),
         "empty_left_m": (vehicle.empty_cg_left_m, EMPTY_LEFT_STD_M),
     }
 
@@ -185,3 +187,20 @@ def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
         f"spring_slope_{end}_per_kn": (0.03 / scale, SLOPE_STD_PER_KN / scale),
         **{f"spring_bend_{end}_{i}_per_kn": (0.0, BEND_STD_PER_KN / scale) for i in range(len(BEND_SHARES))},
     }
+
+
+class Inherited(Protocol):
+    """What vehicles of the same line say before a fit starts (calibration.line)."""
+
+    @property
+    def usual(self) -> Usual:
+        """How much its vehicles usually moved."""
+
+    def prior_of(self, vehicle: Vehicle, *, with_roll: bool) -> Prior:
+        """Of one of its vehicles that has not been driven yet."""
+
+    def on(self, calibration: CrossSpectrumCalibration, *, is_tested: bool) -> CrossSpectrumCalibration:
+        """``calibration`` of one of its vehicles, valid where the line is, with the line's limits.
+
+        Where runs of its own that were left out ``is_tested``, its limits are the wider of both.
+        """

@@ -6,14 +6,11 @@ rows, axes and signs, and loads are asked in this order; a fault keeps its run o
 ``explained`` holds the words and the advice for every kind of finding, docs/findings.md is made from it.
 """
 
-from gateway.calibration.inspection.campaign import inspect_campaign
-from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
-from gateway.calibration.inspection.inspection import Inspection
-from gateway.calibration.inspection.kinds import Kind
-from gateway.calibration.inspection.log import LogFacts
+from gateway.calibration.inspection.campaign import Inspection, inspect_campaign
+from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
+from gateway.calibration.inspection.log import LogFacts, SplitRun
 from gateway.calibration.inspection.roll import offset_findings, unmapped_roll_findings
 from gateway.calibration.inspection.rows import RowFacts, row_facts
-from gateway.calibration.inspection.split_run import SplitRun
 
 __all__ = [
     "Finding",

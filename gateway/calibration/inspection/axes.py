@@ -20,8 +20,7 @@ import numpy as np
 from gateway.calibration.half_car import KnownSpectra, fit_half_car, prior_of
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import COHERENCE_BAND_HZ
 from gateway.core.cross_spectrum.measured import CrossSpectra

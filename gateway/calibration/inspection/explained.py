@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from gateway.calibration.inspection.finding import Explained, Finding, Severity, Topic
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Explained, Finding, Kind, Severity, Topic
 from gateway.calibration.inspection.sensors_explained import SENSORS_EXPLAINED
 
 EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(

@@ -15,8 +15,7 @@ import numpy as np
 
 from gateway.calibration.half_car import KnownSpectra, fit_half_car, half_car_calibration, known_spectra, prior_of
 from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.located import locate

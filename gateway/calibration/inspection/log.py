@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind
-from gateway.records import Signal
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
+from gateway.calibration.inspection.rows import RowFacts
+from gateway.calibration.known_run import KnownRun
+from gateway.records import Batch, Signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,3 +57,29 @@ def _is_same_drive(one: LogFacts, other: LogFacts) -> bool:
     if not one.sha256 or one.sha256 != other.sha256 or one.span_ns is None or other.span_ns is None:
         return False
     return one.span_ns[0] < other.span_ns[1] and other.span_ns[0] < one.span_ns[1]
+
+
+@dataclass(frozen=True, slots=True)
+class SplitRun:
+    """One drive's two parts, either of which may hold no batch, with the facts of its rows and of its log.
+
+    has_identification is False where the campaign keeps the whole drive for validation. Only what identifies can spoil
+    a calibration, so facts, batches and run are of that part alone, and of validation only where there is no other:
+    judging a calibration shall not change it.
+    """
+
+    identification: KnownRun
+    validation: KnownRun
+    facts: RowFacts = field(default_factory=RowFacts)
+    has_identification: bool = True
+    log: LogFacts = field(default_factory=LogFacts)
+
+    @property
+    def batches(self) -> tuple[Batch, ...]:
+        """Those to inspect."""
+        return (self.identification if self.has_identification else self.validation).batches
+
+    @property
+    def run(self) -> KnownRun:
+        """The part to inspect."""
+        return self.identification if self.has_identification else self.validation

@@ -13,8 +13,7 @@ import numpy as np
 
 from gateway.calibration.half_car.known_spectra import N_SEGMENT
 from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.core.spectrum import BAND_HZ, frequencies_hz, segment_starts, segment_transforms
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Z95
@@ -140,7 +139,7 @@ def unmapped_roll_findings(entry: str | None) -> Iterator[Finding]:
 
 def offset_findings(vehicle: Vehicle) -> Iterator[Finding]:
     """A sensor whose place to the side nobody measured."""
-    std_m = vehicle.sensor_offset_left_std_m
+    std_m = vehicle.sensor_left_std_m
     if std_m > HARDLY_KNOWN_M:
-        text = f"sensor_offset_left_m is {vehicle.sensor_offset_left_m:g} ± {Z95 * std_m:.2g} m (95 %)"
+        text = f"sensor_offset_left_m is {vehicle.sensor_left_m:g} ± {Z95 * std_m:.2g} m (95 %)"
         yield finding_of(Kind.SENSOR_OFFSET_UNKNOWN, Severity.NOTE, text)

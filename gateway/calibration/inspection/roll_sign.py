@@ -61,7 +61,7 @@ def roll_sign_of(runs: Sequence[KnownRun], vehicle: Vehicle) -> RollSign | None:
         return RollSign(signs.pop(), "; ".join(one.why for one in told))
     if told:
         return RollSign(0, f"{told[0].why}, but {told[1].why}: one of them is stated wrong")
-    offset_m, std_m = vehicle.sensor_offset_left_m, vehicle.sensor_offset_left_std_m
+    offset_m, std_m = vehicle.sensor_left_m, vehicle.sensor_left_std_m
     sits = f"the sensor sits {offset_m:g} ± {Z95 * std_m:.2g} m left of the centre line"
     return RollSign(0, f"{sits}, and no load is known to lie far enough to one side")
 
@@ -77,8 +77,8 @@ def _rolled(run: KnownRun, vehicle: Vehicle) -> Rolled | None:
 
 def _by_sensor(runs: Sequence[Rolled], vehicle: Vehicle) -> RollSign | None:
     """The lever arm, less what the loads do to it, beside the sensor's stated place."""
-    offset_m = vehicle.sensor_offset_left_m
-    if abs(offset_m) < max(LEAST_OFFSET_M, LEAST_SCORE * vehicle.sensor_offset_left_std_m):
+    offset_m = vehicle.sensor_left_m
+    if abs(offset_m) < max(LEAST_OFFSET_M, LEAST_SCORE * vehicle.sensor_left_std_m):
         return None
     stds_m = [hypot(LEVER_STD_M, BY_CG * run.cg_left_std_m, BY_CG_STD * run.cg_left_m) for run in runs]
     weights = np.array(stds_m) ** -2

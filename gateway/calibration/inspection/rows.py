@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE, Traits
 from gateway.core.settings import BatchSettings
 from gateway.core.timeline import sample_rate_hz

@@ -20,9 +20,8 @@ from gateway.calibration.inspection.axes import (
     reading_of,
 )
 from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, RunVerdict, Severity
-from gateway.calibration.inspection.kinds import Kind
-from gateway.calibration.inspection.log import log_findings
+from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
+from gateway.calibration.inspection.log import SplitRun, log_findings
 from gateway.calibration.inspection.roll import (
     ROLL,
     RollSpectra,
@@ -41,7 +40,6 @@ from gateway.calibration.inspection.rows import (
     stands_still_but_shakes,
     unmapped_findings,
 )
-from gateway.calibration.inspection.split_run import SplitRun
 from gateway.core.batch import REASON_SHARE_MIN
 from gateway.core.cross_spectrum.measured import LEAST_SEGMENTS, CrossSpectra, cross_spectra_of
 from gateway.core.settings import BatchSettings

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from gateway.calibration.inspection.finding import Explained, Severity, Topic
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Explained, Kind, Severity, Topic
 
 SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
     {

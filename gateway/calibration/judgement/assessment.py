@@ -7,9 +7,10 @@ from enum import StrEnum
 from gateway.budget import BudgetLine, budget_of, typical_budget
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
-from gateway.calibration.file import CalibrationFile, RegressionPart
+from gateway.calibration.file import CalibrationFile
 from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
 from gateway.core.cargo import is_said
+from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
 
 
@@ -121,7 +122,7 @@ def _dof(file: CalibrationFile, estimator: str) -> dict[Target, float]:
     """The ratio index's intervals are a regression's."""
     if estimator != "ratio_index" or file.ratio_index is None:
         return {}
-    models: dict[Target, RegressionPart | None] = {
+    models: dict[Target, RegressionModel | None] = {
         "payload": file.ratio_index.payload,
         "front_share": file.ratio_index.front_share,
     }

@@ -14,7 +14,7 @@ from scipy.special import gammainc
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import RunVerdict, Severity
-from gateway.calibration.inspection.kinds import Kind
+from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement, Part
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Target, TargetErrors

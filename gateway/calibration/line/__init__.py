@@ -5,12 +5,10 @@ Each sister's drives are evidence of the line; scatter between vehicles blurs it
 in turn tell how far intervals must be widened (``with_siblings_left_out``).
 """
 
-from gateway.calibration.half_car.limits import Limits
-from gateway.calibration.half_car.usual import Usual
+from gateway.calibration.inheritance import Limits, Seen, Usual
 from gateway.calibration.line.evidence import Evidence
 from gateway.calibration.line.left_out import Sibling, TestedLine, with_siblings_left_out
 from gateway.calibration.line.line import Line, Sister, line_of
-from gateway.calibration.line.seen import Seen
 
 __all__ = [
     "Evidence",

@@ -19,13 +19,16 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS
-from gateway.calibration.half_car.limits import Limits
 from gateway.calibration.half_car.prior import Prior, prior_of
-from gateway.calibration.half_car.usual import Usual
+from gateway.calibration.inheritance import Limits, Seen, Usual
 from gateway.calibration.line.evidence import Evidence
-from gateway.calibration.line.scatter import SCATTER_DOF, default_scatter_std, is_inherited
-from gateway.calibration.line.seen import Seen
-from gateway.calibration.line.siblings import LEAST_SIBLINGS, scatter_found
+from gateway.calibration.line.scatter import (
+    LEAST_SIBLINGS,
+    SCATTER_DOF,
+    default_scatter_std,
+    is_inherited,
+    scatter_found,
+)
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS, has_roll, upright
 from gateway.core.vehicle import Vehicle

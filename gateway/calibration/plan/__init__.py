@@ -8,9 +8,8 @@ the half-car's covariance (``Design``) among the loads that the vehicle may carr
 
 from gateway.calibration.plan.design import Design, Spread
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, weighed_loads
-from gateway.calibration.plan.plan import Advice, Expected, LoadPlan, plan_first, plan_next, usual_drive
+from gateway.calibration.plan.plan import Advice, Expected, LoadPlan, SidewaysLoad, plan_first, plan_next, usual_drive
 from gateway.calibration.plan.saying import StatedWidths, stated_widths
-from gateway.calibration.plan.sideways import SidewaysLoad
 
 __all__ = [
     "Advice",

@@ -8,6 +8,7 @@ of five-minute batches over the loads the vehicle carries, with every source of 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any, Final
@@ -17,21 +18,66 @@ import numpy as np
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.half_car import Inherited, Prior, prior_of
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
-from gateway.calibration.half_car.model_error import model_error
+from gateway.calibration.half_car.left_out import model_error
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import BATCH_S, Design
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
-from gateway.calibration.plan.sideways import SidewaysLoad, sideways_load
 from gateway.core.cargo import shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, upright
 from gateway.core.cross_spectrum.predicted import predicted
-from gateway.core.vehicle import Load, Vehicle, front_share_pct
+from gateway.core.vehicle import Load, Vehicle, cg_left_m, front_share_pct
+from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError
-from gateway.posterior import Source
+from gateway.estimate import Quantity
+from gateway.posterior import Source, exactly
 from gateway.records import F64
 from gateway.units import NS_PER_S
+
+LEAST_CG_LEFT_M: Final = 0.03  # of the sprung mass: what a load somewhere near the middle may do by chance
+TRACK_PART: Final = 0.25  # of the track width: as far to one side as a heavy load mostly goes between wheel arches
+USUAL_TRACK_M: Final = 1.5
+PLACE_STEP_M: Final = 0.05
+EVEN: Final = 0.5  # part of a sideways moment that the front axle takes, where nobody knows it
+
+
+@dataclass(frozen=True, slots=True)
+class SidewaysLoad:
+    """A load with its centre payload_left_m left of the centre line."""
+
+    load: PlacedLoad
+    payload_left_m: float
+
+
+def sideways_load(runs: Sequence[KnownRun], vehicle: Vehicle) -> SidewaysLoad | None:
+    """The heaviest load that may be driven well to one side, near the middle lengthwise.
+
+    None without a roll rate, where a run has carried such a load, or where limits allow none.
+    """
+    if all(batch.roll_rate_radps is None for run in runs for batch in run.batches) or _has_sideways(runs, vehicle):
+        return None
+    left_m = round(round(TRACK_PART * (vehicle.track_width_m or USUAL_TRACK_M) / PLACE_STEP_M) * PLACE_STEP_M, 6)
+    placed = [SidewaysLoad(load, left_m) for load in drivable_loads(vehicle) if load.payload_kg > 0.0]
+    allowed = [one for one in placed if _is_allowed(vehicle, one)]
+    middle_pct = vehicle.empty_front_share_pct
+    return max(
+        allowed, key=lambda one: (one.load.payload_kg, -abs(one.load.front_share_pct - middle_pct)), default=None
+    )
+
+
+def _has_sideways(runs: Sequence[KnownRun], vehicle: Vehicle) -> bool:
+    noted_m = [cg_left_m(vehicle, run.payload_kg, run.payload_left_m) for run in runs if run.payload_left_m is not None]
+    return any(abs(left_m - vehicle.empty_cg_left_m) >= LEAST_CG_LEFT_M for left_m in noted_m)
+
+
+def _is_allowed(vehicle: Vehicle, placed: SidewaysLoad) -> bool:
+    """Limits of single wheels; those of axles and gross weight hold already."""
+    at_m = cg_left_m(vehicle, placed.load.payload_kg, placed.payload_left_m)
+    load = exactly(placed.load.payload_kg, placed.load.front_share_pct, at_m)
+    weights = weights_of(vehicle, load, Quantity(EVEN, 0.0))
+    return not any(weight.is_over_limit for _, weight in weights.items())
+
 
 FIRST_DRIVE: Final = Drive(600.0, 50.0 / 3.6)
 N_FIRST: Final = 4

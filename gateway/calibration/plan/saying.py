@@ -1,34 +1,45 @@
-"""What it costs that nobody said what the vehicle carries: the width of a weight now, and once it is said.
+"""What it costs that nobody said what the vehicle carries: what one batch would state now, and once it is said.
 
-stated_widths(calibration, vehicle, speed_mps) -> half-widths in kg, as the service would state them for one batch
+stated_widths(calibration, vehicle, speed_mps) -> payload and half-width in kg, by kind of goods
 """
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 from gateway.calibration.plan.design import BATCH_S
-from gateway.core.cargo import Carries, is_said, shape_prior
+from gateway.core.cargo import ShapePrior, is_said, shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.predicted import predicted
-from gateway.core.vehicle import Load, Vehicle, front_share_pct
+from gateway.core.vehicle import Carries, Load, Vehicle, front_share_pct
 from gateway.posterior import PAYLOAD
 
 TYPICAL_PART: Final = 0.5  # of the most payload
 TYPICAL_PLACE: Final = 0.5  # of the wheelbase, behind the front axle
-COMPACT_LENGTH_M: Final = 0.8  # one pallet's, as an example of a length that is said
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """The payload that one batch states, and half its 95 % interval."""
+
+    payload_kg: float
+    half_width_kg: float
+
+
+@dataclass(frozen=True, slots=True)
+class StatedOf:
+    """What it states under goods of one kind: while nothing is said of them, and once it is said."""
+
+    unsaid: Stated
+    said: Stated
 
 
 @dataclass(frozen=True, slots=True)
 class StatedWidths:
-    """Half the 95 % interval (kg) of one batch under ``payload_kg``, amid the wheelbase: with what is said of the loads
-    now, with each kind of goods that ``carries`` may name, and with a payload_length_m of 0.8.
-    """
+    """What it states under ``payload_kg`` amid the wheelbase, by each kind of goods that ``carries`` may name."""
 
     payload_kg: float
-    now_kg: float
-    carries_kg: dict[Carries, float]
-    compact_kg: float
+    carries: dict[Carries, StatedOf]
 
     def to_json(self) -> dict[str, Any]:
         """Plain numbers."""
@@ -36,21 +47,23 @@ class StatedWidths:
 
 
 def stated_widths(known: CrossSpectrumCalibration, vehicle: Vehicle, speed_mps: float) -> StatedWidths | None:
-    """None where the fitter said what the vehicle carries, or where one load alone was driven."""
+    """Of a load of each kind's median shape. None where the fitter said what the vehicle carries, or where one load
+    alone was driven.
+    """
     if is_said(vehicle) or known.payload_seen_kg[0] == known.payload_seen_kg[1]:
         return None
     payload_kg = TYPICAL_PART * vehicle.payload_range_kg[1]
     load = Load(payload_kg, front_share_pct(vehicle, payload_kg, TYPICAL_PLACE * vehicle.wheelbase_m))
+    drive = Drive(BATCH_S, speed_mps)
+    nothing_said = shape_prior(vehicle, *known.known_shape)
 
-    def half_width_kg(said: Vehicle) -> float:
-        prior = shape_prior(said, *known.known_shape)
-        low, high = predicted(known, prior, load, Drive(BATCH_S, speed_mps)).quantity(PAYLOAD).interval95
-        return 0.5 * (high - low)
+    def stated(prior: ShapePrior, log_s: float) -> Stated:
+        payload = predicted(known, prior, load, drive, log_s).quantity(PAYLOAD)
+        low, high = payload.interval95
+        return Stated(payload.number, 0.5 * (high - low))
 
-    kinds = [kind for kind in Carries if kind is not Carries.MIXED]
-    return StatedWidths(
-        payload_kg=payload_kg,
-        now_kg=half_width_kg(vehicle),
-        carries_kg={kind: half_width_kg(replace(vehicle, carries=kind)) for kind in kinds},
-        compact_kg=half_width_kg(replace(vehicle, payload_length_m=COMPACT_LENGTH_M)),
-    )
+    def stated_of(kind: Carries) -> StatedOf:
+        said = shape_prior(replace(vehicle, carries=kind), *known.known_shape)
+        return StatedOf(stated(nothing_said, said.median), stated(said, said.median))
+
+    return StatedWidths(payload_kg, {kind: stated_of(kind) for kind in Carries if kind is not Carries.MIXED})

@@ -1,8 +1,8 @@
-"""The choice of bands, and of terms where these are not fixed, by errors on runs left out."""
+"""The choice of bands, and of a structure where none is named, by errors on runs left out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -14,33 +14,44 @@ from gateway.calibration.ratio_index.regression import (
     scaled_design,
     without_each_run,
 )
-from gateway.calibration.ratio_index.stepwise import Selection, select_stepwise
-from gateway.calibration.ratio_index.structures import Family, terms_of
 from gateway.calibration.ratio_index.table import SpectrumTable
-from gateway.core.ratio_index.regression import RegressionModel
+from gateway.core.ratio_index.regression import (
+    MODEL_9_PAYLOAD,
+    MODEL_10_FRONT_SHARE,
+    MODEL_11_FRONT_SHARE,
+    MODEL_11_PAYLOAD,
+    RegressionModel,
+)
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 
-N_STEPWISE: Final = 12  # pairs of pairs, the best with both logarithms, worth a stepwise choice
+Family = Literal["single", "log", "joint"]
+StructureChoice = Literal["auto", "single", "log", "joint"]
+
+TERMS_OF: Final[dict[Family, tuple[tuple[str, ...], tuple[str, ...]]]] = {  # of payload, of front share
+    "single": (MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE),  # each target from its own index
+    "log": (("log_ra", "log_rg"), ("log_ra", "log_rg")),  # ours: linear in both logarithms
+    "joint": (MODEL_11_PAYLOAD, MODEL_11_FRONT_SHARE),
+}
+"""The structures, in the order in which they are tried: of equals the earlier is taken."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
     """Bands, and one family's regressions of payload and of front share on them, None where there is none.
 
-    ``selections`` tell how stepwise ones came about. ``score`` is the sum of mean square errors on runs left
-    out of the regressions, the bands given, as shares of the ranges of (12).
+    ``score`` is the sum of mean square errors on runs left out of the regressions, the bands given, as shares of the
+    ranges of (12).
     """
 
     family: Family
     pairs: Pairs
     regressions: tuple[FittedRegression | None, FittedRegression | None]
-    selections: tuple[Selection, Selection]
     score: float
 
     @property
-    def is_told(self) -> tuple[bool, bool]:
-        """Whether it tells payload, and front share."""
+    def answers(self) -> tuple[bool, bool]:
+        """Whether it has a regression of payload, and of front share."""
         return self.regressions[0] is not None, self.regressions[1] is not None
 
     @property
@@ -50,13 +61,13 @@ class Choice:
         return payload.model if payload else None, front_share.model if front_share else None
 
     def predict(self, table: SpectrumTable) -> tuple[F64, F64]:
-        """Answers and their standard deviations (2, n) for the table's batches; NaN where none is told."""
+        """Answers and their standard deviations (2, n) for the table's batches; NaN where it has no regression."""
         shown = list(zip(*indexes(table, self.pairs), strict=True))
-        told = np.full((2, len(shown), 2), np.nan)
+        found = np.full((2, len(shown), 2), np.nan)
         for target, model in enumerate(self.models):
             if model is not None:
-                told[target] = [model.predict(float(ra), float(rg))[:2] for ra, rg in shown]
-        return told[..., 0], told[..., 1]
+                found[target] = [model.predict(float(ra), float(rg))[:2] for ra, rg in shown]
+        return found[..., 0], found[..., 1]
 
 
 def choose(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, vehicle: Vehicle) -> Choice | None:
@@ -64,14 +75,23 @@ def choose(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, ve
 
     None where these runs cannot carry a regression of this family.
     """
-    scores = _scores(table, candidates, "log" if family == "stepwise" else family, vehicle)
-    if family != "stepwise":
-        best = int(np.argmin(scores))
-        return _choice_on(table, candidates[best], family, vehicle) if np.isfinite(scores[best]) else None
-    finalists = [candidates[int(i)] for i in np.argsort(scores, kind="stable")[:N_STEPWISE]]
-    choices = [_choice_on(table, pairs, family, vehicle) for pairs in finalists]
-    carried = [choice for choice in choices if choice is not None]
-    return min(carried, key=lambda choice: (-sum(choice.is_told), choice.score), default=None)
+    scores = _scores(table, candidates, family, vehicle)
+    best = int(np.argmin(scores))
+    return _choice_on(table, candidates[best], family, vehicle) if np.isfinite(scores[best]) else None
+
+
+def terms_of(family: Family, target: int, table: SpectrumTable) -> tuple[str, ...]:
+    """The terms of payload (target 0) or front share (1); none where the campaign is too small for them.
+
+    A regression needs its sensors, two runs more than terms, and three different front shares where the share is the
+    target or both indexes take part.
+    """
+    absent = {index for index, spectra in zip(("ra", "rg"), table.spectra, strict=True) if spectra is None}
+    terms = TERMS_OF[family][target]
+    used = {index for index in ("ra", "rg") if any(index in term for term in terms)}
+    needs_shares = target == 1 or len(used) > 1
+    is_enough = table.n_runs >= len(terms) + 2 and (table.n_shares >= 3 or not needs_shares)
+    return terms if is_enough and not used & absent else ()
 
 
 def spans_of(vehicle: Vehicle) -> tuple[float, float]:
@@ -84,20 +104,15 @@ def _choice_on(table: SpectrumTable, pairs: Pairs, family: Family, vehicle: Vehi
     """One family's regressions with given bands; None where there is none."""
     ra, rg = indexes(table, pairs)
     regressions: list[FittedRegression | None] = []
-    selections: list[Selection] = []
     score = 0.0
     for target, (known, span) in enumerate(zip(table.targets, spans_of(vehicle), strict=True)):
-        terms, selection = terms_of(family, target, table), Selection()
-        if terms and family == "stepwise":
-            selection = select_stepwise(terms, ra, rg, known, table.run)
-            terms = selection.terms
+        terms = terms_of(family, target, table)
         regression = fit_regression(terms, ra, rg, known, table.run) if terms else None
         regressions.append(regression)
-        selections.append(selection)
         if regression is not None:
             score += (float(np.sqrt(np.mean(regression.held_out_errors**2))) / span) ** 2
-    choice = Choice(family, pairs, (regressions[0], regressions[1]), (selections[0], selections[1]), score)
-    return choice if any(choice.is_told) else None
+    choice = Choice(family, pairs, (regressions[0], regressions[1]), score)
+    return choice if any(choice.answers) else None
 
 
 def _scores(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, vehicle: Vehicle) -> F64:

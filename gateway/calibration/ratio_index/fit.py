@@ -16,8 +16,7 @@ from scipy.special import stdtrit
 
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import BandChoice, Pairs, candidates
-from gateway.calibration.ratio_index.choice import Choice, choose, spans_of
-from gateway.calibration.ratio_index.structures import FAMILIES, Family, StructureChoice
+from gateway.calibration.ratio_index.choice import TERMS_OF, Choice, Family, StructureChoice, choose, spans_of
 from gateway.calibration.ratio_index.table import N_SEGMENT, SPECTRUM, SpectrumTable, spectrum_table
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
@@ -88,8 +87,8 @@ def fit_ratio_index(
 
     ``progress`` is called with (steps done, steps in all).
     """
-    table = spectrum_table(runs, vehicle.sensor_offset_left_m)
-    trials = _family_trials(table, vehicle, bands, FAMILIES if structure == "auto" else (structure,), progress)
+    table = spectrum_table(runs, vehicle.sensor_left_m)
+    trials = _family_trials(table, vehicle, bands, tuple(TERMS_OF) if structure == "auto" else (structure,), progress)
     chosen = trials[0]
     batches = [batch for run in runs for batch in run.batches if not batch.rejected]
     speeds_mps = [batch.mean_speed_mps for batch in batches]
@@ -189,10 +188,10 @@ def _trial(table: SpectrumTable, folds: Sequence[Fold], choice: Choice, vehicle:
 
 
 def _rank(trial: FamilyTrial, vehicle: Vehicle) -> tuple[int, bool, float]:
-    parts = zip(trial.nested_rms, spans_of(vehicle), trial.choice.is_told, strict=True)
-    score = sum((rms / span) ** 2 for rms, span, is_told in parts if is_told)
+    parts = zip(trial.nested_rms, spans_of(vehicle), trial.choice.answers, strict=True)
+    score = sum((rms / span) ** 2 for rms, span, answers in parts if answers)
     is_nested = bool(np.isfinite(score))
-    return -sum(trial.choice.is_told), not is_nested, score if is_nested else trial.choice.score
+    return -sum(trial.choice.answers), not is_nested, score if is_nested else trial.choice.score
 
 
 def _widening(model: RegressionModel | None, trial: FamilyTrial, target: int) -> float | None:
@@ -208,7 +207,7 @@ def _widening(model: RegressionModel | None, trial: FamilyTrial, target: int) ->
 def _models_without(trial: FamilyTrial, table: SpectrumTable) -> dict[int, tuple[Pairs, Models]]:
     """By run number, bands and regressions that did not see that run."""
     choice = trial.choice
-    if np.isfinite(trial.nested_error[list(choice.is_told)]).all():
+    if np.isfinite(trial.nested_error[list(choice.answers)]).all():
         return {number: (again.pairs, again.models) for number, again in trial.without.items()}
     places = dict(zip(table.number.tolist(), table.run.tolist(), strict=True))
     return {

@@ -11,7 +11,7 @@ from gateway.cli.asked.service import Service, asks_service
 from gateway.cli.options import FILE, NUMBER, as_json
 from gateway.cli.text.commission import doubts_text, lines_text, progress_text, state_text, underway_text
 from gateway.cli.text.progress import StatusLine
-from gateway.core.cargo import Carries
+from gateway.core.vehicle import Carries
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.files.signed import signature_path
 from gateway.records import json_line

@@ -142,5 +142,8 @@ def _said(refusal: urllib.error.HTTPError) -> str:
 def _why(fault: Exception) -> str:
     reason = getattr(fault, "reason", fault)
     if isinstance(reason, ConnectionRefusedError):
-        return "nobody listens: is it running? With another calibration it begins anew, within seconds"
+        return (
+            "nothing is listening there: is the service running? "
+            "With a new calibration it restarts, which takes a few seconds"
+        )
     return str(reason)

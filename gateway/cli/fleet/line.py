@@ -5,10 +5,10 @@ from pathlib import Path
 
 import click
 
-from gateway.calibration.build_line import build_line
 from gateway.calibration.campaign import Campaign, file_sha256, load_campaign
 from gateway.calibration.file import CalibrationFile, LineFile, load_calibration, load_like
 from gateway.calibration.known_run import KnownRun
+from gateway.calibration.line_files import build_line
 from gateway.cli.options import FILE, as_json, batch_settings
 from gateway.cli.text.line import line_text
 from gateway.cli.text.progress import Steps, counted

@@ -7,7 +7,7 @@ import click
 from gateway.cli.estimate import prepared, with_known_weights
 from gateway.cli.options import FILE, as_json, one_estimator, window
 from gateway.cli.text.events import entry_sentence
-from gateway.offline.events import entries_of_logs, require_order
+from gateway.offline.estimates import entries_of_logs, require_order
 from gateway.records import json_line
 
 

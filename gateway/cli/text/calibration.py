@@ -1,6 +1,7 @@
 """A calibration file for people to read."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 
 from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, Figure, LinePart, figures_of
 
@@ -24,19 +25,19 @@ def calibration_text(held: CalibrationFile) -> str:
 
 
 def _vehicle(held: CalibrationFile) -> Iterator[str]:
-    for name, stated in held.vehicle.model_dump(mode="json").items():
+    for name, stated in asdict(held.vehicle).items():
         if stated is not None:
             yield f"{name:28}{_plain(stated)}"
 
 
 def _plain(stated: object) -> str:
-    if isinstance(stated, list):
+    if isinstance(stated, tuple):
         return " to ".join(map(_plain, stated))
     return f"{stated:g}" if isinstance(stated, float) else str(stated)
 
 
 def _ranges(held: CalibrationFile) -> Iterator[str]:
-    for name, span in held.seen.model_dump(mode="json").items():
+    for name, span in held.seen.model_dump().items():
         yield f"{name:28}{'unknown' if span is None else f'{span[0]:.4g} to {span[1]:.4g}'}"
 
 

@@ -36,7 +36,8 @@ def _run_line(one: SplitRun, verdict: RunVerdict) -> str:
     batches = [batch for part in (one.identification, one.validation) for batch in part.batches if not batch.rejected]
     n_identifying = sum(not batch.rejected for batch in one.identification.batches)
     seconds = sum(batch.usable_share * batch.duration_s for batch in batches)
-    driven = f"{n_identifying} batches identify, {len(batches) - n_identifying} validate, {seconds:.0f} s can be used"
+    n_validating = len(batches) - n_identifying
+    driven = f"{n_identifying} batches for fitting, {n_validating} for validation, {seconds:.0f} s can be used"
     words = "left out" if not verdict.is_usable else "sound" if not verdict.findings else "usable"
     load = f"{one.identification.payload_kg:g} kg"
     return f"run {verdict.number} {verdict.name} ({load}): {words}; {driven}"

@@ -28,12 +28,15 @@ def plan_sentences(plan: LoadPlan) -> str:
 
 
 def widths_sentence(widths: StatedWidths) -> str:
-    """What saying what the vehicle carries would bring."""
-    kinds = ", ".join(f"± {width:.0f} with {kind}" for kind, width in widths.carries_kg.items())
+    """What it costs that nobody said what the vehicle carries."""
+    kinds = ", ".join(
+        f"{one.unsaid.payload_kg:.0f} ± {one.unsaid.half_width_kg:.0f} kg with {kind} "
+        f"({one.said.payload_kg:.0f} ± {one.said.half_width_kg:.0f} once said)"
+        for kind, one in widths.carries.items()
+    )
     return (
-        f"Nobody said what the vehicle carries: it states a load of {widths.payload_kg:g} kg to ± {widths.now_kg:.0f} "
-        f"kg (95 %). Say it in [vehicle]: carries would make it {kinds}, payload_length_m = 0.8 "
-        f"± {widths.compact_kg:.0f}."
+        f"Nobody said what the vehicle carries. One batch would state a load of {widths.payload_kg:g} kg as {kinds}; "
+        "± values are 95 % intervals. Say it in [vehicle]: carries, or payload_length_m and payload_height_m."
     )
 
 

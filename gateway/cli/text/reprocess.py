@@ -3,9 +3,8 @@
 from typing import Final
 
 from gateway.archive.inventory import Forecast
-from gateway.archive.reprocess import Summary
+from gateway.archive.reprocess import Progress, Summary
 from gateway.archive.run import Status
-from gateway.archive.turns import Progress
 from gateway.words import counted
 
 MOST_TOLD: Final = 10  # failures, one line each; the data set has them all

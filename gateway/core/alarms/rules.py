@@ -60,9 +60,9 @@ class AlarmRules:
     def of_probability(self, probability: float, n_batches: int) -> Verdict:
         """``probability`` is what all ``n_batches`` of a load together give; NaN where nothing is known.
 
-        Final: enough batches are sure together. Early: they are nearly so, or a single one is. Over: they say rather no
-        than yes, by as much as is between the two probabilities, so that a weight about its limit does not make the
-        alarm come and go.
+        Final: enough batches are sure together. Early: they are nearly so, or a single one is. Ended: they say rather
+        no than yes, by as much as is between the two probabilities, so that a weight about its limit does not make
+        the alarm come and go.
         """
         if math.isnan(probability):
             return Verdict.HOLD

@@ -1,18 +1,24 @@
 """What the cross-spectral estimator knows of a vehicle: the half-car that its known-load drives taught."""
 
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Final
 
 import numpy as np
+from annotated_types import Ge, Gt
 
-from gateway.core.cross_spectrum.model.parameters import INDEX, LEAST_SLACK, Ground, mount_of
+from gateway.core.cross_spectrum.model.parameters import INDEX, LEAST_SLACK, PARAMETERS, Ground, mount_of
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
 from gateway.core.weights import Unsprung
 from gateway.estimate import Quantity
 from gateway.records import F64
+from gateway.schema import STRICT
 
 SCORE: Final = 6.0  # six standard deviations are no chance; a calibration that shows more of its own allows more
+
+Positive = Annotated[float, Gt(0.0)]
+NonNegative = Annotated[float, Ge(0.0)]
+_POSITIVE: Final = {"gt": 0.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,40 +37,54 @@ class CrossSpectrumCalibration:
     usual_stroke_mps: see model.reading; None too where no roll rate was read.
     """
 
-    empty_mass_kg: float
+    __pydantic_config__ = STRICT
+
+    empty_mass_kg: float = field(metadata=_POSITIVE)
     empty_front_share_pct: float
-    wheelbase_m: float
+    wheelbase_m: float = field(metadata=_POSITIVE)
     band_hz: tuple[float, float]
-    n_segment: int
+    n_segment: int = field(metadata={"ge": 64, "le": 65_536})
     names: tuple[str, ...]
     parameters: F64
     covariance: F64
     directions: F64
-    model_std: tuple[float, float, float]
-    misfit_limit: float
-    acceleration_rms_mps2: float
-    pitch_rate_rms_radps: float
+    model_std: tuple[NonNegative, NonNegative, NonNegative]
+    misfit_limit: float = field(metadata=_POSITIVE)
+    acceleration_rms_mps2: float = field(metadata=_POSITIVE)
+    pitch_rate_rms_radps: float = field(metadata=_POSITIVE)
     payload_seen_kg: tuple[float, float]
     front_share_seen_pct: tuple[float, float]
     speed_seen_mps: tuple[float, float]
     warnings: tuple[str, ...] = ()
     known_loads: tuple[Load, ...] = ()
-    model_per_reach: tuple[float, float] = (0.0, 0.0)
+    model_per_reach: tuple[NonNegative, NonNegative] = (0.0, 0.0)
     usual_log_amplitude: float | None = None
-    gravity_mps2: float | None = None
-    most_position_score: float = SCORE
-    most_noise_score: float = SCORE
-    track_width_m: float | None = None
+    gravity_mps2: float | None = field(default=None, metadata=_POSITIVE)
+    most_position_score: float = field(default=SCORE, metadata=_POSITIVE)
+    most_noise_score: float = field(default=SCORE, metadata=_POSITIVE)
+    track_width_m: float | None = field(default=None, metadata=_POSITIVE)
     sensor_left_m: float = 0.0
-    sensor_left_std_m: float = UNKNOWN_OFFSET_STD_M
-    least_slack: float = LEAST_SLACK
-    usual_stroke_mps: tuple[float, float] | None = None
+    sensor_left_std_m: float = field(default=UNKNOWN_OFFSET_STD_M, metadata=_POSITIVE)
+    least_slack: float = field(default=LEAST_SLACK, metadata=_POSITIVE)
+    usual_stroke_mps: tuple[Positive, Positive] | None = None
 
     @property
     def ground(self) -> Ground:
         """The vehicle as stated, in the core's terms."""
         share = self.empty_front_share_pct / 100.0
         return Ground(self.empty_mass_kg, share, self.wheelbase_m, self.track_width_m, self.least_slack)
+
+    @property
+    def upright(self) -> "CrossSpectrumCalibration":
+        """What it says of a vehicle that only heaves and pitches."""
+        n = len(PARAMETERS)
+        return replace(
+            self,
+            names=self.names[:n],
+            parameters=self.parameters[:n],
+            covariance=self.covariance[:n, :n],
+            directions=self.directions[:n],
+        )
 
     @property
     def known_shape(self) -> tuple[float, float]:

@@ -160,18 +160,29 @@ class Whittle:
     def _curvature(self, point: Point, free: Sequence[int]) -> Curvature:
         z = self._whitened(point)
         slopes = spectral_slopes(point.theta, point.loaded, self.ground, self.spectra, free, (z.model, z.driven))
-        d = z.by(slopes)
-        root_n = np.sqrt(self._n)
-        shape = _traceless(d) * root_n
-        residual = _traceless(z.seen) * (self._p / z.trace) * root_n
-        rows = np.moveaxis(shape, 1, 0).reshape(shape.shape[1], -1)
-        together = _sum(d.auto * z.seen.auto[:, None])
-        together = together + 2.0 * _sum(np.real(d.cross * np.conj(z.seen.cross)[:, None]))
-        level_gradient, level_information = self._level_curvature(z, -together / z.trace)
+        d = self._by_part(z) @ slopes
+        level, root_w, x = _centred(np.log(z.trace / self._p)), np.sqrt(self._level_weight), self._slope
+        along, stiffness = np.sum(root_w**2 * x * level), np.sum(root_w**2 * x * x) + ROAD_SLOPE_STD**-2
+        d[:, :, -1] -= d[:, :, -1].mean(axis=1, keepdims=True)
+        d[:, :, -1] *= root_w[:, None]
+        d_along = np.tensordot(root_w * x, d[:, :, -1], 2)
+        shape = _traceless(z.seen) * (-self._p / z.trace * np.sqrt(self._n))
+        residual = np.stack([*shape, root_w * level], axis=-1)
+        rows = d.reshape(-1, len(free))
         return Curvature(
-            gradient=level_gradient - rows @ residual.ravel(),
-            information=level_information + rows @ rows.T,
+            gradient=residual.ravel() @ rows - along / stiffness * d_along,
+            information=rows.T @ rows - np.outer(d_along, d_along) / stiffness,
         )
+
+    def _by_part(self, z: _Whitened) -> F64:
+        """(b, m, p^2, p^2) by how much the whitened matrix, its shape first and then minus the logarithm of its level,
+        changes with each part of the matrix; the shape by the root of what it counts.
+        """
+        units = z.by(SpectralMatrix.units(self._p))
+        together = _sum(units.auto * z.seen.auto[:, None])
+        together = together + 2.0 * _sum(np.real(units.cross * np.conj(z.seen.cross)[:, None]))
+        rows = np.concatenate([_traceless(units) * np.sqrt(self._n), -together[None] / z.trace])
+        return np.ascontiguousarray(rows.transpose(2, 3, 0, 1))
 
     def _whitened(self, point: Point) -> _Whitened:
         """Solved once for a point: a search asks for the cost and then for the slopes."""
@@ -189,15 +200,6 @@ class Whittle:
         along, stiffness = _over_all(w * x * level), np.sum(w * x * x) + ROAD_SLOPE_STD**-2
         of_level = 0.5 * (_over_all(w * level**2) - along**2 / stiffness)
         return np.asarray(_over_all(self._n * shape) + of_level, np.float64)
-
-    def _level_curvature(self, z: _Whitened, d_level: F64) -> tuple[F64, F64]:
-        level, d = _centred(np.log(z.trace / self._p)), _centred(d_level)
-        w, x = self._level_weight, self._slope
-        along, stiffness = np.sum(w * x * level), np.sum(w * x * x) + ROAD_SLOPE_STD**-2
-        d_along = np.sum(w * x * d, axis=(1, 2))
-        gradient = np.sum(w * level * d, axis=(1, 2)) - along * d_along / stiffness
-        rows = (d * np.sqrt(w)).reshape(len(d), -1)
-        return gradient, rows @ rows.T - np.outer(d_along, d_along) / stiffness
 
 
 def _sum(x: F64) -> F64:

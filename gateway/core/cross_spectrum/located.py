@@ -21,12 +21,12 @@ from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ, Sideways, s
 from gateway.core.cross_spectrum.lateral.unseen import sideways_columns
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Curvature, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra
-from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll, level, upright
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll, level
 from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.cross_spectrum.packing import Packing, packings
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
-from gateway.core.cross_spectrum.shape import EVIDENCE, EVIDENCE_WITHOUT_ROLL, Node, Shaped, shaped
+from gateway.core.cross_spectrum.shape import EVIDENCE, EVIDENCE_WITHOUT_ROLL, Node, Shaped, Waypoint, shaped
 from gateway.core.vehicle import Load
 from gateway.posterior import NORMAL_TAILS, Source
 from gateway.records import F64
@@ -118,7 +118,7 @@ def locate(
         unseen = sideways_columns(whittle.spectra, as_known, calibration, weigh)
         return replace(located, columns={**located.columns, Source.SIDEWAYS: unseen})
     placed = replace(calibration, parameters=level(calibration.parameters))
-    _, peak = _best(spectra.without_roll, replace(calibration, parameters=upright(calibration.parameters)))
+    _, peak = _best(spectra.without_roll, calibration.upright)
     moving = _moving(spectra, peak.found.x, placed)
     whittle = Whittle(moving.without_roll, calibration.ground)
     rolling = Whittle(moving.within(ROLL_BAND_HZ), calibration.ground)
@@ -196,9 +196,15 @@ def answer_at(
     steady = np.zeros((len(along), len(STEADY)))
     steady[:, free] = along @ np.linalg.inv(narrowing)  # S_posterior S^-1
     by_noise = along @ posterior * evidence
-    at_peak = whittle.cost(point) + 0.5 * float(off @ DRIFT_PRECISION @ off)
+    to_peak = -covariance @ pull
+    at_peak = whittle.cost(point) + 0.5 * float(off @ DRIFT_PRECISION @ off + pull @ to_peak)
     return Answer(
-        whole, covariance, at_peak + gained + narrowed, along @ step, steady, by_noise @ information @ by_noise.T
+        whole=whole,
+        covariance=covariance,
+        cost=at_peak + gained + narrowed,
+        shift=to_peak + along @ step,
+        steady=steady,
+        own=by_noise @ information @ by_noise.T,
     )
 
 
@@ -236,13 +242,17 @@ def _shaped(
     def weighed_as(log_s: float, start: F64) -> Node:
         of_shape = _with_gyration(calibration, log_s)
         found = _sought(whittle, start, peak.packing, of_shape, cg_left_m, OF_SHAPES)
-        point = _point(found.x, of_shape, cg_left_m)
+        point = _point(found.near, of_shape, cg_left_m)
         at = answer_at(whittle, point, of_shape, expected, evidence, is_shape_known=False)
+        ended = Waypoint(log_s, found.x, -at.covariance @ at.whole.information[FITTED, _GYRATION])
         own_std_kg = float(np.sqrt(at.covariance[-2, -2]))
-        return Node(found.x, at.cost, found.x + at.shift, own_std_kg, found.is_converged)
+        return Node(ended, at.cost, found.near + at.shift, own_std_kg, found.is_converged)
 
     mode_hz = float(np.exp(peak.found.x[DRIFTING.index(INDEX["payload_mode_hz"])]))
-    start = float(calibration.parameters[_GYRATION]), peak.found.x
+    point = _point(peak.found.near, calibration, cg_left_m)
+    across = whittle.curvature(point, [*weighed(point), _GYRATION]).information[:-1, -1]
+    known_log_s = float(calibration.parameters[_GYRATION])
+    start = Waypoint(known_log_s, peak.found.x, -peak.found.covariance @ across)
     return shaped(prior, calibration.wheelbase_m, start, weighed_as, evidence * min(1.0, (mode_hz / FIRM_HZ) ** 2))
 
 

@@ -16,13 +16,15 @@ MOST_HALVINGS = 10
 class Found:
     """Solution x (k,), its cost and its posterior covariance (k, k) by Laplace's approximation.
 
-    ``is_converged`` is false where the steps ran out, or none lowered a cost that was still falling.
+    near (k,) is where the last curvature was taken, from where one small step led to x. ``is_converged`` is false where
+    the steps ran out, or none lowered a cost that was still falling.
     """
 
     x: F64
     cost: float
     covariance: F64
     is_converged: bool
+    near: F64
 
 
 def most_probable(
@@ -36,30 +38,33 @@ def most_probable(
     """Minimise cost(x) + (x - mean)' precision (x - mean) / 2 from ``start`` (k,).
 
     Where ``prior_precision`` (k, k) is zero the prior is flat. Steps are damped (Levenberg 1944) until they help; the
-    search ends when a step gains less than ``tolerance``, which is nothing against one unit of evidence.
+    search ends with a step that gains less than ``tolerance``, which is nothing against one unit of evidence.
     """
 
     def total(x: F64) -> float:
         return cost(x) + 0.5 * float((x - prior_mean) @ prior_precision @ (x - prior_mean))
 
-    x, damping = start, 1e-3
-    best = total(x)
+    x = near = start
+    best, damping, is_converged = total(x), 1e-3, False
     information = prior_precision
-    is_converged = False
     for _ in range(MOST_STEPS):
-        here = curvature(x)
+        here, near = curvature(x), x
         gradient = here.gradient + prior_precision @ (x - prior_mean)
         information = here.information + prior_precision
+        step = np.linalg.solve(information, -gradient)
+        expected = -0.5 * float(gradient @ step)
+        if 0.0 <= expected < tolerance:
+            x, best, is_converged = x + step, best - expected, True
+            break
         moved = _damped_step(x, gradient, information, damping, total, best)
         if moved is None:
-            is_converged = 0.5 * float(gradient @ np.linalg.solve(information, gradient)) < tolerance
             break
         gain = best - moved[1]
         x, best, damping = moved[0], moved[1], max(moved[2] / 5.0, 1e-6)
         if gain < tolerance:
             is_converged = True
             break
-    return Found(x, best, np.asarray(np.linalg.inv(information), float), is_converged)
+    return Found(x, best, np.asarray(np.linalg.inv(information), float), is_converged, near)
 
 
 def _damped_step(

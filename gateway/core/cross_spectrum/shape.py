@@ -5,7 +5,7 @@ than their own statistics say, for the half-car errs too: the evidence is temper
 the payload that is skewed, because a load can be much longer than a compact one and hardly shorter.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -36,13 +36,21 @@ POINTS: Final = (0.025, 0.5, 0.975)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Waypoint:
+    """Where a search ended under one log s: x (k,), and by how much x moves with log s (moves (k,))."""
+
+    log_s: float
+    x: F64
+    moves: F64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Node:
-    """A load weighed under one shape: where its search ended (start (k,), for the next one), minus the logarithm of its
-    evidence (cost), the answer x (k,), payload in kg and front share (0..1) being its last, and the payload's own
-    error.
+    """A load weighed under one shape: where its search ended (at), minus the logarithm of its evidence (cost), the
+    answer x (k,), payload in kg and front share (0..1) being its last, and the payload's own error.
     """
 
-    start: F64
+    at: Waypoint
     cost: float
     x: F64
     own_std_kg: float
@@ -76,15 +84,15 @@ class Shaped:
 def shaped(
     prior: ShapePrior,
     wheelbase_m: float,
-    start: tuple[float, F64],
+    start: Waypoint,
     weighed_as: Callable[[float, F64], Node],
     evidence: float,
 ) -> Shaped:
-    """``start`` is a log s and where to begin there; ``weighed_as`` weighs under another log s, from a near one on."""
+    """``start`` is where a search ended already; ``weighed_as`` weighs under another log s, beginning at an x (k,)."""
     nodes, founds = _profile(prior, wheelbase_m, start, weighed_as, evidence)
     if len(nodes) == 1:
         x = founds[0].x
-        likeliest = float(nodes[0]), founds[0].start
+        likeliest = float(nodes[0]), founds[0].at.x
         return Shaped(likeliest[0], x, x[-2:], np.zeros(2), NORMAL_TAILS, 0.0, likeliest, founds[0].is_converged)
     within = (prior.log_s >= nodes[0]) & (prior.log_s <= nodes[-1])
     log_s = prior.log_s[within]
@@ -104,7 +112,7 @@ def shaped(
         low, middle, high = _points(away[:, 0] / payload_std, weight)
         load, tails = load + middle * column, (middle - low, high - middle)
     best = min(range(len(nodes)), key=lambda i: founds[i].cost)
-    likeliest = float(nodes[best]), founds[best].start
+    likeliest = float(nodes[best]), founds[best].at.x
     narrowed = float(weight @ (log_s - mean_log_s) ** 2) / prior.variance
     goods_part = prior.habit * min(narrowed, 1.0)
     is_converged = founds[best].is_converged
@@ -114,7 +122,7 @@ def shaped(
 def _profile(
     prior: ShapePrior,
     wheelbase_m: float,
-    start: tuple[float, F64],
+    start: Waypoint,
     weighed_as: Callable[[float, F64], Node],
     evidence: float,
 ) -> tuple[F64, list[Node]]:
@@ -126,18 +134,32 @@ def _profile(
     wanted = sorted({float(lowest), *wanted, float(highest)})
     found: dict[float, Node] = {}
     least = np.inf
-    above = [node for node in wanted if node >= start[0]]
-    below = [node for node in reversed(wanted) if node < start[0]]
+    above = [node for node in wanted if node >= start.log_s]
+    below = [node for node in reversed(wanted) if node < start.log_s]
     for outwards in (above, below):
-        x = start[1]
+        passed = [start]
         for node in outwards:
-            found[node] = weighed_as(node, x)
-            x = found[node].start
+            found[node] = weighed_as(node, _ahead(node, passed))
+            passed.append(found[node].at)
             least = min(least, found[node].cost)
             if _against(found[node].cost - least, evidence) > -np.log(LEAST_PROBABILITY):
                 break
     inside = sorted(found)
     return np.array(inside), [found[node] for node in inside]
+
+
+def _ahead(log_s: float, passed: Sequence[Waypoint]) -> F64:
+    """Where the next search will end: on a parabola through the last waypoint, along its slope, and through an earlier
+    one far enough off to tell how the path bends.
+    """
+    last = passed[-1]
+    further = log_s - last.log_s
+    x: F64 = last.x + further * last.moves
+    for earlier in reversed(passed[:-1]):
+        back = earlier.log_s - last.log_s
+        if abs(back) >= 0.5 * abs(further):
+            return x + (earlier.x - last.x - back * last.moves) * (further / back) ** 2
+    return x
 
 
 def _against(excess: float, evidence: float) -> float:

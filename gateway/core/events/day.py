@@ -6,9 +6,19 @@ from typing import Any
 
 from gateway.core.change import Rules, change_of
 from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json, rounded
-from gateway.core.events.halts import Halt, Link, clocks_of, halts_of, links_of
-from gateway.core.events.load import Load, Weighing, weighings_of
-from gateway.core.events.loads import Loads, loads_of, sides_of
+from gateway.core.loads import (
+    Halt,
+    Link,
+    Load,
+    Loads,
+    Weighing,
+    clocks_of,
+    halts_of,
+    links_of,
+    loads_of,
+    sides_of,
+    weighings_of,
+)
 from gateway.estimate import NOWHERE, Estimate
 from gateway.estimate_json.way import place_to_json
 from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD

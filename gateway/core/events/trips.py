@@ -13,8 +13,7 @@ from typing import Any, Final
 
 from gateway.core.events.day import Day
 from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json, rounded
-from gateway.core.events.halts import SLACK_NS, follows
-from gateway.core.events.load import Load
+from gateway.core.loads import SLACK_NS, Load, follows
 from gateway.estimate import NOWHERE, Estimate, Quantity, Way
 from gateway.estimate_json.way import place_to_json
 from gateway.posterior import PAYLOAD
@@ -56,8 +55,13 @@ def _drives(estimates: Sequence[Estimate]) -> Iterator[tuple[int, int]]:
 
 def _load_of_each(day: Day) -> list[Load | None]:
     """What was aboard during each batch: as weighed, or as the weighings around it agree without a long stop."""
-    of_weighing = {weighing.at: load for weighing, load in zip(day.weighings, day.found.of_weighing, strict=True)}
     whole = day.estimates
+    of_weighing: dict[int, Load] = {}
+    for weighing, load in zip(day.weighings, day.found.of_weighing, strict=True):
+        at, one = weighing.at, whole[weighing.at]
+        while at >= 0 and at not in of_weighing and one.t_start_ns <= whole[at].way_start_ns < one.t_end_ns:
+            of_weighing[at] = load
+            at -= 1
     ahead: list[Load | None] = []
     for i in range(len(whole)):
         goes_on = i > 0 and follows(whole[i - 1], whole[i])
@@ -86,7 +90,7 @@ def _trip(day: Day, first: int, last: int, loads: Sequence[Load | None]) -> Entr
     by_speed_m = sum(way.distance_m for way in ways if math.isfinite(way.distance_m))
     if not ways or by_speed_m < LEAST_TRIP_M:
         return None
-    duration_s = (batches[-1].t_end_ns - batches[0].t_start_ns) / NS_PER_S
+    duration_s = (batches[-1].t_end_ns - batches[0].way_start_ns) / NS_PER_S
     distance_m, source = _distance(ways, by_speed_m, duration_s)
     scale = distance_m / by_speed_m
     pieces = [
@@ -94,7 +98,7 @@ def _trip(day: Day, first: int, last: int, loads: Sequence[Load | None]) -> Entr
         for one, load in zip(batches, loads[first : last + 1], strict=True)
         if one.way is not None and math.isfinite(one.way.distance_m)
     ]
-    begin_ns, end_ns = batches[0].t_start_ns, _arrival_ns(batches)
+    begin_ns, end_ns = batches[0].way_start_ns, _arrival_ns(batches)
     moving_s, known_s = sum(way.moving_s for way in ways), sum(way.known_s for way in ways)
     newest = day.estimates[-1]
     record: dict[str, Any] = {
@@ -173,6 +177,6 @@ def _arrival_ns(batches: Sequence[Estimate]) -> int:
         if not stops or abs(stops[-1].t_end_ns - arrival_ns) > SLACK_NS:
             break
         arrival_ns = stops[-1].t_start_ns
-        if abs(arrival_ns - batch.t_start_ns) > SLACK_NS:
+        if abs(arrival_ns - batch.way_start_ns) > SLACK_NS:
             break
     return min(arrival_ns, end_ns)

@@ -6,14 +6,15 @@ rate); the ratio of what passes through them moves with the load because the bod
 A sensor beside the centre line takes roll for heave: with a roll rate its acceleration is moved to that line first.
 """
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import C128, F64, I64, Batch, Bool
+from gateway.schema import STRICT, described
 
 UPPER_LIMIT_HZ = 10.0  # of the integrals (7) and (8)
 MIN_SEGMENTS = 6
@@ -21,8 +22,7 @@ MIN_SEGMENTS = 6
 SpectrumKind = Literal["amplitude", "power"]
 
 
-@dataclass(frozen=True, slots=True)
-class Band:
+class Band(NamedTuple):
     """A band-pass (6): centre and -3 dB width, both in Hz."""
 
     centre_hz: float
@@ -44,15 +44,23 @@ class RatioIndexCalibration:
     roll_lever_m left of it; 0: taken as measured.
     """
 
+    __pydantic_config__ = STRICT
+
     spectrum: SpectrumKind
-    n_segment: int
+    n_segment: int = field(metadata={"ge": 64, "le": 65_536})
     acceleration_bands: tuple[Band, Band] | None
     pitch_rate_bands: tuple[Band, Band] | None
     payload: RegressionModel | None
     front_share: RegressionModel | None
     speed_range_mps: tuple[float, float]
-    speed_std_max_mps: float
-    roll_lever_m: float = 0.0
+    speed_std_max_mps: float = field(metadata={"gt": 0.0})
+    roll_lever_m: float = field(
+        default=0.0,
+        metadata=described(
+            "the sensor's place left of the centre line, from where the roll rate moves the acceleration to that line; "
+            "0: the acceleration is taken as measured"
+        ),
+    )
 
 
 def band_pass_gain(freq_hz: F64, band: Band) -> F64:

@@ -1,13 +1,14 @@
 """Static regression of a target on the two ratio indexes: the terms, and prediction with its spread."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
 from scipy.special import stdtrit
 
 from gateway.records import F64
+from gateway.schema import STRICT, check_shapes
 
 Term = Callable[[F64, F64], F64]
 
@@ -23,11 +24,8 @@ TERMS: Mapping[str, Term] = MappingProxyType(
         "cbrt_rg": lambda ra, rg: np.cbrt(rg),
         "sqrt_rg": lambda ra, rg: np.sqrt(rg),
         "rg": lambda ra, rg: rg,
-        "rg2": lambda ra, rg: rg**2,
         "log_rg": lambda ra, rg: np.log(rg),
         "ra_rg": lambda ra, rg: ra * rg,
-        "sqrt_ra_rg": lambda ra, rg: np.sqrt(ra * rg),
-        "log_ra_log_rg": lambda ra, rg: np.log(ra) * np.log(rg),
     }
 )
 
@@ -47,13 +45,24 @@ class RegressionModel:
     dof are the degrees of freedom behind it.
     """
 
+    __pydantic_config__ = STRICT
+
     terms: tuple[str, ...]
     lows: F64
     highs: F64
     coefficients: F64
     gram_inverse: F64
-    residual_std: float
-    dof: float
+    residual_std: float = field(metadata={"gt": 0.0})
+    dof: float = field(metadata={"gt": 0.0})
+
+    def __post_init__(self) -> None:
+        n = len(self.terms)
+        check_shapes(
+            lows=(self.lows, (n,)),
+            highs=(self.highs, (n,)),
+            coefficients=(self.coefficients, (n + 1,)),
+            gram_inverse=(self.gram_inverse, (n + 1, n + 1)),
+        )
 
     def predict(self, ra: float, rg: float) -> tuple[float, float, tuple[float, float]]:
         """Value, standard deviation of a new observation, and its 95 % interval (Student's t)."""

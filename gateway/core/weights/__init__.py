@@ -4,9 +4,8 @@ weighed(estimate, vehicle, unsprung)    # as it leaves; ``unsprung`` is what cal
 """
 
 from gateway.core.weights.limits import RELEASE_SHARE, Limits, is_over_limit, over_limit_probability
-from gateway.core.weights.on_the_road import Place, place_of, weighed, weights_of
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, Place, Unsprung, place_of, unsprung_kg, weighed, weights_of
 from gateway.core.weights.room import Light, Nearness, Room, nearness, rooms_of
-from gateway.core.weights.unsprung import NOT_CALIBRATED, Unsprung, unsprung_kg
 
 __all__ = [
     "NOT_CALIBRATED",

@@ -6,11 +6,9 @@ gravity and a first signal map of one's own go out. Nothing is taken for granted
 
 from gateway.bus.heard import Heard
 from gateway.offline.look.draft import write_draft
-from gateway.offline.look.fits import Fit
-from gateway.offline.look.look import Look, look
+from gateway.offline.look.look import Fit, Look, look, why_silent
 from gateway.offline.look.readings import Described
 from gateway.offline.look.roles import Found
-from gateway.offline.look.silence import why_silent
 from gateway.offline.look.unmapped import unmapped_roll_rate
 
 __all__ = [

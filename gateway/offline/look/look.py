@@ -1,21 +1,158 @@
 """One look at a log: who speaks, what it may be, what carries gravity, and whether that can work."""
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
-from gateway.bus.heard import Heard
-from gateway.bus.logs import LogReport
-from gateway.bus.signals import shipped_databases
-from gateway.core.batch import RATE_MIN_SHARE
+import numpy as np
+
+from gateway.bus.frames import merge_frames
+from gateway.bus.heard import Heard, counted, heard_on
+from gateway.bus.logs import LogReport, motion_of_log, open_whole_log
+from gateway.bus.signals import (
+    Decoder,
+    MappedMessage,
+    SignalMap,
+    id_name,
+    load_signal_map,
+    shipped_databases,
+    shipped_map,
+    shipped_maps,
+)
+from gateway.bus.similar import similar_to
+from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
 from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
-from gateway.offline.look.fits import Fit, fits_of
-from gateway.offline.look.heard import heard_in
-from gateway.offline.look.journey import journey_of
 from gateway.offline.look.readings import Described, Reading, databases_of, described, readings_of
 from gateway.offline.look.roles import Found, roles_of, tilt_deg
-from gateway.records import Signal
+from gateway.records import ASIDE, F64, Signal
+from gateway.units import STANDARD_GRAVITY_MPS2
+
+NEEDED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A shipped map on one channel: which signals come, which that weigh do not, what its vertical axis reads."""
+
+    name: str
+    device: str
+    channel: str | None
+    found: tuple[Signal, ...]
+    missing: tuple[Signal, ...]
+    gravity_mps2: float
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether both inertial signals come, and gravity is where the map says."""
+        has_gravity = abs(self.gravity_mps2 - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
+        return has_gravity and all(signal in self.found for signal in NEEDED)
+
+
+def fits_of(heard: Sequence[Heard]) -> tuple[Fit, ...]:
+    """The maps of which at least one signal comes, the best first."""
+    fits = [fit for name in shipped_maps() for fit in _fits(name, heard)]
+    return tuple(sorted(fits, key=lambda fit: (not fit.is_whole, len(fit.missing), fit.name)))
+
+
+def _fits(name: str, heard: Sequence[Heard]) -> Iterator[Fit]:
+    signal_map = load_signal_map(f"springscale:{name}")
+    device = shipped_map(name).read_text(encoding="utf-8").splitlines()[0].removeprefix("# ").rstrip(".")
+    for channel in sorted({one.channel for one in heard}, key=str):
+        ours = [one for one in heard if one.channel == channel and _is_mapped(one, signal_map)]
+        if not ours:
+            continue
+        motion = Decoder(signal_map).decode(merge_frames([one.frames for one in ours]))
+        found = tuple(signal for signal in motion.signals if len(motion.of(signal)[1]))
+        missing = tuple(signal for signal in motion.signals if signal not in found and signal not in ASIDE)
+        vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
+        if found:
+            yield Fit(name, device, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan)
+
+
+def _is_mapped(one: Heard, signal_map: SignalMap) -> bool:
+    ids = np.array([one.can_id], np.uint32)
+    return any(message.id_filter.matches(ids)[0] and message.length in one.lengths for message in signal_map.messages)
+
+
+NO_CHANNEL: Final = "None"  # how python-can's readers name the channel of a log that keeps none
+
+
+def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
+    """Every identifier in order of channel and number. Raises LogUnreadableError where nothing can be read."""
+    chunks, report = open_whole_log(log)
+    of_all = counted(chunks)
+    report.require_frames()
+    channels = sorted(report.channels - {NO_CHANNEL})
+    if len(channels) < 2:
+        return heard_on(channels[0] if channels else None, of_all), report
+    by_channel = [heard_on(channel, counted(open_whole_log(log, channel)[0])) for channel in channels]
+    return tuple(one for heard in by_channel for one in heard), report
+
+
+_NO_POSITION: Final = re.compile(r"accura|error|std|dev|valid|ref|dest", re.IGNORECASE)
+_STEP_M: Final = 2000.0  # between two frames; an odometer that leaps further counts something else
+
+_LOOKED_FOR: Final[tuple[tuple[Signal, str, re.Pattern[str], Callable[[F64], bool]], ...]] = (
+    (Signal.LATITUDE, "angle", re.compile(r"latitude|(?:^|_)lat(?:_|$)", re.IGNORECASE), lambda x: _is_angle(x, 90.0)),
+    (
+        Signal.LONGITUDE,
+        "angle",
+        re.compile(r"longitude|(?:^|_)lon(?:g)?(?:_|$)", re.IGNORECASE),
+        lambda x: _is_angle(x, 180.0),
+    ),
+    (
+        Signal.ODOMETER,
+        "distance",
+        re.compile(r"odo|mileage|(?:vehicle|total|trip)_?distance|distance_?(?:total|trip)", re.IGNORECASE),
+        lambda x: bool(np.all(np.diff(x) >= 0.0) and np.all(np.diff(x) < _STEP_M)),
+    ),
+)
+
+
+def journey_of(readings: Sequence[Reading]) -> tuple[Found, ...]:
+    """Latitude, longitude and odometer where a signal has the name and reads like one; the finest of them."""
+    found = []
+    for role, quantity, name, fits in _LOOKED_FOR:
+        named = [
+            r for r in readings
+            if r.quantity == quantity and name.search(r.signal.name) and not _NO_POSITION.search(r.signal.name)
+        ]  # fmt: skip
+        good = [r for r in named if len(r.x) > 1 and fits(r.x)]
+        if good:
+            finest = min(good, key=lambda r: (abs(r.signal.field.scale), -r.rate_hz))
+            found.append(Found(role, finest, 1, "its name says so, and it reads like one"))
+    return tuple(found)
+
+
+def _is_angle(x: F64, most_deg: float) -> bool:
+    """A receiver without a fix mostly sends 0, or what lies outside."""
+    return bool(np.all(np.abs(x) <= most_deg) and np.any(x != 0.0))
+
+
+def why_silent(log: Path, signal_map: SignalMap, signal: Signal) -> str:
+    """In words. Reads the log once or twice more; raises LogUnreadableError as every reader does."""
+    message = next(m for m in signal_map.messages if any(mapped.signal is signal for mapped in m.signals))
+    motions, _, decoder = motion_of_log(log, signal_map)
+    for _ in motions:
+        pass
+    refused = decoder.counts[signal].rejected
+    if n := sum(refused.values()):
+        reasons = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in sorted(refused.items()))
+        return f"{n} frames of {_named(message)} came, none valid: {reasons}"
+    if decoder.counts[signal].samples:
+        return f"{decoder.counts[signal].samples} frames of {_named(message)} came, none of them within the run"
+    similar = similar_to(message, signal_map, heard_in(log)[0])
+    instead = f"similar: {'; '.join(similar)}" if similar else "and no identifier like it"
+    on = f" on {signal_map.channel}" if signal_map.channel else ""
+    return f"nothing of {_named(message)} came{on}; {instead}"
+
+
+def _named(message: MappedMessage) -> str:
+    return f"{message.name} ({id_name(message.frame_id)})"
+
 
 LEAST_RATE_HZ = RATE_MIN_SHARE * BatchSettings().rate_hz
 MOST_TILT_DEG = 15.0  # 3 % of gravity; what lies along and across then mixes in as well

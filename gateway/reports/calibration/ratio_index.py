@@ -11,7 +11,6 @@ from gateway.calibration.ratio_index import (
     FittedRegression,
     IndexRows,
     RatioIndexFit,
-    Selection,
     index_rows,
 )
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
@@ -42,7 +41,7 @@ def ratio_index_section(
         "Ratio indexes R_a and R_g of every batch over the load and over the front share. Lines: the static regression "
         "that answers from both indexes, drawn along one of them with the other held; the ribbon is the 95 % interval "
         "of a new batch. Where points of one payload spread, it is the share (or the road) that moves them.",
-        f"Ratio indexes over load and share. {len(fitted.run)} batches identify, {len(later.run)} validate.",
+        f"Ratio indexes over load and share. {len(fitted.run)} batches for fitting, {len(later.run)} for validation.",
         tuple(panels),
     )
     return Section(
@@ -124,12 +123,10 @@ def _band(band: Band) -> str:
 
 def _model_tables(fit: RatioIndexFit) -> Iterator[Table]:
     choice, models = fit.chosen.choice, (fit.calibration.payload, fit.calibration.front_share)
-    told = zip(("payload [kg]", "front share [%]"), choice.regressions, choice.selections, models, strict=True)
-    for target, regression, selection, model in told:
+    rows = zip(("payload [kg]", "front share [%]"), choice.regressions, models, strict=True)
+    for target, regression, model in rows:
         if regression is not None and model is not None:
             yield _model_table(target, regression, model.residual_std, model.dof)
-            if selection.steps:
-                yield _steps_table(target, selection)
 
 
 def _trials_table(fit: RatioIndexFit) -> Table:
@@ -144,7 +141,7 @@ def _trials_table(fit: RatioIndexFit) -> Table:
         for trial in fit.trials
     )
     return Table(
-        "Regressions tried: (9) and (10) single, both logarithms, (11) joint, and chosen stepwise. Errors are root "
+        "Regressions tried: (9) and (10) single, both logarithms, and (11) joint. Errors are root "
         "mean squares over runs for which bands and terms were chosen anew without them",
         ("Family", "bands", "terms of payload", "terms of share", "payload", "share"),
         rows,
@@ -159,19 +156,6 @@ def _pairs(trial: FamilyTrial) -> str:
 def _rms(trial: FamilyTrial) -> tuple[str, str]:
     payload_kg, share_pct = (None if np.isnan(rms) else rms for rms in trial.nested_rms)
     return decimal(payload_kg, " kg", 1), decimal(share_pct, " pp")
-
-
-def _steps_table(target: str, selection: Selection) -> Table:
-    """How a stepwise choice came about."""
-    rows = tuple(
-        (step.action, step.term, f"{step.test.statistic:.3g}", f"{step.test.p_value:.2g}", f"{step.held_out_rms:.3g}")
-        for step in selection.steps
-    )
-    caption = (
-        f"Stepwise choice for {target}: partial F-tests over run means. The smallest of many p-values is small by "
-        "choice alone: they rank and stop, and prove nothing"
-    )
-    return Table(caption, ("Step", "term", "F", "p", "error on runs left out"), rows)
 
 
 def _model_table(target: str, regression: FittedRegression, residual_std: float, dof: float) -> Table:

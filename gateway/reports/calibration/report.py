@@ -23,6 +23,7 @@ from gateway.calibration.judgement import (
     stated_budget,
     verdicts_of,
 )
+from gateway.calibration.line_files import line_in
 from gateway.calibration.plan import LoadPlan, plan_next
 from gateway.estimate_json.errors import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
@@ -75,7 +76,7 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: LoadPlan |
     if outcome.ratio_index is not None:
         yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.split])
     if outcome.cross_spectrum is not None:
-        line = outcome.file.line.for_core() if outcome.file.line else None
+        line = line_in(outcome.file.line) if outcome.file.line else None
         yield half_car_section(identification, outcome.cross_spectrum.calibration, campaign.vehicle, line)
 
 

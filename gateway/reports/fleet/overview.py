@@ -45,7 +45,7 @@ class Look:
 
 
 def looks_of(fleet: Fleet) -> list[Look]:
-    """What wants a look: sensors that are bad first, then drift, silence, few answers and logs that failed."""
+    """Needs attention: sensors that are bad first, then drift, silence, few answers and logs that failed."""
     return [
         *(_bad(vehicle, n) for vehicle in fleet.vehicles for n in range(len(vehicle.bad_sensors))),
         *sorted(_drifts(fleet), key=lambda look: look.what),
@@ -108,8 +108,9 @@ def _failing(fleet: Fleet) -> Iterator[Look]:
 
 def _look_section(looks: Sequence[Look]) -> Section:
     rows = tuple((_name(look.vehicle, look.has_page), look.what, look.told, look.advice) for look in looks)
-    table = Table("What wants a look", ("Vehicle", "what", "as found", "what to do"), rows)
-    return Section("look", "What wants a look", () if rows else ("Nothing does.",), (), (table,) if rows else ())
+    table = Table("Needs attention", ("Vehicle", "what", "as found", "what to do"), rows)
+    words = () if rows else ("Nothing needs attention.",)
+    return Section("look", "Needs attention", words, (), (table,) if rows else ())
 
 
 def _name(vehicle: str, has_page: bool = True) -> Link | str:

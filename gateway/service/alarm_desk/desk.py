@@ -71,6 +71,8 @@ class AlarmDesk:
 
     def __call__(self, found: Estimate) -> None:
         """One more batch, by the pipeline once it is stored."""
+        if found.is_remainder:
+            return
         calibrated = self._subject.calibrated
         with self._lock:
             if calibrated is None:
@@ -143,7 +145,7 @@ class AlarmDesk:
 def remembered(reader: StoreReader) -> tuple[list[Alarm], list[Estimate]]:
     """The last alarms and the last batches, oldest first. Raises what the store's reader raises.
 
-    An alarm that cannot be read is passed over: what is the matter is told anew.
+    An alarm that cannot be read is passed over: what is wrong is reported again.
     """
     told = reader.entries(kind=ENTRY_KIND, limit=REMEMBERED, newest_first=True)
     page = reader.estimates(limit=DRIVEN, newest_first=True, with_spectra=False)

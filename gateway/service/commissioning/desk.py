@@ -4,9 +4,9 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, Protocol
 
-from gateway.calibration.campaign import VehicleTable
 from gateway.calibration.commissioning import doubts_of, vehicle_table
 from gateway.calibration.kept import KeptBatch, Shelf
+from gateway.core.vehicle import Vehicle as StatedVehicle
 from gateway.errors import CampaignError, CommissioningRefusedError
 from gateway.log import Event
 from gateway.records import json_line
@@ -275,7 +275,7 @@ class Commissioning:
             if not doubts_of(answers, line.facts):
                 require_alike(self._book.directory, line, table)
 
-    def _table(self, answers: VehicleAnswers, line: LineChoice) -> VehicleTable:
+    def _table(self, answers: VehicleAnswers, line: LineChoice) -> StatedVehicle:
         try:
             return vehicle_table(answers, self._vehicle.name)
         except CampaignError as fault:

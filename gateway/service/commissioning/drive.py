@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from gateway.calibration.campaign import VehicleTable
 from gateway.calibration.commissioning import Job, Result, vehicle_table
 from gateway.calibration.kept import KeptBatch, Shelf, packed
+from gateway.core.vehicle import Vehicle as VehicleFigures
 from gateway.errors import CalibrationFileError, CommissioningRefusedError
 from gateway.log import Event
 from gateway.records import Why
@@ -217,9 +217,9 @@ class EmptyDrive:
             self._book.forget_others()
         self._book.tell(Event.COMMISSIONED, {"calibration_id": made.id, "by": made.by, "n_batches": len(made.batches)})
 
-    def _table(self, answers: VehicleAnswers, line: LineChoice) -> VehicleTable:
+    def _table(self, answers: VehicleAnswers, line: LineChoice) -> VehicleFigures:
         table = vehicle_table(answers, self._vehicle.name, line.shared)
-        return table.model_copy(update={"name": self._vehicle.name}) if self._vehicle.is_name_fixed else table
+        return replace(table, name=self._vehicle.name) if self._vehicle.is_name_fixed else table
 
 
 def _seconds(job: Job) -> float:

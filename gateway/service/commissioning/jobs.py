@@ -5,11 +5,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
-from gateway.calibration.campaign import VehicleTable
 from gateway.calibration.commissioning import Drive, Job
 from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
-from gateway.core.vehicle import front_share_pct
+from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.service.commissioning.record import LineChoice
 from gateway.units import NS_PER_S
 
@@ -39,7 +38,7 @@ class Jobs:
     settings: CommissioningSection
     batch: BatchSettings
 
-    def job(self, vehicle: VehicleTable, line: LineChoice, batches: Sequence[BatchFile], *, is_fit: bool) -> Job:
+    def job(self, vehicle: Vehicle, line: LineChoice, batches: Sequence[BatchFile], *, is_fit: bool) -> Job:
         """Of an empty drive. A window that a power cut ended early is no shorter than it could be."""
         window_s = min(self.batch.window_s, max(one.duration_s for one in batches))
         return Job(
@@ -47,7 +46,7 @@ class Jobs:
             drives=(
                 Drive(
                     name=EMPTY,
-                    front_share_pct=front_share_pct(vehicle.stated, 0.0, None),
+                    front_share_pct=front_share_pct(vehicle, 0.0, None),
                     batches=tuple(one.path for one in batches),
                 ),
             ),

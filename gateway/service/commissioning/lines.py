@@ -4,14 +4,15 @@ import hashlib
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from gateway.calibration.campaign import VehicleTable
 from gateway.calibration.commissioning import OF_THE_LINE, LineFacts
-from gateway.calibration.file import CalibrationFile, LikeFile, line_of_files, load_like
+from gateway.calibration.file import CalibrationFile, LikeFile, load_like
+from gateway.calibration.line_files import line_of_files
+from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError, LineError
 from gateway.files.kept import KeptFiles
 from gateway.files.signed import SUFFIX, Trust
@@ -135,12 +136,12 @@ class Lines:
         return held, content
 
 
-def require_alike(directory: Path, line: LineChoice, vehicle: VehicleTable) -> None:
+def require_alike(directory: Path, line: LineChoice, vehicle: Vehicle) -> None:
     """Raises CommissioningRefusedError where a vehicle is none of the line, whose copy lies in ``directory``."""
     if line.copy_name is None:
         return
     try:
-        line_of_files([load_like(directory / line.copy_name)]).prior_of(vehicle.stated, with_roll=False)
+        line_of_files([load_like(directory / line.copy_name)]).prior_of(vehicle, with_roll=False)
     except (CalibrationFileError, LineError) as fault:
         raise CommissioningRefusedError("not_of_the_line", str(fault)) from None
 
@@ -148,7 +149,7 @@ def require_alike(directory: Path, line: LineChoice, vehicle: VehicleTable) -> N
 def _figures(held: LikeFile) -> dict[str, object]:
     """What of it a form may be filled with."""
     if isinstance(held, CalibrationFile):
-        return held.vehicle.model_dump(mode="json")
+        return asdict(held.vehicle)
     most_kg = held.line.seen.payload_seen_kg[1]
     return {
         "name": held.siblings[0].name,

@@ -6,9 +6,9 @@ from typing import Any, Final, Literal
 
 from pydantic import Field, ValidationError
 
-from gateway.calibration.campaign import VehicleTable
 from gateway.calibration.commissioning import NO_LINE, Learned, LineFacts
 from gateway.calibration.file.parts import Part
+from gateway.core.vehicle import Vehicle
 from gateway.errors import ConfigurationError
 from gateway.files.kept import KeptFiles
 from gateway.stated import VehicleAnswers
@@ -112,7 +112,7 @@ class Made(Part):
     by: str
     note: str | None
     line: LineChoice
-    vehicle: VehicleTable
+    vehicle: Vehicle
     batches: tuple[str, ...]
     learned: Learned | None
     warnings: tuple[str, ...]

@@ -98,7 +98,7 @@ def _underway(underway: Underway, present: Present) -> dict[str, Any]:
         "line": None
         if underway.line is None
         else underway.line.model_dump(include={"name", "id", "source"}) | {"vehicle": dict(underway.line.figures)},
-        "vehicle": None if underway.vehicle is None else underway.vehicle.model_dump(mode="json"),
+        "vehicle": None if underway.vehicle is None else asdict(underway.vehicle),
         "empty": None if underway.empty is None else underway.empty.model_dump(include={"at", "by"}),
         "inspection": None
         if looked is None

@@ -10,12 +10,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from gateway.calibration.known_weight import WeightRefusal, load_of
 from gateway.calibration.known_weights_file import FILE_NAME, Confirmation, Ending, KnownWeight, KnownWeights
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.flow import Flow
 from gateway.core.fusion import WeighedLoad
 from gateway.core.known_weights import KnownWeightKind
 from gateway.errors import WeightRefusedError
@@ -24,22 +23,13 @@ from gateway.log import Event, tell_event
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source
 from gateway.quantity import Quantity
 from gateway.records import iso_utc, json_line, ns_of
+from gateway.service.pipeline import Pipeline
 from gateway.service.proving.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
 from gateway.service.proving.history_file import HistoryFile
 from gateway.service.subject import OnEvent, Subject
 from gateway.stated_weight import StatedWeight
 
 ALL_KINDS: Final = tuple(KnownWeightKind)
-
-
-class Weighing(Protocol):
-    """The pipeline, as far as "it is empty now" needs it."""
-
-    flow: Flow
-
-    def weighed_age_s(self) -> float | None:
-        """Seconds since ``flow.weighed`` was found; None where there is none."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +59,7 @@ class KnownWeightService:
         self,
         directory: Path,
         subject: Subject,
-        pipeline: Weighing,
+        pipeline: Pipeline,
         ask: Ask,
         *,
         stale_after_s: float,

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from gateway.calibration.verification_file import VerificationRule
 from gateway.config.sections import VerificationSection
-from gateway.service.proving.known_weights import KnownWeightService, Weighing
+from gateway.service.pipeline import Pipeline
+from gateway.service.proving.known_weights import KnownWeightService
 from gateway.service.proving.trend_keeper import TrendKeeper
 from gateway.service.proving.verification_desk import VerificationDesk
 from gateway.service.subject import Subject
@@ -19,7 +20,7 @@ class Proving:
         directory: Path,
         wanted: VerificationSection,
         subject: Subject,
-        pipeline: Weighing,
+        pipeline: Pipeline,
         store: Store,
         *,
         stale_after_s: float,

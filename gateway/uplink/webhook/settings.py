@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 from gateway.config import VehicleSection
 from gateway.config.alarms import WebhookSection
 from gateway.errors import ConfigurationError
+from gateway.uplink.settings import require_own_id
 from gateway.uplink.webhook.signature import SecretError, secrets_of
 
 HOW_TO_MAKE_ONE = 'echo "whsec_$(openssl rand -base64 32)" > FILE'
@@ -82,9 +83,5 @@ def webhook_settings(section: WebhookSection, vehicle: VehicleSection) -> Webhoo
     )
     settings.tls_context()  # a wrong file is told at the start
     settings.secrets()
-    if vehicle.id == VehicleSection().id:
-        raise ConfigurationError(
-            f"[webhook] url is set, but [vehicle] id is {vehicle.id!r}, that of every vehicle that was given none: "
-            "a receiver could not tell them apart; set [vehicle] id to a name of its own"
-        )
+    require_own_id("[webhook] url", vehicle, "a receiver could not tell them apart")
     return settings

@@ -92,8 +92,7 @@ async def _invalid(request: Request, error: Exception) -> Response:
         said.setdefault(".".join(map(str, fault["loc"][:2])), what)
     detail = "; ".join(f"{where}: {what}" for where, what in said.items())
     faults = [Fault(where=where, what=what) for where, what in said.items()]
-    status = 400 if request.url.path.startswith("/rfms/") else 422  # rFMS knows no 422
-    return problem_response(status, detail, request.url.path, faults)
+    return problem_response(422, detail, request.url.path, faults)
 
 
 async def _unavailable(request: Request, error: Exception) -> Response:

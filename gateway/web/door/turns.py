@@ -21,7 +21,6 @@ _HISTORY: Final = (
     "/api/v1/alarms",
     "/api/v1/export",
     "/api/v1/record",
-    "/rfms/",
 )
 _STREAM: Final = "/api/v1/stream"
 _LOOK_S: Final = 0.05

@@ -8,7 +8,8 @@ from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
 from gateway.errors import StoreError
-from gateway.history import KINDS, Follower, Reader, Record
+from gateway.history import KINDS, Record
+from gateway.store import Follower, StoreReader
 from gateway.web.live.fanout import Fanout, StreamEvent, Subscription
 
 GRACE_S: Final = 0.2  # for the last words of a stream that ends
@@ -37,7 +38,7 @@ class EventStream(Response):
 
     media_type = "text/event-stream"
 
-    def __init__(self, fanout: Fanout, reader: Reader, behind: str | None, keep_alive_s: float) -> None:
+    def __init__(self, fanout: Fanout, reader: StoreReader, behind: str | None, keep_alive_s: float) -> None:
         super().__init__(headers={"cache-control": "no-store", "x-accel-buffering": "no"})
         del self.headers["content-length"]
         self._fanout = fanout

@@ -7,7 +7,8 @@ from fastapi import APIRouter, Path, Query, Request
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
-from gateway.history import ALARM, Reader
+from gateway.history import ALARM
+from gateway.store import StoreReader
 from gateway.web.routes.calibration.asking import answered, who
 from gateway.web.routes.estimates import HistoryQuery
 from gateway.web.routes.events import entries_of
@@ -83,7 +84,7 @@ AlarmId = Annotated[str, Path(max_length=100, examples=["alarm-17900003000000000
 _REFUSALS: Final = problem_responses(400, 404, 409, 422, 503)
 
 
-def alarms_router(reader: Reader, desk: AlarmDesk) -> APIRouter:
+def alarms_router(reader: StoreReader, desk: AlarmDesk) -> APIRouter:
     """The routes of the alarms."""
     router = APIRouter(prefix="/api/v1", tags=["alarms"])
 

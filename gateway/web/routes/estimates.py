@@ -12,9 +12,10 @@ from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
 from starlette.responses import Response, StreamingResponse
 
-from gateway.history import BATCHES, Page, Reader
+from gateway.history import BATCHES, Page
 from gateway.records import json_line
 from gateway.status import Status
+from gateway.store import StoreReader
 from gateway.web.instant import Instant
 from gateway.web.live.board import Board
 from gateway.web.live.latest import LatestResponse
@@ -66,7 +67,7 @@ class EstimatesQuery(HistoryQuery):
     spectra: bool = Field(True, description="false leaves the spectra out")
 
 
-def api_router(board: Board, reader: Reader, status: Callable[[], Status], settings: WebSettings) -> APIRouter:
+def api_router(board: Board, reader: StoreReader, status: Callable[[], Status], settings: WebSettings) -> APIRouter:
     """The routes under /api/v1."""
     router = APIRouter(prefix=PREFIX, tags=["api"])
 
@@ -110,7 +111,7 @@ def api_router(board: Board, reader: Reader, status: Callable[[], Status], setti
     return router
 
 
-async def asked(reader: Reader, kinds: Sequence[str], **question: Any) -> Page:
+async def asked(reader: StoreReader, kinds: Sequence[str], **question: Any) -> Page:
     """A page of the history; a cursor that is none is the client's fault."""
     try:
         return await asyncio.to_thread(reader.page, kinds, **question)
@@ -130,7 +131,7 @@ def _question(query: EstimatesQuery, n_left: int, cursor: str | None) -> dict[st
     }
 
 
-async def _page_by_page(reader: Reader, query: EstimatesQuery, first: Page) -> AsyncIterator[bytes]:
+async def _page_by_page(reader: StoreReader, query: EstimatesQuery, first: Page) -> AsyncIterator[bytes]:
     """A long answer, read from the store as fast as the client reads it."""
     page, n_left = first, query.limit - len(first.items)
     newest = first.last_cursor

@@ -10,8 +10,9 @@ from starlette.responses import Response
 
 from gateway.core.events import EntryKind
 from gateway.core.events.table import COLUMNS, cells_of
-from gateway.history import Page, Reader
+from gateway.history import Page
 from gateway.records import json_line
+from gateway.store import StoreReader
 from gateway.web.as_file import CSV, JSON_LINES, csv_lines, file_responses, json_lines, sent_as_file
 from gateway.web.as_parquet import PARQUET, ParquetFile
 from gateway.web.routes.estimates import HistoryQuery, Span, asked
@@ -117,7 +118,7 @@ class TripsPage(_EntriesPage):
     items: list[Trip]
 
 
-def events_router(reader: Reader) -> APIRouter:
+def events_router(reader: StoreReader) -> APIRouter:
     """The routes of both."""
     router = APIRouter(prefix="/api/v1", tags=["events"])
 
@@ -140,11 +141,11 @@ def events_router(reader: Reader) -> APIRouter:
     return router
 
 
-async def _page(reader: Reader, kind: EntryKind, query: HistoryQuery) -> Response:
+async def _page(reader: StoreReader, kind: EntryKind, query: HistoryQuery) -> Response:
     return Response("{" + await entries_of(reader, kind, query), media_type="application/json")
 
 
-async def entries_of(reader: Reader, kind: str, query: HistoryQuery) -> str:
+async def entries_of(reader: StoreReader, kind: str, query: HistoryQuery) -> str:
     """One page of entries as the rest of a JSON object. Raises RequestValidationError for a cursor that is none."""
     page = await asked(
         reader,
@@ -159,7 +160,7 @@ async def entries_of(reader: Reader, kind: str, query: HistoryQuery) -> str:
     return f'"items":[{",".join(page.items)}],{tail}'
 
 
-def _file_of(reader: Reader, kind: EntryKind, ending: str) -> Callable[..., Any]:
+def _file_of(reader: StoreReader, kind: EntryKind, ending: str) -> Callable[..., Any]:
     async def whole(span: Annotated[Span, Query()]) -> Response:
         async def page_behind(cursor: str | None) -> Page:
             return await asked(reader, (kind,), since_ns=span.since, until_ns=span.until, limit=_PAGE, cursor=cursor)

@@ -7,7 +7,8 @@ from pydantic import Field
 from starlette.responses import Response
 
 from gateway.estimate_json import COLUMNS, csv_cells
-from gateway.history import BATCHES, Page, Reader
+from gateway.history import BATCHES, Page
+from gateway.store import StoreReader
 from gateway.web.as_file import CSV, JSON_LINES, Encoder, csv_lines, file_responses, json_lines, sent_as_file
 from gateway.web.routes.estimates import Span, asked
 
@@ -20,7 +21,7 @@ class SpanWithSpectra(Span):
     spectra: bool = Field(False, description="true sends the spectra too")
 
 
-def export_router(reader: Reader) -> APIRouter:
+def export_router(reader: StoreReader) -> APIRouter:
     """The routes that send the history as a file."""
     router = APIRouter(prefix="/api/v1", tags=["export"])
 
@@ -38,7 +39,7 @@ def export_router(reader: Reader) -> APIRouter:
 
 
 async def _sent(
-    reader: Reader, span: Span, media_type: str, ending: str, encode: Encoder, *, with_spectra: bool
+    reader: StoreReader, span: Span, media_type: str, ending: str, encode: Encoder, *, with_spectra: bool
 ) -> Response:
     async def page_behind(cursor: str | None) -> Page:
         return await asked(

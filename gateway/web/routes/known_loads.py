@@ -1,4 +1,4 @@
-"""/api/v1/known-loads: what is truly aboard, where somebody knows it, as in the demonstration."""
+"""/api/v1/known-loads: the actual load, where it is known, as in the demonstration."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -39,12 +39,12 @@ class KnownLoadsTold(BaseModel):
 
 
 def known_loads_router(known_loads: KnownLoads) -> APIRouter:
-    """The route that tells them; a service on the road has none."""
+    """Their route; a service on the road has no known loads."""
     router = APIRouter(tags=["api"])
 
     @router.get(KNOWN_LOADS_PATH)
     async def told() -> KnownLoadsTold:
-        """What is truly aboard."""
+        """The actual load, as the simulator of the demonstration knows it."""
         return KnownLoadsTold(
             items=[
                 KnownLoadTold(

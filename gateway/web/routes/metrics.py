@@ -10,6 +10,7 @@ from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from gateway.estimate import PLACES
+from gateway.quantities import FOUND, Outward
 from gateway.status import State, Status
 from gateway.web.live.board import Board, Shown
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
@@ -94,6 +95,16 @@ def _passed(moment: Moment) -> Labelled | None:
     return None if known.last_at is None else [((), float(known.last_verdict == "passed"))]
 
 
+def _found(quantity: Outward) -> tuple[Row, Row]:
+    """The latest estimate of a quantity, and its standard deviation."""
+    name, std_name, factor = quantity.metric
+    text = f"{quantity.words[0].upper()}{quantity.words[1:]}, by the latest estimate."
+    return (
+        one(name, text, f"shown.{quantity.name}.number", factor),
+        one(std_name, _STD, f"shown.{quantity.name}.std", factor),
+    )
+
+
 _ROWS: Final = "Rows by what became of them."
 _STD: Final = "Its standard deviation."
 TABLE: Final = (
@@ -145,6 +156,7 @@ TABLE: Final = (
         estimate="n_estimates",
         rejected="n_rejected",
         provisional="n_provisional",
+        remainder="n_remainders",
     ),
     by(
         "springscale_rejections_total",
@@ -174,7 +186,7 @@ TABLE: Final = (
     Row("springscale_verification_passed", "1 where the last of this calibration passed.", _passed),
     by("springscale_alarm", "0 while nothing is the matter, 1 told early, 2 confirmed.", "alarm", _levels),
     one("springscale_alarms_unacknowledged", "Alarms that nobody has seen.", "now.alarms.n_unacknowledged"),
-    one("springscale_alarms_told_total", "Early and final words since the start.", "now.alarms.n_told"),
+    one("springscale_alarms_told_total", "Alarms sent since the start, provisional and final.", "now.alarms.n_told"),
     Row(
         "springscale_record_refused",
         "1 while frames cannot be recorded.",
@@ -225,14 +237,7 @@ TABLE: Final = (
     one("springscale_stream_clients", "Open streams.", "board.fanout.n_subscribers"),
     one("springscale_stream_slow_clients_total", "Streams whose client did not read.", "board.fanout.n_slow_clients"),
     one("springscale_stream_dropped_events_total", "Events those clients lost.", "board.fanout.n_events_dropped"),
-    one("springscale_payload_kilograms", "Payload of the latest estimate.", "shown.payload.number"),
-    one("springscale_payload_std_kilograms", _STD, "shown.payload.std"),
-    one("springscale_front_share_ratio", "Of the sprung mass, on the front axle.", "shown.front_share.number", 0.01),
-    one("springscale_front_share_std_ratio", _STD, "shown.front_share.std", 0.01),
-    one("springscale_cg_left_meters", "Centre of gravity, left of the centre line.", "shown.cg_left.number"),
-    one("springscale_cg_left_std_meters", _STD, "shown.cg_left.std"),
-    one("springscale_left_share_ratio", "Of the sprung mass, on the left wheels.", "shown.left_share.number", 0.01),
-    one("springscale_left_share_std_ratio", _STD, "shown.left_share.std", 0.01),
+    *(row for quantity in FOUND for row in _found(quantity)),
     one("springscale_estimate_age_seconds", "Since the latest estimate was received.", "shown.age_s"),
     one("springscale_estimate_stale", "1 while the latest estimate is old.", "shown.is_stale"),
     by("springscale_weight_kilograms", "Weight on the road.", "where", _of_places("kg")),

@@ -6,39 +6,8 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle, believed
+from gateway.core.vehicle import Vehicle
 from gateway.status import SignalHealth, Status
-
-
-class VehicleFigures(BaseModel):
-    """The vehicle as its calibration campaign stated it, with the limits in force.
-
-    Masses and share are of the sprung mass; unknown is null.
-    """
-
-    name: str
-    empty_mass_kg: float
-    wheelbase_m: float
-    empty_front_share_pct: float
-    sensor_position_m: float = Field(description="behind the front axle", examples=[3.2])
-    sensor_offset_left_m: float
-    track_width_m: float | None = Field(description="wheel loads need it", examples=[1.5])
-    empty_cg_left_m: float
-    payload_range_kg: tuple[float, float] = Field(description="only normalises errors; gates nothing")
-    front_share_range_pct: tuple[float, float]
-    carries: str | None = Field(description="what it usually carries; null: not said", examples=["parcels"])
-    payload_length_m: float | None = Field(description="how far along the floor loads usually reach; null: not said")
-    payload_height_m: float | None = Field(description="how high above the floor they reach; null: not said")
-    roof_rack: bool
-    tow_bar: bool
-    unsprung_front_kg: float | None
-    unsprung_rear_kg: float | None
-    kerb_front_axle_kg: float | None
-    kerb_rear_axle_kg: float | None
-    front_axle_limit_kg: float | None
-    rear_axle_limit_kg: float | None
-    gross_limit_kg: float | None
-    front_wheel_limit_kg: float | None
-    rear_wheel_limit_kg: float | None
 
 
 class CalibrationFigures(BaseModel):
@@ -62,7 +31,9 @@ class VehicleDescription(BaseModel):
     vin: str | None
     estimator: str | None
     calibration: CalibrationFigures | None = Field(description="null: not calibrated, no payload can be told")
-    figures: VehicleFigures | None
+    figures: Vehicle | None = Field(
+        description="the vehicle as its campaign stated it, with the limits in force; unknown is null"
+    )
     signals: tuple[SignalHealth, ...]
 
 
@@ -79,7 +50,7 @@ def vehicle_router(status: Callable[[], Status], calibrated: CalibratedVehicle |
             vin=now.vin,
             estimator=now.estimator,
             calibration=None if calibrated is None else _calibration(calibrated),
-            figures=None if calibrated is None else _figures(calibrated),
+            figures=None if calibrated is None else calibrated.vehicle,
             signals=now.signals,
         )
 
@@ -103,7 +74,3 @@ def _speed_seen_mps(calibrated: CalibratedVehicle) -> tuple[float, float] | None
     if calibrated.cross_spectrum is not None:
         return calibrated.cross_spectrum.speed_seen_mps
     return None if calibrated.ratio_index is None else calibrated.ratio_index.speed_range_mps
-
-
-def _figures(calibrated: CalibratedVehicle) -> VehicleFigures:
-    return VehicleFigures(**{name: getattr(calibrated.vehicle, name) for name in VehicleFigures.model_fields})

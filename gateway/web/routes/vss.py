@@ -1,36 +1,17 @@
 """/api/v1/vss: the vehicle in the words of the COVESA Vehicle Signal Specification and our overlay to it."""
 
 import math
-from collections.abc import Callable
 from typing import Final
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.weights import unsprung_kg
-from gateway.web.live.board import Board, Shown
-from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
+from gateway.quantities import QUANTITIES
+from gateway.web.live.board import Board
+from gateway.web.routes.weights import Scales, weigh_latest
 
 _UINT16_LAST: Final = 65_535
-
-OVERLAY: Final[dict[str, tuple[Callable[[Shown], float], str]]] = {  # described in docs/vss/springscale.vspec
-    "Vehicle.Load.Payload": (lambda shown: shown.payload.number, "kg"),
-    "Vehicle.Load.PayloadStd": (lambda shown: shown.payload.std, "kg"),
-    "Vehicle.Load.FrontShare": (lambda shown: shown.front_share.number, "percent"),
-    "Vehicle.Load.FrontShareStd": (lambda shown: shown.front_share.std, "percent"),
-    "Vehicle.Load.LeftShare": (lambda shown: shown.left_share.number, "percent"),
-    "Vehicle.Load.LeftShareStd": (lambda shown: shown.left_share.std, "percent"),
-    "Vehicle.Load.CenterOfGravityLeft": (lambda shown: shown.cg_left.number, "m"),
-    "Vehicle.Load.CenterOfGravityLeftStd": (lambda shown: shown.cg_left.std, "m"),
-}
-LOADS: Final = {  # likewise: the core has these branches and no load in them
-    "Vehicle.Chassis.Axle.Row1": "front_axle",
-    "Vehicle.Chassis.Axle.Row1.Wheel.Left": "front_left",
-    "Vehicle.Chassis.Axle.Row1.Wheel.Right": "front_right",
-    "Vehicle.Chassis.Axle.Row2": "rear_axle",
-    "Vehicle.Chassis.Axle.Row2.Wheel.Left": "rear_left",
-    "Vehicle.Chassis.Axle.Row2.Wheel.Right": "rear_right",
-}
 
 
 class VssPoint(BaseModel):
@@ -55,29 +36,21 @@ def vss_router(board: Board, scales: Scales) -> APIRouter:
 
 
 def vss_points(board: Board, scales: Scales) -> list[VssPoint]:
-    """Every path we speak, in a fixed order."""
+    """Every path we speak, in a fixed order; the overlay's are described in docs/vss/springscale.vspec."""
     weights, shown = weigh_latest(board, scales), board.shown()
-    t_end = weights.t_end
     points = [
-        VssPoint(path="Vehicle.CurrentOverallWeight", value=_uint16(weights.gross.kg), unit="kg", timestamp=t_end),
         VssPoint(path="Vehicle.CurbWeight", value=_uint16(_kerb_kg(scales)), unit="kg", timestamp=None),
         VssPoint(path="Vehicle.GrossWeight", value=_uint16(weights.gross.limit_kg), unit="kg", timestamp=None),
     ]
-    points += [
-        VssPoint(path=path, value=_or_none(number_of(shown)), unit=unit, timestamp=t_end)
-        for path, (number_of, unit) in OVERLAY.items()
-    ]
-    for path, place in LOADS.items():
-        points += _load(path, place, weights)
+    for one in QUANTITIES:
+        figure = getattr(weights if one.is_weight else shown, one.name)
+        known, std = (figure.kg, figure.std_kg) if one.is_weight else (_or_none(figure.number), _or_none(figure.std))
+        found = {one.vss: known, f"{one.vss}Std": std} if one.has_vss_std else {one.vss: _uint16(known)}
+        points += [
+            VssPoint(path=path, value=value, unit=one.vss_unit, timestamp=weights.t_end)
+            for path, value in found.items()
+        ]
     return points
-
-
-def _load(path: str, place: str, weights: LatestWeights) -> list[VssPoint]:
-    figure = getattr(weights, place)
-    return [
-        VssPoint(path=f"{path}.Load", value=figure.kg, unit="kg", timestamp=weights.t_end),
-        VssPoint(path=f"{path}.LoadStd", value=figure.std_kg, unit="kg", timestamp=weights.t_end),
-    ]
 
 
 def _kerb_kg(scales: Scales) -> float | None:

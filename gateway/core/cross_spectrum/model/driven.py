@@ -110,8 +110,15 @@ def driven(model: SpectralModel, spectra: CrossSpectra) -> Driven:
     later_s = spectra.delay_s * model.delay_scale[..., None, :] + model.rear_lag_s[..., None, :]
     phase = spectra.delay_phase * np.exp(-2j * np.pi * spectra.freq_hz * later_s)
     x = along(model.track_offset_m, model, spectra)
-    paths = weights @ model.motion.paths
+    paths = _mixed(weights, model.motion.paths)
     return Driven(tuple(np.moveaxis(paths, 1, 0)), phase * (x * k1(x)), _twist(model, spectra))
+
+
+def _mixed(weights: F64, paths: C128) -> C128:
+    """(p, s, ..., b, m) of paths (p, s, ..., 5, m): weights (b, 5) are real, and so is the product that is taken."""
+    parts = np.ascontiguousarray(np.moveaxis(paths, -2, 0)).view(float)
+    mixed: C128 = (weights @ parts.reshape(len(parts), -1)).view(complex)
+    return np.moveaxis(mixed.reshape(len(weights), *paths.shape[:-2], paths.shape[-1]), 0, -2)
 
 
 def along(apart_m: F64, model: SpectralModel, spectra: CrossSpectra) -> F64:

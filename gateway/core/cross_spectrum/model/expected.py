@@ -4,7 +4,7 @@ Both axles meet one road, so the matrix is that of two coherent paths (with roll
 for half their difference); what is not coherent is added to it.
 """
 
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.driven import Driven, SpectralModel, driven
 from gateway.core.cross_spectrum.model.matrix import PAIRS, SpectralMatrix
 from gateway.records import C128, F64
+
+_Spectra = TypeVar("_Spectra", F64, C128)
 
 ROAD_EXPONENT: Final = -2.0  # displacement density of a road falls about as frequency squared (ISO 8608)
 
@@ -59,12 +61,27 @@ def power(x: C128) -> F64:
 
 def tapered(matrix: SpectralMatrix, spectra: CrossSpectra) -> SpectralMatrix:
     """With the road's slope, and mixed as a Hann taper does; one frequency fewer at either end."""
-    road = spectra.freq_hz**ROAD_EXPONENT / 6.0
-    auto, cross = matrix.auto * road, matrix.cross * road
-    return SpectralMatrix(
-        auto[..., :-2] + 4.0 * auto[..., 1:-1] + auto[..., 2:],
-        cross[..., :-2] + 4.0 * cross[..., 1:-1] + cross[..., 2:],
-    )
+    road = _road(spectra)
+    return SpectralMatrix(_mixed(matrix.auto * road), _mixed(matrix.cross * road))
+
+
+def tapered_parts(slopes: F64, spectra: CrossSpectra) -> F64:
+    """The same of changes (b, m, p^2, k) of a matrix's parts, frequencies before these."""
+    rough = (slopes * _road(spectra)[:, None, None]).swapaxes(1, -1)
+    return _mixed(rough).swapaxes(1, -1)
+
+
+def _road(spectra: CrossSpectra) -> F64:
+    road: F64 = spectra.freq_hz**ROAD_EXPONENT / 6.0
+    return road
+
+
+def _mixed(x: _Spectra) -> _Spectra:
+    """Each with its neighbours (..., m), weighed 1:4:1."""
+    mixed: _Spectra = 4.0 * x[..., 1:-1]
+    mixed += x[..., :-2]
+    mixed += x[..., 2:]
+    return mixed
 
 
 def noise(model: SpectralModel, matrix: SpectralMatrix, spectra: CrossSpectra) -> F64:

@@ -39,15 +39,14 @@ def levels() -> tuple[tuple[float, float], ...]:
     return (-u, -u), (0.0, 0.0), (u, u), (d, -d), (-d, d)
 
 
-_LESS: Final = np.expm1(-np.array(levels()))  # (5, 2) of front and rear axle: 1/s - 1
+_AXLES, _SHARES, _RATES = (list(each) for each in zip(*RATES, strict=True))
+_LESS: Final = np.expm1(-np.array(levels()))[:, _AXLES]  # (5, 4) of the axle of each rate: 1/s - 1
 
 
 def at_levels(theta: F64) -> F64:
     """Parameters theta (..., p) as they act at each of :func:`levels`: (..., 5, p)."""
     moved = np.repeat(theta[..., None, :], len(_LESS), axis=-2)
-    for axle, share, rate in RATES:
-        ratio = 1.0 + theta[..., share, None] * _LESS[:, axle]
-        moved[..., rate] += np.log(np.maximum(ratio, LEAST_LEFT))
+    moved[..., _RATES] += np.log(np.maximum(1.0 + moved[..., _SHARES] * _LESS, LEAST_LEFT))
     return moved
 
 

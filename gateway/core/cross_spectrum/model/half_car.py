@@ -1,8 +1,8 @@
 """A linear half-car that meets one road twice: first with the front axle, one wheelbase later with the rear.
 
 Heave and pitch of a rigid body on two axles, each a spring, a damper in series with its elastic
-mount, an unsprung mass and a tyre. The payload is a point mass with its own inertia, carried on a
-floor that gives a little. The body is described by the vertical positions of its points over the two
+mount, an unsprung mass and a tyre. The payload is a point mass on a floor that gives a little; its own inertia turns
+with the body. The body is described by the vertical positions of its points over the two
 axles, in which coordinates the suspension is diagonal and the payload enters without dividing by it.
 
 Fields may be numbers or arrays that broadcast against frequency, so that many vehicles are solved at once.
@@ -152,21 +152,18 @@ def added_axle_masses_kg(car: HalfCar, payload_kg: Real, front_share: Real) -> t
 def body_masses_kg(
     car: HalfCar, payload_kg: Real, front_share: Real
 ) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:
-    """Mass matrix (front-front, rear-rear, front-rear) of the body for the displacements over the axles, then of the
-    payload.
+    """Mass matrix (front-front, rear-rear, front-rear) of what turns with the body for the displacements over the
+    axles, then of the payload's mass, which moves on its floor.
 
     A point mass L at d adds L (1 - d/l)^2, L (d/l)^2 and L (1 - d/l)(d/l); written with the masses
-    F and R it puts on the axles, the last is q = L/4 - (R - F)^2 / (4 L) and the others F - q and R - q.
+    F and R it puts on the axles, the last is q = L/4 - (R - F)^2 / (4 L) and the others F - q and R - q. The payload's
+    own inertia turns with the body: a load rests on its edges, so that it rocks on its floor faster than it bounces.
     """
     share, length = car.empty_front_share, car.wheelbase_m
     front_kg, rear_kg = added_axle_masses_kg(car, payload_kg, front_share)
     inverse_payload = payload_kg / (payload_kg**2 + INVERSE_PAYLOAD_KG**2)
-    coupling = (
-        payload_kg / 4.0
-        - (rear_kg - front_kg) ** 2 / 4.0 * inverse_payload
-        - payload_kg * car.payload_gyration_m2 / length**2
-    )
-    turning = car.pitch_inertia_kgm2 / length**2
+    coupling = payload_kg / 4.0 - (rear_kg - front_kg) ** 2 / 4.0 * inverse_payload
+    turning = (car.pitch_inertia_kgm2 + payload_kg * car.payload_gyration_m2) / length**2
     rigid = (
         car.empty_mass_kg * share**2 + turning,
         car.empty_mass_kg * (1.0 - share) ** 2 + turning,

@@ -23,6 +23,17 @@ class SpectralMatrix:
         """Of the sensors, those that ``cross`` holds."""
         return PAIRS[: len(self.cross)]
 
+    @property
+    def parts(self) -> F64:
+        """(..., m, p^2) its real numbers: the diagonal, then real and imaginary part of each of the pairs."""
+        return np.stack([*self.auto, *(part for one in self.cross for part in (one.real, one.imag))], axis=-1)
+
+    @classmethod
+    def units(cls, n_sensors: int) -> "SpectralMatrix":
+        """The p^2 matrices (p, p^2, 1, 1) that have a one among their parts, and else zeros."""
+        units = np.eye(n_sensors**2)[:, :, None, None]
+        return cls(units[:n_sensors], units[n_sensors::2] + 1j * units[n_sensors + 1 :: 2])
+
     @classmethod
     def zeros(cls, n_sensors: int, shape: tuple[int, ...]) -> "SpectralMatrix":
         """Nothing, to be filled in."""

@@ -143,7 +143,8 @@ def _still_npm(axle: Axle, added_kg: Real, against: Against) -> Real:
 
 
 def _roll_masses(car: RollingCar, load: SidewaysLoad) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:
-    """Mass that couples the front and the rear with roll (kg m), and roll inertia (kg m2): of the body, of the payload.
+    """Mass that couples the front and the rear with roll (kg m), and roll inertia (kg m2): of what turns with the body,
+    of the payload's mass on its floor.
 
     A point mass L at (d, y) adds L y (1 - d/l), L y d/l and L y^2. An empty vehicle has no payload to divide by: what
     moment it is told to have lies as its own mass does.
@@ -155,6 +156,6 @@ def _roll_masses(car: RollingCar, load: SidewaysLoad) -> tuple[tuple[Real, Real,
     small = INVERSE_PAYLOAD_KG**2
     to_front = (added_front_kg * payload_kg + body.empty_front_share * small) / (payload_kg**2 + small)
     inverse_payload = payload_kg / (payload_kg**2 + small)
-    turning = payload_kg * car.payload_roll_gyration_m2 + moment_kgm**2 * inverse_payload
-    rigid = own_kgm * body.empty_front_share, own_kgm * (1.0 - body.empty_front_share), car.roll_inertia_kgm2
-    return rigid, (moment_kgm * to_front, moment_kgm * (1.0 - to_front), turning)
+    turning = car.roll_inertia_kgm2 + payload_kg * car.payload_roll_gyration_m2
+    rigid = own_kgm * body.empty_front_share, own_kgm * (1.0 - body.empty_front_share), turning
+    return rigid, (moment_kgm * to_front, moment_kgm * (1.0 - to_front), moment_kgm**2 * inverse_payload)

@@ -1,6 +1,7 @@
 """How the expected spectral matrix changes with each parameter of the vehicle and with its load."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -9,16 +10,15 @@ from scipy.special import k0, k1
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.driven import (
     Driven,
-    Paths,
     SpectralModel,
     along,
     driven,
     numbers_of,
     spectral_model,
 )
-from gateway.core.cross_spectrum.model.expected import noise, power, tapered, without_noise
+from gateway.core.cross_spectrum.model.expected import noise, power, tapered, tapered_parts, without_noise
 from gateway.core.cross_spectrum.model.friction import level_weights
-from gateway.core.cross_spectrum.model.matrix import SpectralMatrix
+from gateway.core.cross_spectrum.model.matrix import PAIRS, SpectralMatrix
 from gateway.core.cross_spectrum.model.motion import Motion
 from gateway.core.cross_spectrum.model.parameters import (
     INDEX,
@@ -43,29 +43,38 @@ def spectral_slopes(
     ground: Ground,
     spectra: CrossSpectra,
     free: Sequence[int],
-    solved: tuple[SpectralModel, Driven] | None = None,
-) -> SpectralMatrix:
-    """Derivatives (p, k, b, m) of the expected spectra for the ``free`` entries of theta (n,) and of the load.
+    solved: tuple[SpectralModel, Driven],
+) -> F64:
+    """Derivatives (b, m, p^2, k) of the expected spectra, as SpectralMatrix.parts has them, for the ``free`` entries of
+    theta (n,) and of the load.
 
     ``load`` is payload in kg, front share (0..1) and, for a vehicle that rolls, the lateral place: entries n, n + 1 and
-    n + 2. Those of vehicle and load are central differences of the responses, carried on by the chain rule; the others
-    are closed forms. ``solved`` is the model at this very point, where it is there already.
+    n + 2. The chain rule goes from parameters to the numbers in the equations of motion by central differences, on to
+    the responses and to the spectra by closed forms; the others are closed forms throughout. All of it is real matrix
+    products. ``solved`` is the model at this very point.
     """
-    model, by = solved or solved_at(theta, load, ground, spectra)
-    slopes = SpectralMatrix.zeros(spectra.n_sensors, (len(free), *by.phase.shape))
-    is_solved = [entry in VEHICLE_PARAMETERS or entry >= len(theta) for entry in free]
-    rows = np.flatnonzero(is_solved).tolist()
+    model, by = solved
+    slopes = np.zeros((*by.phase.shape, spectra.n_sensors**2, len(free)))
+    rows = [row for row, entry in enumerate(free) if entry in VEHICLE_PARAMETERS or entry >= len(theta)]
     if rows:
-        moved = _moved(theta, load, ground, spectra, [free[row] for row in rows], model.motion)
-        changed = _by_response(by, moved, model)
-        slopes.auto[:, rows], slopes.cross[:, rows] = changed.auto, changed.cross
+        by_level = _by_level(theta, load, ground, [free[row] for row in rows], model.motion)
+        moved = level_weights(spectra.log_movement) @ by_level
+        changed = _by_response(by, model) @ moved.reshape(*by.phase.shape, -1, len(rows))
+        for into, part in _runs(rows):
+            slopes[..., into] = changed[..., part]
     _fill_in_slack(slopes, free, by, model, spectra)
     for row, entry in enumerate(free):
         if entry in _OF_ROAD:
-            changed = _by_road(entry, by, model, spectra)
-            slopes.auto[:, row], slopes.cross[:, row] = changed.auto, changed.cross
-    matrix = tapered(without_noise(by, model), spectra)
-    return _with_noise(tapered(slopes, spectra), matrix, model, spectra, free)
+            slopes[..., row] = _by_road(entry, by, model, spectra).parts
+    slopes = tapered_parts(slopes, spectra)
+    _add_noise(slopes, tapered(without_noise(by, model), spectra), model, spectra, free)
+    return slopes
+
+
+def _runs(rows: Sequence[int]) -> list[tuple[slice, slice]]:
+    """Unbroken stretches of rising ``rows``, and where these stand among them: numpy copies slices far faster."""
+    breaks = [0, *(i for i in range(1, len(rows)) if rows[i] != rows[i - 1] + 1), len(rows)]
+    return [(slice(rows[start], rows[end - 1] + 1), slice(start, end)) for start, end in pairwise(breaks)]
 
 
 def solved_at(
@@ -76,10 +85,9 @@ def solved_at(
     return model, driven(model, spectra)
 
 
-def _moved(
-    theta: F64, load: tuple[float, ...], ground: Ground, spectra: CrossSpectra, free: Sequence[int], motion: Motion
-) -> Paths:
-    """Changes (p, k, b, m) of the responses with ``free`` entries of the vehicle and its load.
+def _by_level(theta: F64, load: tuple[float, ...], ground: Ground, free: Sequence[int], motion: Motion) -> F64:
+    """Changes (5, m 2 p s k) of the responses at each of friction.levels() with ``free`` entries of the vehicle and its
+    load: by frequency, sensor, way, real or imaginary part, entry.
 
     Central differences say how these move the numbers in the equations of motion, closed forms how the numbers move
     the responses.
@@ -95,37 +103,40 @@ def _moved(
             step[row] = LOAD_STEPS[entry - len(theta)]
             loads[entry - len(theta)][2 * row : 2 * row + 2] += (step[row], -step[row])
     numbers = numbers_of(thetas, tuple(loads), ground).all[..., 0]
-    by_number = (numbers[:, ::2] - numbers[:, 1::2]) * (0.5 / step[:, None])
-    moving = np.flatnonzero(by_number.any(axis=(1, 2)))
-    by_number = np.ascontiguousarray(np.moveaxis(by_number[moving], (2, 1), (0, 1)))  # or BLAS cannot multiply it
-    slopes = motion.slopes(moving.tolist())
-    p, s, m = slopes.shape[2:]
-    by_level = by_number @ slopes.view(float).reshape(len(slopes), len(moving), -1)
-    by_group = level_weights(spectra.log_movement) @ by_level.reshape(len(by_level), -1)
-    changed = by_group.view(complex).reshape(-1, k, p, s, m)
-    return tuple(changed[:, :, :, way].transpose(2, 1, 0, 3) for way in range(s))
+    by_entry = (numbers[:, ::2] - numbers[:, 1::2]) * (0.5 / step[:, None])
+    moving = np.flatnonzero(by_entry.any(axis=(1, 2)))
+    by_entry = np.ascontiguousarray(by_entry[moving].transpose(2, 0, 1))  # or BLAS cannot multiply it
+    slopes = np.ascontiguousarray(motion.slopes(moving.tolist()).transpose(0, 1, 4, 2, 3))
+    by_number = slopes.view(float).reshape(len(slopes), len(moving), -1)
+    by_level: F64 = by_number.transpose(0, 2, 1) @ by_entry
+    return by_level.reshape(len(slopes), -1)
 
 
-def _by_response(by: Driven, moved: Paths, model: SpectralModel) -> SpectralMatrix:
-    """Change of the matrix with changes ``moved`` (p, k, b, m) of the responses."""
-    slack, back = (1.0 + model.slack)[:, None, None], np.conj(by.phase)
-    changed = SpectralMatrix.zeros(len(model.slack), moved[0].shape[1:])
-    power_by = np.zeros(moved[0].shape, np.complex128)
-    shares: tuple[float | F64, ...] = (1.0,) if by.twist is None else (1.0, by.twist)
-    for way, share in enumerate(shares):
-        front, rear = share * by.paths[2 * way], share * by.paths[2 * way + 1]
-        for own, other, d in ((front, by.phase * rear, moved[2 * way]), (rear, back * front, moved[2 * way + 1])):
-            power_by += np.conj(slack * own[:, None] + other[:, None]) * d
-            whole = own + other
-            for row, (i, j) in enumerate(changed.pairs):
-                changed.cross[row] += d[i] * np.conj(whole[j])
-                changed.cross[row] += np.conj(d[j]) * whole[i]
-    return SpectralMatrix(2.0 * power_by.real, changed.cross)
+def _by_response(by: Driven, model: SpectralModel) -> F64:
+    """(b, m, p^2, 2 p s) by how much the matrix changes with the responses, both in real and imaginary parts.
+
+    An auto-spectrum is F^* (slack F + phase R) and the rest of it, so that a change d of the response F moves it by
+    2 Re(conj(slack F + phase R) d), and likewise the others: each is the real part of a product with conj(z), or
+    Re(z) Re(d) + Im(z) Im(d).
+    """
+    p, s = len(model.slack), len(by.paths)
+    slack = 1.0 + model.slack[:, None]
+    twist = 1.0 if by.twist is None else by.twist
+    z = np.zeros((*by.phase.shape, p * p, p, s), np.complex128)
+    for way, own in enumerate(by.paths):
+        other = by.phase * by.paths[way + 1] if way % 2 == 0 else np.conj(by.phase) * by.paths[way - 1]
+        share = 1.0 if way < 2 else twist
+        power_by, whole = 2.0 * share * (slack * own + other), share * (own + other)
+        for i in range(p):
+            z[:, :, i, i, way] = power_by[i]
+        for row, (i, j) in enumerate(PAIRS[: p * (p - 1) // 2]):
+            re, im = p + 2 * row, p + 2 * row + 1
+            z[:, :, re, i, way], z[:, :, re, j, way] = whole[j], whole[i]
+            z[:, :, im, i, way], z[:, :, im, j, way] = 1j * whole[j], -1j * whole[i]
+    return z.reshape(*z.shape[:3], -1).view(float)
 
 
-def _fill_in_slack(
-    slopes: SpectralMatrix, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra
-) -> None:
+def _fill_in_slack(slopes: F64, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra) -> None:
     """By the knots of each sensor's slack, which has a part in that sensor's own power alone."""
     for sensor, knots in enumerate(SLACK_KNOTS[: len(model.slack)]):
         rows = [row for row, entry in enumerate(free) if entry in knots]
@@ -135,7 +146,9 @@ def _fill_in_slack(
         if by.twist is not None:
             own = own + by.twist * (power(by.paths[2][sensor]) + power(by.paths[3][sensor]))
         shares = slack_weights(spectra.freq_hz)[[free[row] - knots.start for row in rows]]
-        slopes.auto[sensor, rows] = (model.slack[sensor] - model.least_slack) * shares[:, None] * own
+        changed = ((model.slack[sensor] - model.least_slack) * own)[..., None] * shares.T
+        for into, part in _runs(rows):
+            slopes[:, :, sensor, into] = changed[..., part]
 
 
 def _by_road(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
@@ -180,16 +193,14 @@ def _by_phase(d_phase: C128, by: Driven) -> SpectralMatrix:
     return changed
 
 
-def _with_noise(
-    slopes: SpectralMatrix, matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra, free: Sequence[int]
-) -> SpectralMatrix:
+def _add_noise(
+    slopes: F64, matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra, free: Sequence[int]
+) -> None:
+    """That of ``matrix`` (expected.noise) grows with the power of acceleration and of pitch rate."""
     sensed = noise(model, matrix, spectra)
-    grown = 0.5 * sum(
-        slopes.auto[i].mean(axis=-1, keepdims=True) / matrix.auto[i].mean(axis=-1, keepdims=True) for i in (0, 1)
-    )
-    auto = slopes.auto + sensed[:, None] * grown
-    for row, entry in enumerate(free):
-        for sensor in range(len(auto)):
+    grown = 0.5 * sum(slopes[:, :, i].mean(axis=1) / matrix.auto[i].mean(axis=-1)[:, None] for i in (0, 1))
+    for sensor, one in enumerate(sensed):
+        slopes[:, :, sensor] += (one * grown)[:, None]
+        for row, entry in enumerate(free):
             if entry == INDEX[NOISES[sensor]]:
-                auto[sensor, row] += sensed[sensor]
-    return SpectralMatrix(auto, slopes.cross)
+                slopes[:, :, sensor, row] += one

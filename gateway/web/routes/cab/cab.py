@@ -12,9 +12,9 @@ from gateway.core.alarms.weighing import as_of_load
 from gateway.core.events import EntryKind
 from gateway.core.weights import Room, nearness, rooms_of
 from gateway.estimate import Estimate, Quantity, Weights
-from gateway.history import Reader
 from gateway.records import iso_utc
 from gateway.status import Status
+from gateway.store import StoreReader
 from gateway.web.live.board import Board
 from gateway.web.routes.cab.shapes import Cab, CabEvent, LoadKnown, RoomLeft
 from gateway.web.routes.weights import Scales
@@ -23,7 +23,7 @@ from gateway.web.schemas import problem_responses
 _EVENTS: Final = 20  # a corrected one comes again behind newer ones
 
 
-def cab_router(board: Board, reader: Reader, status: Callable[[], Status], scales: Scales) -> APIRouter:
+def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], scales: Scales) -> APIRouter:
     """The route that tells a driver."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
@@ -88,7 +88,7 @@ def _rejected(heard: Estimate | None, shown: Estimate | None) -> list[str]:
     return [str(why) for why in heard.rejected] if heard is not None and is_newer else []
 
 
-def _events(reader: Reader) -> tuple[str, ...]:
+def _events(reader: StoreReader) -> tuple[str, ...]:
     return tuple(reader.page((EntryKind.EVENT,), limit=_EVENTS, newest_first=True).items)
 
 

@@ -4,14 +4,12 @@ Requests with a good token come in; who keeps these things (a desk of the servic
 thread of its own; its refusals go out as problems with a reason.
 """
 
-from gateway.web.routes.calibration.known_weights import KnownWeightService, NoKnownWeights, known_weights_router
+from gateway.web.routes.calibration.known_weights import KnownWeightService, known_weights_router
 from gateway.web.routes.calibration.trend import TrendDesk, trend_router
-from gateway.web.routes.calibration.verification import NoVerificationDesk, VerificationDesk, verification_router
+from gateway.web.routes.calibration.verification import VerificationDesk, verification_router
 
 __all__ = [
     "KnownWeightService",
-    "NoKnownWeights",
-    "NoVerificationDesk",
     "TrendDesk",
     "VerificationDesk",
     "known_weights_router",

@@ -11,8 +11,6 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from starlette.responses import Response
 
 from gateway.core.known_weights import KnownWeightKind
-from gateway.errors import WeightRefusedError
-from gateway.records import json_line
 from gateway.stated_weight import StatedWeight
 from gateway.web.routes.calibration.asking import REFUSALS, answered, who
 from gateway.web.routes.calibration.stated import Stated, StatedTold
@@ -23,8 +21,6 @@ TARE_PATH: Final = "/calibration/tare"
 TICKETS_PATH: Final = "/calibration/tickets"
 EMPTY: Final = (KnownWeightKind.EMPTY,)
 WEIGHED: Final = tuple(kind for kind in KnownWeightKind if kind is not KnownWeightKind.EMPTY)
-_NO_CALIBRATION: Final = ("no_calibration", "no calibration is loaded, so there is nothing to correct")
-_NO_SUCH: Final = ("no_such_weight", "there is no such known weight that still stands")
 
 
 class KnownWeightService(Protocol):
@@ -49,32 +45,6 @@ class KnownWeightService(Protocol):
     def take_back_empty(self, by: str, *, to_factory: bool) -> str:
         """The KnownWeightState after it, of this kind. Raises WeightRefusedError."""
         ...
-
-
-class NoKnownWeights:
-    """Where nothing is weighed there is nothing to condition."""
-
-    def state(self, kinds: Sequence[KnownWeightKind] = ()) -> str:
-        """An empty list."""
-        offer = {"is_possible": False, "reason": _NO_CALIBRATION[0], "detail": _NO_CALIBRATION[1], "load": None}
-        known = {"known_weights_id": None, "n_teaching": 0, "mean_error_kg": None, "error_std_kg": None}
-        return json_line({**known, "offer": offer, "fault": None, "history": []})
-
-    def add(self, kind: KnownWeightKind, by: str, note: str | None, stated: StatedWeight | None = None) -> str:
-        """Always refused."""
-        raise WeightRefusedError(*_NO_CALIBRATION)
-
-    def confirm(self, by: str, entry_id: str) -> str:
-        """Always refused."""
-        raise WeightRefusedError(*_NO_SUCH)
-
-    def take_back(self, by: str, entry_id: str, kinds: Sequence[KnownWeightKind] = ()) -> str:
-        """Always refused."""
-        raise WeightRefusedError(*_NO_SUCH)
-
-    def take_back_empty(self, by: str, *, to_factory: bool) -> str:
-        """Always refused."""
-        raise WeightRefusedError(*_NO_SUCH)
 
 
 Note = Annotated[

@@ -7,8 +7,6 @@ from fastapi import APIRouter, Path, Request
 from pydantic import BaseModel, Field
 from starlette.responses import HTMLResponse, Response
 
-from gateway.errors import WeightRefusedError
-from gateway.records import json_line
 from gateway.stated_weight import StatedWeight
 from gateway.status import VerificationStatus
 from gateway.web.door.problems import problem_response
@@ -37,24 +35,6 @@ class VerificationDesk(Protocol):
     def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str:
         """The new VerificationRecord. Raises WeightRefusedError."""
         ...
-
-
-class NoVerificationDesk:
-    """Where nothing is weighed there is nothing to verify."""
-
-    def told(self) -> str:
-        """No record, and none is due."""
-        rule = {"permitted_error_pct": 5.0, "permitted_axle_error_pct": None, "loads": 1}
-        due = {"n_records": 0, "last_at": None, "last_verdict": None, "due_at": None, "is_due": False}
-        return json_line({"rule": rule, "due": due, "warning": None, "history": []})
-
-    def record(self, record_id: str) -> Mapping[str, Any] | None:
-        """None."""
-        return None
-
-    def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str:
-        """Always refused."""
-        raise WeightRefusedError("no_calibration", "there is no calibration, and so nothing to verify")
 
 
 class VerificationRequest(Body):

@@ -32,10 +32,6 @@ class ChooseLine(Body):
     line: LineNamed | None
 
 
-class VehicleBody(Body, VehicleAnswers):
-    """The vehicle as it stands before you, empty."""
-
-
 class ClaimEmpty(Body):
     """The claim that the drive rests on."""
 

@@ -4,6 +4,7 @@ import asyncio
 from typing import Annotated, Final, Protocol
 
 from fastapi import APIRouter, Query, Request
+from pydantic import BeforeValidator
 from starlette.responses import Response
 
 from gateway.stated import VehicleAnswers
@@ -17,9 +18,8 @@ from gateway.web.routes.commissioning.shapes import (
     LinesFound,
     Source,
     UploadLine,
-    VehicleBody,
 )
-from gateway.web.schemas import problem_responses
+from gateway.web.schemas import problem_responses, utf8_only
 
 COMMISSIONING_PATH: Final = "/calibration/commissioning"
 NOT_HERE: Final = "there is no service behind this page that could calibrate"
@@ -83,13 +83,12 @@ def commissioning_router(desk: CommissioningDesk) -> APIRouter:
         )
 
     @router.post("/vehicle", response_model=CommissioningState, responses=of_body)
-    async def state_vehicle(request: Request, said: VehicleBody) -> Response:
+    async def state_vehicle(request: Request, said: Annotated[VehicleAnswers, BeforeValidator(utf8_only)]) -> Response:
         """What the empty vehicle weighs, its wheelbase, and where the sensor sits. May be answered anew as well.
 
         Answers that are unlikely are kept and asked about (``doubts``): correct them, or confirm.
         """
-        answers = VehicleAnswers(**said.model_dump(exclude_unset=True))
-        return await answered(request, lambda: desk.state_vehicle(answers))
+        return await answered(request, lambda: desk.state_vehicle(said))
 
     @router.post("/confirm", response_model=CommissioningState, responses=refusals)
     async def confirm_doubts(request: Request) -> Response:

@@ -1,0 +1,185 @@
+"""How much of the time on the road is covered by estimates, where driving is slow, short or broken by stops.
+
+    python -m benchmarks.accuracy.availability --vans 2        a line a world, as Markdown
+
+Every van is calibrated by known loads at 50 km/h and then driven through each world with one load, or with one that
+changes at a stop. A second on the road counts as covered where it lies within an estimate, early looks left out.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import click
+import numpy as np
+
+from benchmarks.accuracy.coverage_drives import MAP_NAME, Scope, unseen_load
+from benchmarks.accuracy.delivery_days import ROAD
+from benchmarks.accuracy.vans import FreshVan, fresh_van
+from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
+from gateway.calibration.judgement.learning_curve import calibrated_on
+from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.flow import Flow, Identity
+from gateway.core.settings import BatchSettings
+from gateway.estimate import Estimate
+from gateway.records import F64, I64, Bool, Motion, Signal, joined
+from gateway.sim.drive import Drive, Leg, drive_of, standstill
+from gateway.sim.scenario import simulate_drive
+from gateway.sim.vehicle import Load, payload_kg
+from gateway.units import NS_PER_S
+from gateway.workbench.wiring import Wiring
+
+SEED: Final = 20_300
+ESTIMATOR: Final = "cross_spectrum"
+STANDSTILL_MPS: Final = 0.5
+START_NS: Final = 1_790_000_000_000_000_000
+HOUR_S: Final = 3600.0
+HOP_S: Final = (100.0, 280.0)
+
+Hop = tuple[Drive, float]  # how it is driven, and how many seconds the vehicle then stands
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """``hops`` draws what is driven; ``is_changed``: at the middle stop another load is put on."""
+
+    name: str
+    hops: Callable[[np.random.Generator], list[Hop]]
+    is_changed: bool = False
+
+
+def _slow(
+    rng: np.random.Generator, kmh: tuple[float, float], hold_s: tuple[float, float], stop_share: float, for_s: float
+) -> Drive:
+    """From rest to rest, with stops of 3 to 40 s between legs."""
+    legs, left_s = [Leg(0.0, 3.0)], for_s
+    while left_s > 0.0:
+        leg = Leg(rng.uniform(*kmh) / 3.6, rng.uniform(*hold_s), rng.uniform(0.7, 1.8))
+        pause = [Leg(0.0, rng.uniform(3.0, 40.0), 1.5)] if rng.random() < stop_share else []
+        left_s -= sum(one.hold_s + 6.0 for one in (leg, *pause))
+        legs += [leg, *pause]
+    return drive_of([*legs, Leg(0.0, 3.0, 1.5)])
+
+
+def _delivery(rng: np.random.Generator) -> list[Hop]:
+    """Twenty short hops in town with a minute or two at each door: none is long enough for a batch."""
+    return [
+        (_slow(rng, (20.0, 45.0), (8.0, 40.0), 0.4, float(rng.uniform(*HOP_S))), float(rng.uniform(75.0, 150.0)))
+        for _ in range(20)
+    ]
+
+
+def _changing(rng: np.random.Generator) -> list[Hop]:
+    """Seven minutes, a stop of 20 s, and eight more."""
+    return [(_slow(rng, (35.0, 55.0), (30.0, 90.0), 0.0, t_s), 20.0) for t_s in (400.0, 480.0)]
+
+
+WORLDS: Final = (
+    World("town, 15 to 30 km/h", lambda rng: [(_slow(rng, (15.0, 30.0), (8.0, 50.0), 0.6, HOUR_S), 0.0)]),
+    World("stop and go, below 30 km/h", lambda rng: [(_slow(rng, (8.0, 30.0), (5.0, 25.0), 1.0, HOUR_S), 0.0)]),
+    World("delivery: hops of 2 to 5 minutes", _delivery),
+    World("load changes during a stop of 20 s", _changing, is_changed=True),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Of one drive: seconds on the road, those within estimates, and each estimate as (error, half-width) in kg."""
+
+    moving_s: float
+    covered_s: float
+    errors_kg: tuple[tuple[float, float, bool], ...]
+    n_refused: int
+
+
+def driven(fresh: FreshVan, calibrated: CalibratedVehicle, world: World, seed: np.random.SeedSequence) -> Found:
+    """One van through one world."""
+    rng = np.random.default_rng(seed)
+    hops = world.hops(rng)
+    first = unseen_load(fresh.van, rng)
+    other = unseen_load(fresh.van, rng) if world.is_changed else first
+    signal_map = load_signal_map(SHIPPED_PREFIX + MAP_NAME)
+    parts, carried, start_ns = list[Motion](), list[tuple[int, tuple[Load, ...]]](), START_NS
+    for i, (drive, stand_s) in enumerate(hops):
+        loads = first if i < len(hops) / 2 else other
+        whole = drive.then(standstill(stand_s)) if stand_s else drive
+        recorded = simulate_drive(fresh.van, loads, ROAD, whole, fresh.sensors, int(rng.integers(2**31)), start_ns)
+        parts.append(Decoder(signal_map).decode(Wiring(MAP_NAME).frames_of(recorded.recording)))
+        carried.append((start_ns, loads))
+        start_ns += round(whole.duration_s * NS_PER_S)
+    motion = joined(parts)
+    flow = Flow(BatchSettings(), signal_map.traits, calibrated, ESTIMATOR, Identity())
+    found = [one for one in (*flow.feed(motion), *flow.flush()) if not one.is_remainder]
+    return _judged(motion, carried, found)
+
+
+def _judged(motion: Motion, carried: list[tuple[int, tuple[Load, ...]]], found: list[Estimate]) -> Found:
+    t_ns, speed_mps = motion.of(Signal.SPEED)
+    step_s = np.minimum(np.diff(t_ns, append=t_ns[-1]) / NS_PER_S, 1.0)
+    moving_s = np.where(speed_mps >= STANDSTILL_MPS, step_s, 0.0)
+    answered = [one for one in found if one.counted]
+    return Found(
+        moving_s=float(moving_s.sum()),
+        covered_s=float(moving_s[_within(t_ns, answered)].sum()),
+        errors_kg=tuple(_error_of(one, _true_kg(one, t_ns, moving_s, carried)) for one in answered),
+        n_refused=len(found) - len(answered),
+    )
+
+
+def _within(t_ns: I64, estimates: list[Estimate]) -> Bool:
+    inside = np.zeros(len(t_ns), bool)
+    for one in estimates:
+        inside |= (t_ns >= one.t_start_ns) & (t_ns < one.t_end_ns)
+    return inside
+
+
+def _true_kg(one: Estimate, t_ns: I64, moving_s: F64, carried: list[tuple[int, tuple[Load, ...]]]) -> float:
+    """The load aboard for most of the time on the road."""
+    inside = (t_ns >= one.t_start_ns) & (t_ns < one.t_end_ns)
+    bounds = [start_ns for start_ns, _ in carried[1:]]
+    of_hop = np.searchsorted(bounds, t_ns[inside], side="right")
+    weights: dict[float, float] = {}
+    for hop, seconds in zip(of_hop, moving_s[inside], strict=True):
+        kg = payload_kg(carried[hop][1])
+        weights[kg] = weights.get(kg, 0.0) + float(seconds)
+    return max(weights, key=lambda kg: weights[kg])
+
+
+def _error_of(one: Estimate, true_kg: float) -> tuple[float, float, bool]:
+    low, high = one.payload.interval95
+    return one.payload.number - true_kg, 0.5 * (high - low), low <= true_kg <= high
+
+
+def table(n_vans: int, seed: int = SEED) -> Iterator[str]:
+    """Lines of Markdown."""
+    yield "| world | on the road [min] | covered | estimates | refused | mean error [kg] | half-width [kg] | held |"
+    yield "|---|---|---|---|---|---|---|---|"
+    scope = Scope()
+    of_world: dict[str, list[Found]] = {world.name: [] for world in WORLDS}
+    for number in range(n_vans):
+        fresh = fresh_van(scope, seed, number)
+        calibrated = calibrated_on(fresh.runs, fresh.vehicle, ESTIMATOR)
+        for world, one in zip(WORLDS, fresh.test_seed.spawn(len(WORLDS)), strict=True):
+            of_world[world.name].append(driven(fresh, calibrated, world, one))
+    for name, found in of_world.items():
+        errors = [error for one in found for error in one.errors_kg]
+        moving_s, covered_s = (sum(getattr(one, which) for one in found) for which in ("moving_s", "covered_s"))
+        figures = [f"{np.mean([abs(e[0]) for e in errors]):.1f}", f"{np.mean([e[1] for e in errors]):.0f}"]
+        held = f"{sum(e[2] for e in errors)} of {len(errors)}"
+        yield (
+            f"| {name} | {moving_s / 60.0:.0f} | {100.0 * covered_s / moving_s:.0f} % | {len(errors)} | "
+            f"{sum(one.n_refused for one in found)} | {' | '.join(figures if errors else ['-', '-'])} | {held} |"
+        )
+
+
+@click.command()
+@click.option("--vans", default=2, show_default=True, help="how many vans are driven through each world")
+@click.option("--seed", default=SEED, show_default=True)
+def main(vans: int, seed: int) -> None:
+    """Print the table."""
+    for line in table(vans, seed):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,461 @@
+"""The parts of the reference pages that are made from the code: tables of keys, fields, reasons and findings.
+
+``PARTS`` names them by page and mark; the words around them stand in the pages (docs/make.py fills the marks).
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from made import default_of, key_table, table
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic.json_schema import GenerateJsonSchema
+
+from gateway.archive.dataset import OVER_LIMIT, OWN_STD, PROVENANCE, columns
+from gateway.archive.manifest import ManifestFile, VehicleEntry
+from gateway.bus.signals import SignalMapFile, shipped_map
+from gateway.bus.signals.resolve import QUANTITIES
+from gateway.bus.signals.signal_map import SignalEntry, shipped_maps
+from gateway.calibration.axle_weights import (
+    DIVISION_KG,
+    ESTIMATED_UNSPRUNG_STD,
+    UNSPRUNG_SHARE,
+    WEIGHED_STD,
+    AxleWeights,
+    sprung_of,
+)
+from gateway.calibration.campaign import CampaignTable, RunTable
+from gateway.calibration.file import CalibrationFile
+from gateway.calibration.inspection.explained import EXPLAINED, Topic
+from gateway.cli.text.axle_weights import vehicle_block
+from gateway.config import Settings
+from gateway.core.vehicle import Vehicle
+from gateway.estimate import Lack
+from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, SPECTRA, WEIGHTS, EstimateField
+from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
+from gateway.records import Signal
+from gateway.units import TO_SI
+
+# -- the signal map --
+
+MEANINGS: Final = {
+    Signal.VERTICAL_ACCELERATION: "needed; z up, about +9.81 m/s² at rest (gravity is removed later)",
+    Signal.PITCH_RATE: "needed; about y, positive **nose down**",
+    Signal.SPEED: "needed; over ground, from GNSS",
+    Signal.ROLL_RATE: "about x, positive **left side up**; tells where the load lies sideways, never refuses a batch",
+    Signal.LONGITUDINAL_ACCELERATION: "x forward; inspection names swapped axes with it",
+    Signal.WHEEL_SPEED: "stands in for `speed` where that is missing",
+    Signal.IGNITION: "of the journey; 1 while it is on",
+    Signal.AMBIENT_TEMPERATURE: "decoded and counted, nothing uses it yet",
+    Signal.AXLE_WEIGHT: "of the vehicle's own load sensors; shown beside, see below",
+    Signal.LATITUDE: "of the journey; WGS 84, north positive",
+    Signal.LONGITUDE: "of the journey; WGS 84, east positive",
+    Signal.ODOMETER: "of the journey; only differences count, so a trip's counter will do",
+    Signal.DOOR: "of the journey; above 0 while any door of the load room is open",
+    Signal.AIR_SPRING_PRESSURE: "of the vehicle's own load sensors; shown beside, see below",
+    Signal.RIDE_HEIGHT: "likewise; its zero is the sensor's own",
+}
+SI_UNITS: Final = {
+    "acceleration": "m/s²", "angular_rate": "rad/s", "speed": "m/s", "angle": "°",
+    "distance": "m", "pressure": "Pa", "mass": "kg", "temperature": "°C", "state": "none"
+}  # fmt: skip
+
+
+def signals_table() -> str:
+    """Every signal: what it measures, and what it is for."""
+    rows = ((f"`{signal}`", QUANTITIES[signal].replace("_", " "), meaning) for signal, meaning in MEANINGS.items())
+    return table("NAME | quantity | meaning", rows)
+
+
+def units_table() -> str:
+    """Every quantity: its SI unit, and the names that are accepted."""
+    rows = (
+        (
+            quantity.replace("_", " "),
+            SI_UNITS[quantity],
+            ", ".join(f"`{name}`" if name else "none at all" for name in units),
+        )
+        for quantity, units in TO_SI.items()
+    )
+    return table("quantity | becomes | accepted names", rows)
+
+
+def maps_table() -> str:
+    """Every shipped map and its device."""
+    return table("map | device", ((f"`springscale:{name}`", _first_line(shipped_map(name))) for name in shipped_maps()))
+
+
+def _first_line(path: Path) -> str:
+    return path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ").split(". ")[0].rstrip(".")
+
+
+# -- the campaign file --
+
+WEIGHED = AxleWeights(front_kg=760.0, rear_kg=640.0)
+MEASURED = {"Ford Escort": (75.0, 4.5, 4.5), "VW Vanagon": (90.21635, 5.56015, 5.56015)}  # sprung, unsprung, in slugs
+GOLDEN_CAR: float = 0.15  # unsprung over sprung mass of a quarter-car, both axles together
+
+
+def sprung_section() -> str:
+    """How axle weights become sprung mass and front share, with the example's numbers."""
+    body = sprung_of(WEIGHED)
+    estimated_pct, given_pct = 100.0 * ESTIMATED_UNSPRUNG_STD, 100.0 * WEIGHED_STD
+    shares = {car: 100.0 * (front + rear) / 2.0 / sprung for car, (sprung, front, rear) in MEASURED.items()}
+    cars = " and ".join(f"{pct:.1f} % ({car})" for car, pct in shares.items())
+    return f"""\
+## From axle weights to sprung mass and front share
+
+A weighbridge shows F under the front axle and R under the rear one. Weigh the empty vehicle on level ground, with
+driver and tank as in service. The body rests on the front axle with its share s. Wheels, brakes and axles (u) are not
+carried by the springs. Each axle is in static equilibrium:
+
+$$F = s M + u_f \\qquad R = (1 - s) M + u_r$$
+
+The sum gives the sprung mass, the first line its front share:
+
+$$M = F + R - u_f - u_r \\qquad s = \\frac{{F - u_f}}{{M}}$$
+
+| symbol | key | meaning |
+|---|---|---|
+| $F$, $R$ | `kerb_front_axle_kg`, `kerb_rear_axle_kg` | what the scales show, kg |
+| $u_f$, $u_r$ | `unsprung_front_kg`, `unsprung_rear_kg` | unsprung masses, kg |
+| $M$ | `empty_mass_kg` | sprung mass of the empty vehicle, kg |
+| $s$ | `empty_front_share_pct` | its share on the front axle, in percent in the file |
+
+The command does it, and prints a block to paste (`--json` for programs):
+
+```console
+$ springscale calibration sprung --front-axle-kg {WEIGHED.front_kg:g} --rear-axle-kg {WEIGHED.rear_kg:g}
+{vehicle_block(body)}
+```
+
+**Where the unsprung masses are unknown** (no `--unsprung-front-kg`, `--unsprung-rear-kg`), each is taken as
+k = {100 * UNSPRUNG_SHARE:.1f} % of the sprung mass, so with both unknown
+
+$$M = \\frac{{F + R}}{{1 + 2 k}}$$
+
+The same share is the centre of calibration's prior, and an estimate is left out of the block, so that calibration goes
+on treating it as one. Sources:
+
+- the paper's van has 160 kg beside 1240 kg (Table 1, read as four times 40 kg), {100 * 80 / 1240:.1f} % an axle;
+- published parameters of two real vehicles have {cars}
+  (CommonRoad vehicle models, from vehicle dynamics studies of the US Department of Transportation);
+- the quarter-car of the roughness index has {100 * GOLDEN_CAR:.0f} % for both axles, {100 * GOLDEN_CAR / 2:.1f} % each
+  (M. W. Sayers, S. M. Karamihas, The Little Book of Profiling, 1998).
+
+**How sure that is.** The standard deviation of an unsprung mass is taken as {estimated_pct:.0f} % where it is estimated
+and {given_pct:.0f} % where it is given: beam axles and twin tyres weigh more than these sources say. A reading rounded
+to steps of {DIVISION_KG:g} kg (`--division-kg`) adds {DIVISION_KG:g}/√12 = {DIVISION_KG / 12**0.5:.1f} kg. Taken as
+independent, to first order:
+
+$$\\sigma_M^2 = \\sigma_f^2 + \\sigma_r^2$$
+
+$$\\sigma_s^2 = \\frac{{(1 - s)^2 \\sigma_f^2 + s^2 \\sigma_r^2}}{{M^2}}$$
+
+with $\\sigma_f$ of $F - u_f$ and $\\sigma_r$ of $R - u_r$. In the example that is {body.mass_std_kg:.0f} kg and
+{body.front_share_std_pct:.2f} percentage points.
+"""
+
+
+# -- an estimate --
+
+UNITS: Final = (
+    ("_kg", "kg"),
+    ("_std_pct", "pp"),
+    ("_pct", "%"),
+    ("_left_m", "m"),
+    ("_left_std_m", "m"),
+    ("_left_interval95_m", "m"),
+    ("_mps2", "m/s²"),
+    ("_mps", "m/s"),
+    ("_ns", "ns"),
+)
+SHARES: Final = ("gap_share", "usable_share", "roll_usable_share", "shares")
+
+NULL: Final = {
+    "id": "",
+    "vehicle_id": "null where no configuration names the vehicle",
+    "vin": "absent unless `[vehicle] vin` says it",
+    "t_start_ns": "",
+    "t_end_ns": "",
+    "estimator": "",
+    "calibration_id": "null without a calibration",
+    "payload": "null where rejected, or where the ratio index has no model of it",
+    "front_share": "null where rejected, or where the ratio index has no model of it",
+    "payload_front_share_correlation": "null where rejected",
+    "cg_left": "null where rejected, by the ratio index, and without a roll rate",
+    "left_share": "as above",
+    "payload_cg_left_correlation": "as above",
+    "front_share_cg_left_correlation": "as above",
+    "roll_share_front": "as above",
+    "roll_share_front_std": "as above",
+    "weights": "what is unknown in it is null and says what it lacks; see below",
+    "ratio_index_acceleration": "null where rejected before it was computed, and without a calibrated ratio index",
+    "ratio_index_pitch_rate": "as above",
+    "mean_speed_mps": "null where no speed is known",
+    "gap_share": "",
+    "usable_share": "",
+    "roll_usable_share": "null without a roll rate in the signal map, and where nothing is usable",
+    "roughness_mps2": "null without spectra or speed",
+    "shares": "",
+    "rejected": "",
+    "is_provisional": "absent in the estimate of a whole batch",
+    "spectra": "absent where nothing could be transformed, and where the request says `spectra=false`",
+    "diagnostics": "empty where rejected before a fit",
+    "epoch": "absent where rejected or provisional; the place is null where no batch told it",
+    "way": "null in what early versions stored, and in an early look; what is unknown in it is null",
+    "known_weights_id": "absent where no known weight is in use",
+    "raw_payload": "absent where no known weight is in use",
+    "raw_front_share": "as above",
+    "error_budget": "empty where rejected",
+    "posterior": "absent where rejected",
+    "measured": "absent where no known weight is in use",
+}
+"""When a field is unknown, by the part of Estimate that it shows. Empty: never."""
+
+DIAGNOSTICS: Final = {
+    "reach": "how far the load lies beyond the known ones, in parts of the empty sprung mass; 0 among them",
+    "misfit": "likelihood ratio per degree of freedom against free matrices: about 1 where the model fits",
+    "n_segments": "segments that were averaged",
+    "amplitude_ratio": "how much the vehicle moved, over the usual in calibration",
+    "damper_front_ratio": "front dampers' rate over the calibrated",
+    "damper_rear_ratio": "rear dampers' rate over the calibrated",
+    "delay_scale": "by which share the rear axle came later than wheelbase and speed say",
+    "tension": "how far the vehicle lies off its calibration: chi-squared of five; refused above 25.7",
+    "sensor_position_score": "pull to another place or gain of the sensor, in standard deviations; refused beyond 6",
+    "sensor_noise_score": "pull towards more noise in the acceleration, as roll makes it, likewise; refused above 6",
+    "payload_gyration_m2": "squared radius of gyration in pitch of the load, as the fit began with it",
+    "payload_mode_hz": "frequency at which the payload rings on its floor",
+    "payload_damping_ratio": "how much its floor or mount damps that, of critical",
+    "delay_s": "mean time from axle to axle",
+    "delay_std_s": "its standard deviation over the segments",
+}
+"""What cross_spectrum says of its own; the ratio index says nothing."""
+
+LACKS: Final = {
+    Lack.CALIBRATION: "nobody says what the vehicle weighs empty: no calibration is in use",
+    Lack.ESTIMATE: "the batch was rejected, or the estimator does not tell the front share",
+    Lack.UNSPRUNG_MASS: "`[vehicle]` of the campaign states neither the axle's unsprung mass nor its kerb weight, and "
+    "the calibration has no part for cross_spectrum, which would have found it",
+    Lack.TRACK_WIDTH: "`[vehicle]` of the campaign states no `track_width_m`",
+    Lack.ROLL_RATE: "nothing tells where the load lies sideways: no roll rate, or a calibration without one",
+}
+"""What a weight may lack, in words."""
+
+KNOWN: Final = ("known_weights_id", "raw_payload", "raw_front_share", "error_budget", "posterior", "measured")
+GROUPS: Final = {
+    "batch": ("",),
+    "epoch": ("epoch",),
+    "known": KNOWN,
+}
+"""Tables of the page, by the parts of Estimate that they show; the batch has all the others."""
+
+
+def part_of(one: EstimateField) -> str:
+    """The part of Estimate that a field shows: a key of NULL."""
+    return "t_end_ns" if one.name == "t_end" else one.path.partition(".")[0]
+
+
+def unit_of(one: EstimateField) -> str:
+    """The unit in which the field's number is; empty for words and pure numbers."""
+    if one.name in SHARES:
+        return "0 to 1"
+    if one.kind in (INSTANT, REASONS, SPECTRA, NUMBERS_BY_NAME, WEIGHTS):
+        return ""
+    return next((unit for ending, unit in UNITS if one.name.endswith(ending)), "")
+
+
+def fields_table(group: str) -> str:
+    """The fields of one of GROUPS."""
+    elsewhere = {part for parts in GROUPS.values() for part in parts}
+    named = [one for one in FIELDS if (part_of(one) if part_of(one) in elsewhere else "") in GROUPS[group]]
+    rows = (
+        (
+            f"`{one.name}`",
+            unit_of(one),
+            one.description or "",
+            NULL[part_of(one)],
+            ", ".join(f"`{c}`" for c in one.columns),
+        )
+        for one in named
+    )
+    return table("field | unit | meaning | unknown | columns in CSV", rows)
+
+
+# -- an archive's data set --
+
+TYPES: Final = {
+    "text": "string",
+    "whole": "int64",
+    "number": "double",
+    "instant": "timestamp, µs, UTC",
+    "texts": "list of strings",
+    "numbers by name": "map string to double",
+}
+"""By the kinds of gateway.archive.dataset: as Parquet has them."""
+
+
+def columns_table() -> str:
+    """Every column of the data set."""
+    rows = ((f"`{name}`", TYPES[kind], _meaning(name)) for name, kind in columns().items())
+    return table("column | type | meaning", rows)
+
+
+def _meaning(column: str) -> str:
+    """In the words of the estimate's own page."""
+    others = {**PROVENANCE, **DIAGNOSTICS, **{name: words for name, (_, words) in OWN_STD.items()}}
+    if column in others:
+        return others[column]
+    if column == OVER_LIMIT:
+        return "places of `weights` that bear more than their limit; empty where none is known to"
+    one = next(field for field in FIELDS if column in (field.name, *field.columns))
+    if column == one.name or len(one.columns) < 2:
+        return one.description or ""
+    if one.name == "weights":
+        of_weights = {"_std_kg": "its standard deviation", "_limit_kg": "what it may be"}
+        return next((words for end, words in of_weights.items() if column.endswith(end)), one.description or "")
+    return f"{'lower' if '_low95' in column else 'upper'} end of its 95 % interval"
+
+
+# -- reasons and findings --
+
+
+def reasons_tables() -> str:
+    """Every reason, by its cause."""
+    return "\n".join(
+        f"## {cause}\n\n"
+        + table(
+            "reason | what happened | what to do",
+            ((f"`{why}`", one.happened, one.advice) for why, one in EXPLANATIONS.items() if one.cause is cause),
+        )
+        for cause in Cause
+    )
+
+
+def findings_tables() -> str:
+    """Every finding of the inspection, by its topic."""
+    return "\n".join(
+        f"## {topic}\n\n"
+        + table(
+            "finding | weight | what it means | what to do",
+            (
+                (f"`{kind}`", " or ".join(one.severities), one.means, one.advice)
+                for kind, one in EXPLAINED.items()
+                if one.topic is topic
+            ),
+        )
+        for topic in Topic
+    )
+
+
+def _named(heading: str, words: Mapping[Any, str]) -> str:
+    return table(heading, ((f"`{name}`", text) for name, text in words.items()))
+
+
+# -- settings --
+
+
+def settings_tables() -> str:
+    """Every key, a table a section."""
+    top = {name: field for name, field in Settings.model_fields.items() if _section_of(field) is None}
+    parts = [_settings_table("Top of the file", top, prefix="SPRINGSCALE_")]
+    for name, field in Settings.model_fields.items():
+        section = _section_of(field)
+        if section is not None:
+            words = (section.__doc__ or "").strip().splitlines()[0].rstrip(".")
+            title = f"[{name}]: {words[0].lower()}{words[1:]}"
+            parts.append(_settings_table(title, section.model_fields, prefix=f"SPRINGSCALE_{name.upper()}__"))
+    return "\n".join(parts)
+
+
+def _section_of(field: FieldInfo) -> type[BaseModel] | None:
+    """The model behind a table of the file; None for a plain key."""
+    kind: Any = field.annotation
+    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+
+
+def _settings_table(title: str, fields: Mapping[str, FieldInfo], *, prefix: str) -> str:
+    rows = (
+        (f"`{name}`", _default(field), field.description or "", f"`{prefix}{name.upper()}`")
+        for name, field in fields.items()
+    )
+    return f"## {title}\n\n{table('key | default | meaning | variable', rows)}"
+
+
+def _default(field: FieldInfo) -> str:
+    return "required" if field.is_required() else default_of(field.get_default(call_default_factory=True))
+
+
+# -- the schema of a calibration file --
+
+DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
+_ID: Final[dict[str, str]] = {
+    "type": "string",
+    "pattern": "^sha256:[0-9a-f]{64}$",
+    "description": "sha256 of the canonical JSON (keys sorted, no spaces, ASCII) of everything but this id",
+}
+
+
+class _WithoutFieldTitles(GenerateJsonSchema):
+    """Names say it already."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        """Never."""
+        return False
+
+
+def calibration_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a file as `springscale calibrate` writes it: no key missing, none besides."""
+    model = CalibrationFile.model_json_schema(mode="serialization", schema_generator=_WithoutFieldTitles)
+    return {
+        "$schema": DIALECT,
+        **model,
+        "title": "Springscale calibration file",
+        "description": "What known-load drives taught of one vehicle. Units stand at the end of a name, "
+        "unknown is null. Written by the tool, never by hand: the id is the hash of the content.",
+        "properties": {"id": _ID, **model["properties"]},
+        "required": ["id", *model["required"]],
+    }
+
+
+def schema_text() -> str:
+    """The text of docs/calibration.schema.json."""
+    return json.dumps(calibration_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
+    "signal-map.md": {
+        "top": lambda: key_table(SignalMapFile, "signals"),
+        "keys": lambda: key_table(SignalEntry),
+        "signals": signals_table,
+        "units": units_table,
+        "maps": maps_table,
+    },
+    "campaign.md": {
+        "top": lambda: key_table(CampaignTable, "vehicle", "runs"),
+        "vehicle": lambda: key_table(Vehicle),
+        "runs": lambda: key_table(RunTable),
+        "sprung": sprung_section,
+    },
+    "estimate.md": {
+        "batch": lambda: fields_table("batch"),
+        "epoch": lambda: fields_table("epoch"),
+        "known": lambda: fields_table("known"),
+        "lacks": lambda: _named("`lacks` | meaning", LACKS),
+        "diagnostics": lambda: _named("name | meaning", DIAGNOSTICS),
+    },
+    "archive.md": {
+        "manifest": lambda: key_table(ManifestFile, "vehicles", "batch", "trust"),
+        "vehicles": lambda: key_table(VehicleEntry),
+        "columns": columns_table,
+    },
+    "reasons.md": {
+        "reasons": reasons_tables,
+        "sources": lambda: f"{_named('source | what it is', SOURCES)}\n{_named('remedy | what to do', REMEDIES)}",
+    },
+    "findings.md": {"findings": findings_tables},
+    "settings.md": {"keys": settings_tables},
+}
+"""What stands between the marks of a page: each part is computed when it is asked for."""

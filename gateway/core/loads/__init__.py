@@ -1,0 +1,22 @@
+"""Which weighings are of one load: stops at which it can have changed (halts), and neighbours that agree (joined)."""
+
+from gateway.core.loads.halts import SLACK_NS, Halt, Link, clocks_of, follows, halts_of, links_of
+from gateway.core.loads.joined import Loads, loads_of, sides_of
+from gateway.core.loads.load import Load, Weighing, load_of, weighings_of
+
+__all__ = [
+    "SLACK_NS",
+    "Halt",
+    "Link",
+    "Load",
+    "Loads",
+    "Weighing",
+    "clocks_of",
+    "follows",
+    "halts_of",
+    "links_of",
+    "load_of",
+    "loads_of",
+    "sides_of",
+    "weighings_of",
+]

@@ -1,0 +1,213 @@
+"""Stretches of one load, pooled until they make a batch.
+
+    parts = (*parts, Part(window, way))      # windows in order, each as the scheduler cut it
+    spanned(parts, begin_ns, end_ns)         # all that was driven in that time, as one batch
+    changes_of(parts, weigh, rules)          # the stops at which the load changed
+
+A window with too little driving in it is no batch, and what it has is not lost: it waits for the windows after it, over
+the stops between them. Every stop of 10 s and more is a possible border of a load. The stretches between the borders
+are weighed one by one, and neighbours that agree are joined (core.loads); what is left are the loads.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from gateway.core.change import Rules
+from gateway.core.journey import LEAST_STOP_S
+from gateway.core.loads import Halt, Link, Weighing, halts_of, loads_of
+from gateway.core.settings import BatchSettings
+from gateway.estimate import Estimate, Way
+from gateway.posterior import Posterior
+from gateway.records import F64, Batch, Bool, Why
+from gateway.units import NS_PER_S
+
+LEAST_RUN_S: Final = 6.0  # of unbroken usable driving, in which a segment of a spectrum fits
+LEAST_SIDE_S: Final = 30.0  # usable on one side of a border, to be weighed against the other
+LEAST_LOAD_S: Final = 60.0  # usable with one load after a change, to be told: as early as an early look
+PARTED_FROM: Final = 0.9  # as likely must a change be, as for an event to be told: stretches are short, and scatter
+MOST_DRIVEN_S: Final = 1800.0  # without a batch; then the time is refused, and the pool begins anew
+MOST_BREAK_S: Final = 3600.0  # springs and sensors are no longer as warm as they were
+# all of them chosen
+
+_FAULTS: Final = frozenset({Why.GRAVITY_MISSING, Why.SENSOR_RATE_LOW, Why.TIME_STAMPS})
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A window, or a piece of one, and its way."""
+
+    batch: Batch
+    way: Way
+
+    @property
+    def usable_s(self) -> float:
+        return float(np.count_nonzero(self.batch.usable)) / self.batch.rate_hz
+
+    @property
+    def driven_s(self) -> float:
+        """Of the whole window, stops included."""
+        return self.batch.duration_s
+
+
+Parts = tuple[Part, ...]
+Weigh = Callable[[Batch], Posterior | None]
+
+
+def can_be_pooled(window: Batch, settings: BatchSettings) -> bool:
+    """True where nothing but too little driving keeps a window from being a batch: no fault of a sensor."""
+    if not _FAULTS.isdisjoint(window.rejected) or window.gap_share > settings.gap_share_max:
+        return False
+    n_at_speed = np.count_nonzero(~(window.speed_mps < settings.speed_min_mps))
+    return bool(np.count_nonzero(window.usable) >= settings.usable_share_min * n_at_speed)
+
+
+def has_stretch(window: Batch) -> bool:
+    """Whether any spectrum fits into what is usable of it."""
+    edges = np.flatnonzero(np.diff(np.r_[False, window.usable, False].astype(np.int8)))
+    return bool(np.max(edges[1::2] - edges[::2], initial=0) >= LEAST_RUN_S * window.rate_hz)
+
+
+def continued(parts: Parts, window: Batch) -> Parts:
+    """What a window may be pooled with: nothing after a long break or a clock put back; nor, where it is a batch by
+    itself, anything of another drive.
+    """
+    if not parts:
+        return ()
+    last = parts[-1].batch
+    break_ns = window.t_start_ns - last.t_end_ns
+    is_next = 0 <= break_ns <= MOST_BREAK_S * NS_PER_S
+    return parts if is_next and (window.rejected or window.drive_start_ns == last.drive_start_ns) else ()
+
+
+def is_batch(parts: Parts, settings: BatchSettings) -> bool:
+    """Whether they are as long, and as much of them usable, as a batch must be."""
+    driven_s = sum(part.driven_s for part in parts)
+    return missing_s(parts, settings) <= 0.0 and driven_s >= settings.last_batch_share_min * settings.window_s
+
+
+def missing_s(parts: Parts, settings: BatchSettings) -> float:
+    """How much usable driving a batch still lacks."""
+    return settings.usable_share_min * settings.window_s - sum(part.usable_s for part in parts)
+
+
+def changes_of(parts: Parts, weigh: Weigh, rules: Rules) -> list[int]:
+    """The middles (ns) of the stops at which the load changed, in order. Weighs nothing where there is no border."""
+    blanks = [Estimate(one.batch.t_start_ns, one.batch.t_end_ns, "", way=one.way) for one in parts]
+    begin_ns, end_ns = blanks[0].t_start_ns, blanks[-1].t_end_ns
+    borders = [
+        halt
+        for halt in halts_of(blanks)
+        if halt.t_end_ns - halt.t_start_ns >= LEAST_STOP_S * NS_PER_S and begin_ns < halt.middle[1] < end_ns
+    ]
+    halts = _with_sides(parts, borders)
+    if not halts:
+        return []
+    bounds = [begin_ns, *(halt.middle[1] for halt in halts), end_ns]
+    found = [weigh(spanned(parts, *span)) for span in pairwise(bounds)]
+    weighings = [Weighing(i, (None, ""), one, one) for i, one in enumerate(found) if one is not None]
+    links = [
+        Link(tuple(halts[one.at : other.at]), bounds[one.at + 1], bounds[other.at])
+        for one, other in pairwise(weighings)
+    ]
+    loads = loads_of(weighings, links, rules, PARTED_FROM).loads if weighings else ()
+    return [max(links[load.last].halts, key=lambda halt: halt.prior).middle[1] for load in loads[:-1]]
+
+
+def _with_sides(parts: Parts, halts: list[Halt]) -> list[Halt]:
+    """The borders that have enough on either side to be weighed; the unlikeliest go first."""
+    begin_ns, end_ns = parts[0].batch.t_start_ns, parts[-1].batch.t_end_ns
+    while halts:
+        bounds = [begin_ns, *(halt.middle[1] for halt in halts), end_ns]
+        short = [i for i, span in enumerate(pairwise(bounds)) if usable_s(parts, *span) < LEAST_SIDE_S]
+        if not short:
+            break
+        beside = sorted({i for at in short for i in (at - 1, at) if 0 <= i < len(halts)})
+        del halts[min(beside, key=lambda i: halts[i].prior)]
+    return halts
+
+
+def usable_s(parts: Parts, begin_ns: int, end_ns: int) -> float:
+    """Usable driving from begin to end."""
+    return sum(
+        float(np.count_nonzero(part.batch.usable[_samples(part.batch, begin_ns, end_ns)])) / part.batch.rate_hz
+        for part in parts
+    )
+
+
+def spanned(parts: Sequence[Part], begin_ns: int, end_ns: int) -> Batch:
+    """What was driven from begin to end (at least a part of one window), as one batch that nothing keeps from counting.
+
+    Breaks between windows are left out: its arrays hold what its windows hold, and the last sample of each window is
+    masked, so that no segment crosses into the next. Shares are those of the windows by their length.
+    """
+    cuts = [cut for part in parts if len((cut := _cut(part.batch, begin_ns, end_ns)).usable)]
+    if len(cuts) == 1:
+        return cuts[0]
+    first, last = cuts[0], cuts[-1]
+    usable = np.concatenate([_closed(cut.usable) for cut in cuts])
+    known = [cut for cut in cuts if cut.usable.any()]
+    gravity_mps2 = np.average([cut.gravity_mps2 for cut in known], weights=[np.count_nonzero(c.usable) for c in known])
+    weights = np.array([len(cut.usable) for cut in cuts]) / len(usable)
+    return Batch(
+        t_start_ns=first.t_start_ns,
+        t_end_ns=last.t_end_ns,
+        drive_start_ns=last.drive_start_ns,
+        rate_hz=first.rate_hz,
+        vertical_acceleration_mps2=np.concatenate([cut.vertical_acceleration_mps2 for cut in cuts]),
+        pitch_rate_radps=np.concatenate([cut.pitch_rate_radps for cut in cuts]),
+        speed_mps=np.concatenate([cut.speed_mps for cut in cuts]),
+        usable=usable,
+        gravity_mps2=float(gravity_mps2),
+        gap_share=float(weights @ [cut.gap_share for cut in cuts]),
+        shares={
+            why: float(weights @ [cut.shares.get(why, 0.0) for cut in cuts])
+            for why in dict.fromkeys(why for cut in cuts for why in cut.shares)
+        },
+        longest_stop_s=max(cut.longest_stop_s for cut in cuts),
+        is_provisional=last.is_provisional,
+        roll_rate_radps=_roll_rate(cuts),
+    )
+
+
+def _cut(window: Batch, begin_ns: int, end_ns: int) -> Batch:
+    """The samples of a window from begin to end."""
+    at = _samples(window, begin_ns, end_ns)
+    if at == slice(0, len(window.usable)):
+        return replace(window, rejected=())
+    usable, acceleration_mps2 = window.usable[at], window.vertical_acceleration_mps2[at]
+    shift_mps2 = float(np.mean(acceleration_mps2[usable])) if usable.any() else 0.0
+    return replace(
+        window,
+        t_start_ns=max(begin_ns, window.t_start_ns),
+        t_end_ns=min(end_ns, window.t_end_ns),
+        vertical_acceleration_mps2=acceleration_mps2 - shift_mps2,
+        pitch_rate_radps=window.pitch_rate_radps[at],
+        speed_mps=window.speed_mps[at],
+        usable=usable,
+        gravity_mps2=window.gravity_mps2 + shift_mps2,
+        rejected=(),
+        roll_rate_radps=None if window.roll_rate_radps is None else window.roll_rate_radps[at],
+    )
+
+
+def _samples(window: Batch, begin_ns: int, end_ns: int) -> slice:
+    """Those of a window from begin to end; none where it lies elsewhere."""
+    n, since_ns = len(window.usable), window.t_start_ns
+    begin, end = (round((t_ns - since_ns) * window.rate_hz / NS_PER_S) for t_ns in (begin_ns, end_ns))
+    begin = min(max(begin, 0), n)
+    return slice(begin, n if end_ns >= window.t_end_ns else min(max(end, begin), n))
+
+
+def _closed(usable: Bool) -> Bool:
+    closed = usable.copy()
+    closed[-1:] = False
+    return closed
+
+
+def _roll_rate(cuts: Sequence[Batch]) -> F64 | None:
+    rates = [cut.roll_rate_radps for cut in cuts if cut.roll_rate_radps is not None]
+    return np.concatenate(rates) if len(rates) == len(cuts) else None
