@@ -1,7 +1,9 @@
 """A weight that somebody states of a vehicle at a time: a weighbridge's ticket, or a load that is known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+
+from gateway.schema import described
 
 
 class Drive(StrEnum):
@@ -26,4 +28,6 @@ class StatedWeight:
     payload_kg: float | None = None
     position_m: float | None = None
     drive: Drive | None = None
-    std_kg: float | None = None
+    std_kg: float | None = field(
+        default=None, metadata=described("standard deviation of each number; null: as usual for its kind")
+    )

@@ -5,71 +5,32 @@ from the list (core.known_weights), so that each can be taken back. Written by t
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.file.parts import Part
-from gateway.core.known_weights import Knowledge, KnownWeightKind, Observation
+from gateway.core.known_weights import Knowledge, Observation
 from gateway.errors import ConfigurationError
 from gateway.estimate_json import posterior_from_json
 from gateway.files.kept import KeptFiles
 from gateway.records import ns_of
-from gateway.stated_weight import StatedWeight
+from gateway.stated import Confirmation, Ending, KnownWeightFields
 from gateway.toml_file import describe_faults
 
 FILE_NAME: Final = "known_weights.json"
 MOST_KNOWN_WEIGHTS: Final = 200  # the oldest that were taken back are forgotten beyond
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 
-
-class Ending(Part):
-    """When, by whom and why a known weight was taken back."""
-
-    at: str
-    by: str
-    why: Literal["withdrawn", "back_to_factory"] = "withdrawn"
-
-
-class Confirmation(Part):
-    """Who confirmed a known weight that its estimate contradicted, and when."""
-
-    at: str
-    by: str
-
-
-class KnownWeight(Part):
-    """One known weight: what was stated, the load it is of as it was measured, and what it makes known of that load.
+class KnownWeight(KnownWeightFields):
+    """A known weight with the load it is of as it was measured: what the file keeps.
 
     ``id`` is the hash of all but its confirmation and its end.
     """
 
-    id: str
-    kind: KnownWeightKind
-    at: str
-    by: str
-    note: str | None = None
-    vehicle_id: str | None = None
-    calibration_id: str
-    estimator: str
-    t_start: str = Field(description="of the load's first batch")
-    t_end: str = Field(description="of its last batch")
-    batch_ids: tuple[str, ...] = Field(min_length=1, description="the newest of the batches it rests on, newest last")
-    n_batches: int = Field(ge=1)
     posterior: dict[str, Any] = Field(description="the load as measured, before any known weight")
-    stated: StatedWeight | None = Field(None, description="what the scale or the note said; null: it was empty")
-    payload_kg: Finite
-    payload_std_kg: float = Field(gt=0.0, allow_inf_nan=False)
-    front_share_pct: Finite | None = Field(None, description="null: nobody stated where the load lies")
-    front_share_std_pct: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
-    estimated_payload_kg: Finite = Field(description="by the calibration and the known weights before this one")
-    estimated_payload_std_kg: float = Field(gt=0.0, allow_inf_nan=False)
-    is_contradicted: bool = Field(description="that estimate speaks against it by more than three standard deviations")
-    confirmed: Confirmation | None = None
-    ended: Ending | None = None
 
     def content_id(self) -> str:
         """What ``id`` has to be."""

@@ -13,7 +13,6 @@ from support.known_weights import FakePipeline, KnownWeightBench
 from support.web import Client, Gateway
 
 from gateway.calibration.known_weights_file import FILE_NAME, load_known_weights
-from gateway.stated import VehicleAnswers
 from gateway.web import Scope, TokenFile
 from gateway.web.door import problems
 from gateway.web.routes.calibration import known_weights_router
@@ -231,8 +230,15 @@ def test_no_body_is_met_with_an_error_of_ours_or_spoils_the_next_start(
 def test_every_body_that_a_route_takes_is_checked_so(local: Client) -> None:
     operations = [one for path in local.app.openapi()["paths"].values() for one in path.values()]
     bodies = [one["requestBody"]["content"]["application/json"] for one in operations if "requestBody" in one]
-    checked = {kind.__name__ for kind in Body.__subclasses__()} | {VehicleAnswers.__name__}  # its route checks that one
+    checked = {kind.__name__ for kind in Body.__subclasses__()} | {"VehicleAnswers"}  # a dataclass, checked likewise
     assert {body["schema"]["$ref"].rpartition("/")[2] for body in bodies} == checked
+
+
+def test_half_a_character_in_a_vehicle_s_name_is_refused_in_words(local: Client) -> None:
+    url, said = "/api/v1/calibration/commissioning/vehicle", {"Content-Type": "application/json"}
+    answer = local.request("POST", url, content=b'{"name": "\\ud800"}', headers=said)
+    assert answer.status_code == 422
+    assert "half a character" in answer.json()["detail"]
 
 
 def test_reading_needs_scope_read_and_changing_needs_operate(guarded: Client, tokens: TokenFile) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.calibration.known_weight import WeightRefusal, load_of
-from gateway.calibration.known_weights_file import FILE_NAME, Confirmation, Ending, KnownWeight, KnownWeights
+from gateway.calibration.known_weights_file import FILE_NAME, KnownWeight, KnownWeights
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.fusion import WeighedLoad
 from gateway.core.known_weights import KnownWeightKind
@@ -27,6 +27,7 @@ from gateway.service.pipeline import Pipeline
 from gateway.service.proving.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
 from gateway.service.proving.history_file import HistoryFile
 from gateway.service.subject import OnEvent, Subject
+from gateway.stated import Confirmation, Ending
 from gateway.stated_weight import StatedWeight
 
 ALL_KINDS: Final = tuple(KnownWeightKind)

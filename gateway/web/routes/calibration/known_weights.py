@@ -11,9 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from starlette.responses import Response
 
 from gateway.core.known_weights import KnownWeightKind
+from gateway.stated import KnownWeightFields
 from gateway.stated_weight import StatedWeight
 from gateway.web.routes.calibration.asking import REFUSALS, answered, who
-from gateway.web.routes.calibration.stated import Stated, StatedTold
+from gateway.web.routes.calibration.stated import Stated
 from gateway.web.schemas import Body, problem_responses
 
 KNOWN_WEIGHTS_PATH: Final = "/known-weights"
@@ -84,49 +85,12 @@ class TicketRequest(Body):
     weight: Stated
 
 
-class EndingTold(BaseModel):
-    """When, by whom and why a known weight was taken back."""
-
-    at: str = Field(json_schema_extra={"format": "date-time"})
-    by: str
-    why: Literal["withdrawn", "back_to_factory"]
-
-
-class ConfirmationTold(BaseModel):
-    """When and by whom a held known weight was confirmed."""
-
-    at: str = Field(json_schema_extra={"format": "date-time"})
-    by: str
-
-
-class KnownWeightEntry(BaseModel):
+class KnownWeightEntry(KnownWeightFields):
     """One known weight: what is true of a load, and what was estimated of it without this entry."""
 
-    id: str = Field(examples=["sha256:9f86d081"])
-    kind: KnownWeightKind
     state: Literal["in_use", "held", "ended", "other_calibration"] = Field(
         description="held: its estimate contradicts it by more than three standard deviations; it counts once confirmed"
     )
-    at: str = Field(json_schema_extra={"format": "date-time"}, description="when it was stated")
-    by: str = Field(description="name of the token; `local` where none are in use", examples=["workshop"])
-    note: str | None
-    vehicle_id: str | None
-    calibration_id: str = Field(description="it belongs to this calibration")
-    estimator: str
-    t_start: str = Field(description="of the load that it is of")
-    t_end: str
-    batch_ids: list[str] = Field(description="the newest of the batches it rests on, newest last")
-    n_batches: int
-    stated: StatedTold | None = Field(description="null: the vehicle was empty")
-    payload_kg: float = Field(examples=[270.0])
-    payload_std_kg: float = Field(description="of the scale or the paper", examples=[5.0])
-    front_share_pct: float | None = Field(description="null: nobody stated where the load lies")
-    front_share_std_pct: float | None
-    estimated_payload_kg: float = Field(description="without it, by what was known before", examples=[276.0])
-    estimated_payload_std_kg: float
-    is_contradicted: bool
-    confirmed: ConfirmationTold | None
-    ended: EndingTold | None
 
 
 class OfferedLoad(BaseModel):

@@ -86,17 +86,4 @@ class KnownPayload(_When):
         )
 
 
-class StatedTold(BaseModel):
-    """What was stated of a load."""
-
-    at: str = Field(json_schema_extra={"format": "date-time"})
-    gross_kg: float | None
-    front_axle_kg: float | None
-    rear_axle_kg: float | None
-    payload_kg: float | None
-    position_m: float | None
-    drive: Literal["before", "after"] | None
-    std_kg: float | None = Field(description="standard deviation of each number; null: as usual for its kind")
-
-
 Stated = Annotated[GrossWeight | AxleWeights | KnownPayload, Field(discriminator="by")]

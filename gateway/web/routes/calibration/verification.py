@@ -11,7 +11,7 @@ from gateway.stated_weight import StatedWeight
 from gateway.status import VerificationStatus
 from gateway.web.door.problems import problem_response
 from gateway.web.routes.calibration.asking import REFUSALS, answered, who
-from gateway.web.routes.calibration.stated import Stated, StatedTold
+from gateway.web.routes.calibration.stated import Stated
 from gateway.web.routes.calibration.verification_page import POLICY, verification_page
 from gateway.web.schemas import Body, problem_responses
 
@@ -63,7 +63,7 @@ class AxleErrorTold(BaseModel):
 class LoadTold(BaseModel):
     """One load: stated, weighed, and the errors."""
 
-    stated: StatedTold
+    stated: StatedWeight
     t_start: str
     t_end: str
     n_batches: int
