@@ -69,9 +69,19 @@ class Commissioned(RuleBasedStateMachine):
     def state_vehicle(self, wheelbase_m: float) -> None:
         self.asks("state_vehicle", VehicleAnswers(**{**ANSWERS, "wheelbase_m": wheelbase_m}))
 
+    @rule(front_kg=st.sampled_from([69.0, 690.0]))
+    def state_weights(self, front_kg: float) -> None:
+        if self.asks("state_vehicle", VehicleAnswers(**{**ANSWERS, "kerb_front_axle_kg": front_kg})):
+            assert bool(self.told["underway"]["doubts"]) is (front_kg < 100.0)
+
     @rule()
-    def call_empty(self) -> None:
-        self.asks("is_empty", "workshop")
+    def confirm(self) -> None:
+        self.asks("confirm", "workshop")
+
+    @rule(again=st.booleans())
+    def call_empty(self, again: bool) -> None:
+        if self.asks("is_empty", "workshop", again=again) and again:
+            self.n_driven = 0
 
     @rule()
     def fit_now(self) -> None:

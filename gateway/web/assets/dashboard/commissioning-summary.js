@@ -11,7 +11,8 @@ function place({ sensor_position_m, sensor_offset_left_m }) {
 }
 
 function axles({ kerb_front_axle_kg: front, kerb_rear_axle_kg: rear }) {
-  return phrase("com_axles", { front: figure(front, 0, "kg"), rear: figure(rear, 0, "kg"), share: figure((100 * front) / (front + rear), 0, "%") });
+  const kg = (x) => figure(x, Number.isInteger(x) ? 0 : 1, "kg");
+  return phrase("com_axles", { front: kg(front), rear: kg(rear), share: figure((100 * front) / (front + rear), 0, "%") });
 }
 
 /** What was typed, else what its line says, else that nobody knows it. */

@@ -108,7 +108,7 @@ function drawDoubts({ doubts, step }) {
   element("commissioning-asked").replaceChildren(...doubts.map((one) => made("li", asked(one))));
   const meant = meantText(doubts);
   element("commissioning-meant").hidden = meant === "";
-  write("commissioning-meant", meant);
+  if (meant !== "") write("commissioning-meant", meant);
 }
 
 function drawDone({ underway, active, is_pending }) {

@@ -106,7 +106,7 @@ export const COMMISSIONING_WORDS = {
   com_doubts_drive: ["The drive contradicts what was entered. No calibration is used until this is answered.", "Die Fahrt widerspricht den Eingaben. Bis zur Antwort wird keine Kalibrierung verwendet."],
   com_confirm: ["It is right all the same", "Es stimmt trotzdem"],
   com_meant: ["Did you mean {answers}? Take it", "Gemeint: {answers}? Übernehmen"],
-  com_meant_one: ["{what} {number}", "{what} {number}"],
+  com_take_meant: ["Take what was meant", "Gemeintes übernehmen"],
   com_confirmed: ["Confirmed though unusual: {what}.", "Trotz Zweifel bestätigt: {what}."],
 
   com_done: ["Done. It counts from the next drive on: when the vehicle has stood for a minute, or sleeps.", "Fertig. Sie gilt ab der nächsten Fahrt: wenn das Fahrzeug eine Minute gestanden hat oder schläft."],
