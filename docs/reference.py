@@ -107,6 +107,9 @@ def sprung_section() -> str:
     return f"""\
 ## From axle weights to sprung mass and front share
 
+`kerb_front_axle_kg` and `kerb_rear_axle_kg` are enough: where `empty_mass_kg` is absent, it, its front share and their
+standard deviation follow from them as below, as in [commissioning](commissioning.md).
+
 A weighbridge shows F under the front axle and R under the rear one. Weigh the empty vehicle on level ground, with
 driver and tank as in service. The body rests on the front axle with its share s. Wheels, brakes and axles (u) are not
 carried by the springs. Each axle is in static equilibrium:
