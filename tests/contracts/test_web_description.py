@@ -26,7 +26,7 @@ from gateway.service.alarm_desk import AlarmDesk
 from gateway.web import Scope, TokenFile, WebSettings
 
 COMMISSIONING = "/api/v1/calibration/commissioning"
-STEPS = ("lines", "line", "vehicle", "empty", "fit", "undo")
+STEPS = ("lines", "line", "vehicle", "confirm", "empty", "fit", "undo")
 CHANGES = [
     "POST /api/v1/alarms/{alarm_id}/acknowledgement",
     "POST /api/v1/calibration/tare",
@@ -136,7 +136,7 @@ WITHOUT_PARAMETERS += (
     "GET /api/v1/known-weights",
 )
 WITHOUT_PARAMETERS += (f"GET {COMMISSIONING}", f"GET {COMMISSIONING}/lines")
-WITHOUT_PARAMETERS += (f"DELETE {COMMISSIONING}", f"POST {COMMISSIONING}/fit")
+WITHOUT_PARAMETERS += (f"DELETE {COMMISSIONING}", f"POST {COMMISSIONING}/fit", f"POST {COMMISSIONING}/confirm")
 WITH_PARAMETERS = [label for label in LABELS if not label.endswith(WITHOUT_PARAMETERS)]
 
 
