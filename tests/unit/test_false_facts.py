@@ -1,4 +1,4 @@
-"""The study of false facts: twenty of them, those that need no drive caught at once, and its page."""
+"""The study of false facts: twenty, those that need no drive caught at once, and a page that says its numbers."""
 
 import json
 from pathlib import Path
