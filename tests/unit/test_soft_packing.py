@@ -57,10 +57,12 @@ def test_a_load_that_rings_at_9_hz_is_weighed(
 def test_it_would_not_be_if_loads_were_only_thought_to_stand_firmly(
     calibration: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Nowhere near as well: further off, and a few times as uncertain."""
     load = (400.0, 44.0)
+    rightly = ringing(calibration, load, 9.0, 0.1, seed=41)
     monkeypatch.setattr(located, "packings", lambda parameters: packings(parameters)[:1] * 2)
     found = ringing(calibration, load, 9.0, 0.1, seed=41)
-    assert not found.counted or not holds(found.payload, load[0])
+    assert not found.counted or found.payload.std > 3.0 * rightly.payload.std
 
 
 @pytest.mark.parametrize("load", [(0.0, 52.0), (60.0, 51.0), (250.0, 54.0), (400.0, 44.0)], ids=str)
@@ -83,7 +85,7 @@ def test_a_real_cars_rattle_is_no_soft_load() -> None:
 
 def peak(payload_kg: float, front_share: float, cost: float, packing: Packing) -> located._Peak:
     x = np.r_[packing.drifting, payload_kg, front_share]
-    return located._Peak(Found(x, cost, np.eye(len(x)), is_converged=True), packing)
+    return located._Peak(Found(x, cost, np.eye(len(x)), is_converged=True, near=x), packing)
 
 
 FIRM, SOFT = packings(np.zeros(100))
@@ -126,7 +128,7 @@ def test_an_answer_of_two_peaks_is_wider(
         return rivalry(found, [*peaks, peak_of(rival, found.cost + behind)])
 
     def peak_of(x: np.ndarray, cost: float) -> located._Peak:
-        return located._Peak(Found(x, cost, np.eye(len(x)), is_converged=True), Packing(x[: len(DRIFTING)]))
+        return located._Peak(Found(x, cost, np.eye(len(x)), is_converged=True, near=x), Packing(x[: len(DRIFTING)]))
 
     monkeypatch.setattr(located, "_rivalry", beside)
     found = weighed(batch, calibration)
