@@ -47,7 +47,9 @@ def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: 
     assert re.findall(r"(?:src|href)=\"(?!/|#)", page) == []
 
 
-@pytest.mark.parametrize(("path", "tables"), [("/cab", ("common", "cab")), ("/", ("common", "dashboard", "commissioning"))])
+@pytest.mark.parametrize(
+    ("path", "tables"), [("/cab", ("common", "cab")), ("/", ("common", "dashboard", "commissioning"))]
+)
 def test_every_word_stands_in_the_table_in_every_language(client: Client, path: str, tables: tuple[str, ...]) -> None:
     """A row per phrase; English and German have the same fields; what a page names has a row."""
     rows: dict[str, tuple[str, str]] = {}
