@@ -1,4 +1,4 @@
-"""A sensor that is not where, or what, it was: told where it can be told, in the interval where it cannot."""
+"""A sensor that is not where, or what, it was, is found."""
 
 from dataclasses import replace
 
@@ -55,7 +55,14 @@ def moved(moved_m: float, calibration: CrossSpectrumCalibration) -> Estimate:
 
 
 @pytest.mark.parametrize(
-    ("moved_m", "why"), [(-0.3, Why.SENSOR_CHANGED), (-0.2, Why.SENSOR_CHANGED), (0.3, Why.MODEL_MISFIT)]
+    ("moved_m", "why"),
+    [
+        (-0.3, Why.SENSOR_CHANGED),
+        (-0.2, Why.SENSOR_CHANGED),
+        (0.15, Why.SENSOR_CHANGED),
+        (0.2, Why.SENSOR_CHANGED),
+        (0.3, Why.MODEL_MISFIT),
+    ],
 )
 def test_a_sensor_moved_along_the_vehicle_is_told(
     calibration: CrossSpectrumCalibration, moved_m: float, why: Why
@@ -63,14 +70,6 @@ def test_a_sensor_moved_along_the_vehicle_is_told(
     estimate = moved(moved_m, calibration)
     assert estimate.rejected == (why,)
     assert np.sign(estimate.diagnostics["sensor_position_score"]) == np.sign(moved_m)
-
-
-def test_a_sensor_moved_forward_a_little_reads_as_a_longer_load(calibration: CrossSpectrumCalibration) -> None:
-    """One batch cannot tell the two apart; the payload's interval holds both, the front share's does not."""
-    estimate = moved(0.2, calibration)
-    low, high = estimate.payload.interval95
-    assert low < LOAD[0] < high
-    assert high - low > 300.0
 
 
 def test_what_does_not_come_through_the_springs_is_told_as_noise(calibration: CrossSpectrumCalibration) -> None:
