@@ -53,6 +53,7 @@ estimates = st.builds(
     by_name,
     st.lists(st.sampled_from(Why), max_size=3).map(tuple),
     st.booleans(),
+    st.just(False),  # what is no batch has no JSON
     st.none() | spectra,
     by_name,
     st.none() | st.builds(Epoch, quantities, quantities, st.integers(1, 10**6), quantities),
