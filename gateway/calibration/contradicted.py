@@ -20,7 +20,7 @@ from math import exp, sqrt
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from gateway.calibration.half_car.known_spectra import known_spectra
 from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
@@ -127,7 +127,7 @@ def _weight(fitted: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
     """Both axles together: a load aboard, wrong or exchanged weights, pounds."""
     off, covariance = fitted.amount(_axle_directions(vehicle))
     covariance = covariance + STATED_STD**2 * np.eye(len(_AXLES))
-    if off @ np.linalg.solve(covariance, off) <= chi2.isf(SELDOM, len(_AXLES)):
+    if off @ np.linalg.solve(covariance, off) <= chdtri(len(_AXLES), SELDOM):
         return
     shares = (vehicle.empty_front_share, 1.0 - vehicle.empty_front_share)
     unsprung = np.nan_to_num(unsprung_kg(vehicle))  # nobody stated them: the weights are of what is sprung
@@ -159,5 +159,5 @@ def _axle_directions(vehicle: Vehicle) -> F64:
 def _line(fitted: _Fitted) -> Iterator[Doubt]:
     """Whether it is of this line at all: all that vehicles of a line share, each by itself."""
     off, covariance = fitted.amount(np.eye(_N)[:, _BUILT])
-    if off @ np.linalg.solve(LINES_DIFFER * covariance, off) > chi2.isf(SELDOM_LINE, len(_BUILT)):
+    if off @ np.linalg.solve(LINES_DIFFER * covariance, off) > chdtri(len(_BUILT), SELDOM_LINE):
         yield Doubt.of(DoubtKind.DRIVEN_LINE)

@@ -151,7 +151,7 @@ def test_it_wants_a_token_that_may_operate_and_does_not_keep_it(
         page.get_by_role("button", name="It is empty", exact=True).click()
         expect(page.get_by_role("alert")).to_have_text("this needs a token with scope operate")
         assert bench.state()["history"] == []
-        page.get_by_label("Token that may operate, used this once").fill(operator)
+        page.get_by_role("dialog").get_by_label("Token that may operate, used this once").fill(operator)
         page.get_by_role("button", name="It is empty", exact=True).click()
         expect(page.get_by_role("dialog")).to_be_hidden()
         assert json.loads(bench.service.state())["history"][0]["by"] == "workshop"
