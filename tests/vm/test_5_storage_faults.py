@@ -34,7 +34,7 @@ def degraded(vehicle: Vehicle) -> None:
     """Wait until records are held in memory, and see that they are told all the same."""
     vehicle.wait_until(lambda status: status["store"]["n_held"] > 1)
     assert vehicle.status()["store"]["state"] == "degraded"
-    assert len(vehicle.records()) > len(vehicle.stored())
+    assert len(vehicle.records()) > len(vehicle.stored("estimate", "rejection"))
 
 
 def on_disk_again(vehicle: Vehicle) -> float:
@@ -42,7 +42,7 @@ def on_disk_again(vehicle: Vehicle) -> float:
     seconds = vehicle.wait_until(lambda status: status["store"]["state"] == "ok" and status["store"]["n_held"] == 0)
     assert vehicle.status()["store"]["n_dropped"] == 0
     told = [record["id"] for record in vehicle.records()]
-    stored = [record["id"] for record in vehicle.stored()]
+    stored = [record["id"] for record in vehicle.stored("estimate", "rejection")]
     assert stored[: len(told)] == told
     assert len(set(stored)) == len(stored)
     return seconds

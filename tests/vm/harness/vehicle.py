@@ -191,12 +191,16 @@ class Vehicle:
         """End what :meth:`play` began, if it is not over."""
         self.run("systemctl stop player 2>/dev/null || true")
 
-    def stored(self) -> list[Answer]:
-        """Every record in the database file itself, oldest first, after SQLite's own check of it."""
+    def stored(self, *kinds: str) -> list[Answer]:
+        """Every record of these kinds (all that windows gave) in the database file itself, oldest first, after SQLite's
+        own check of it.
+        """
+        kinds = kinds or ("estimate", "rejection", "remainder")
+        marks = ", ".join("?" * len(kinds))
         script = (
             f"import json, sqlite3; c = sqlite3.connect('file:{STATE}/springscale.db?mode=ro', uri=True);"
             "print(c.execute('PRAGMA integrity_check').fetchone()[0]);"
-            "rows = c.execute('SELECT text FROM journal WHERE kind IN (?, ?) ORDER BY seq', ('estimate', 'rejection'));"
+            f"rows = c.execute('SELECT text FROM journal WHERE kind IN ({marks}) ORDER BY seq', {kinds!r});"
             "print(json.dumps([json.loads(t) for t, in rows]))"
         )
         verdict, records = self.run(f'python3 -c "{script}"').strip().split("\n")
