@@ -25,6 +25,7 @@ from gateway.core.pool import (
     can_be_pooled,
     changes_of,
     continued,
+    driven_s,
     has_stretch,
     is_batch,
     missing_s,
@@ -149,7 +150,7 @@ class Flow:
         parts = (*parts, Part(window, way))
         if is_batch(parts, self.settings):
             return self._of_parts(parts, rows)
-        if sum(part.driven_s for part in parts) >= MOST_DRIVEN_S:
+        if driven_s(parts) >= MOST_DRIVEN_S:
             whole = spanned(parts, parts[0].batch.t_start_ns, window.t_end_ns)
             return [self._counted(replace(whole, rejected=(Why.TOO_SLOW,)), way, window.t_start_ns)]
         self._pool = parts
@@ -165,7 +166,7 @@ class Flow:
         changes_ns = changes_of(parts, self._posterior, self._rules)
         if not changes_ns:
             found = self._counted(spanned(parts, begin_ns, end_ns), way, window.t_start_ns)
-            may_wait = window.rejected and sum(part.driven_s for part in parts) < MOST_DRIVEN_S
+            may_wait = window.rejected and driven_s(parts) < MOST_DRIVEN_S
             if not (may_wait and found.rejected and _TOO_LITTLE.issuperset(found.rejected)):
                 return [found]
             self._pool = parts

@@ -85,8 +85,12 @@ def continued(parts: Parts, window: Batch) -> Parts:
 
 def is_batch(parts: Parts, settings: BatchSettings) -> bool:
     """Whether they are as long, and as much of them usable, as a batch must be."""
-    driven_s = sum(part.driven_s for part in parts)
-    return missing_s(parts, settings) <= 0.0 and driven_s >= settings.last_batch_share_min * settings.window_s
+    return missing_s(parts, settings) <= 0.0 and driven_s(parts) >= settings.last_batch_share_min * settings.window_s
+
+
+def driven_s(parts: Parts) -> float:
+    """Of all windows, stops included."""
+    return sum(part.driven_s for part in parts)
 
 
 def missing_s(parts: Parts, settings: BatchSettings) -> float:
