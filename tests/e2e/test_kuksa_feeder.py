@@ -79,6 +79,10 @@ class Databroker(v2_grpc.VALServicer):
         self._server.stop(None).wait()
         self.now = {}
 
+    @property
+    def known(self) -> set[str]:
+        return {path for path, value in self.now.copy().items() if value is not None}
+
     def PublishValue(self, request: Any, context: Any) -> Any:
         """As the databroker's source has it (databroker/src/broker.rs, validate): not available is always valid; else
         the type must be the signal's, and the value within its type and within min and max of its specification.
@@ -207,12 +211,12 @@ def test_a_value_that_the_databroker_refuses_holds_nothing_else_up(tmp_path: Pat
         broker.narrowed = {PAYLOAD: 103.5}
         gateway.publish(make_estimate(3))
         assert wait_until(lambda: broker.now.get(PAYLOAD) == 103.0)
-        known = {path for path, value in broker.now.items() if value is not None}
-        assert len(known) > 1
+        assert wait_until(lambda: len(broker.known) > 1)  # what is published after it, in the same round
+        known = broker.known
         gateway.publish(make_estimate(4))
         assert wait_until(lambda: PAYLOAD in broker.refused)
         assert wait_until(lambda: broker.now[PAYLOAD] is None)  # and not the 103 kg of before
-        assert wait_until(lambda: known - {PAYLOAD} <= {p for p, value in broker.now.items() if value is not None})
+        assert wait_until(lambda: known - {PAYLOAD} <= broker.known)
     assert f"refuses {PAYLOAD} = 104" in (tmp_path / "log").read_text()
 
 
