@@ -164,50 +164,67 @@ def exactly(*numbers: float) -> Posterior:
 
 
 def fused(parts: Sequence[Posterior]) -> Posterior:
-    """Several batches of one load together: own errors average out by their precision, shared ones stay.
+    """Several batches of one load together (Fusible). Raises ValueError for no part."""
+    return Fusible(parts).fused(0, len(parts))
+
+
+class Fusible:
+    """Batches in their order, of which any that follow one another can be fused: own errors average out by their
+    precision, shared ones stay.
 
     The weights are W_i = (sum P)^-1 P_i with P_i the inverse of own covariance i; a batch that does not know the
     lateral place has no precision there. Columns of one source stand for the same causes in every part and average
-    with the same weights. Raises ValueError for no part.
+    with the same weights. What a part adds to each sum is computed once.
     """
-    if not parts:
-        raise ValueError("there is no batch to fuse")
-    if len(parts) == 1:
-        return parts[0]
-    size = max(part.size for part in parts)
-    precisions = np.zeros((len(parts), size, size))
-    for known in {part.size for part in parts}:
-        alike = [i for i, part in enumerate(parts) if part.size == known]
-        precisions[alike, :known, :known] = np.linalg.inv(np.array([parts[i].own for i in alike]))
-    own = np.linalg.inv(precisions.sum(axis=0))
-    weights = own @ precisions
-    mean = np.einsum("nij,nj->i", weights, _stacked([part.mean for part in parts], size))
-    sources = {
-        name: _averaged([part.sources.get(name) for part in parts], weights)
-        for name in Source
-        if any(name in part.sources for part in parts)
-    }
-    tails = np.average([part.tails for part in parts], axis=0, weights=np.abs(weights[:, PAYLOAD, PAYLOAD]))
-    return Posterior(mean, 0.5 * (own + own.T), sources, (float(tails[0]), float(tails[1])))
 
+    def __init__(self, parts: Sequence[Posterior]) -> None:
+        self._parts = parts
+        self._sizes = np.array([part.size for part in parts], int)
+        size = int(self._sizes.max(initial=0))
+        self._precisions = np.zeros((len(parts), size, size))
+        for known in set(self._sizes.tolist()):
+            alike = np.flatnonzero(self._sizes == known).tolist()
+            self._precisions[alike, :known, :known] = np.linalg.inv(np.array([parts[i].own for i in alike]))
+        self._means = self._weighted([part.mean[None] for part in parts])[:, 0]
+        self._columns = {
+            name: self._weighted([part.sources.get(name, np.zeros((0, size))) for part in parts])
+            for name in Source
+            if any(name in part.sources for part in parts)
+        }
+        self._n_columns = {
+            name: np.array([len(part.sources[name]) if name in part.sources else -1 for part in parts])
+            for name in self._columns
+        }
+        self._tails = np.array([part.tails for part in parts])
 
-def _averaged(columns: Sequence[F64 | None], weights: F64) -> F64:
-    """Columns (c, size) of one source from those of each part, None where a part has none; weights (n, size, size)."""
-    size = weights.shape[-1]
-    n_columns = max(len(each) for each in columns if each is not None)
-    whole = np.zeros((len(columns), n_columns, size))
-    for i, each in enumerate(columns):
-        if each is not None:
+    def _weighted(self, rows: Sequence[F64]) -> F64:
+        """(n, c, size) rows (c, d) of each part times its precision; 0 where a part has fewer."""
+        size = self._precisions.shape[-1]
+        whole = np.zeros((len(rows), max((len(each) for each in rows), default=1), size))
+        for i, each in enumerate(rows):
             whole[i, : len(each), : each.shape[1]] = each
-    averaged: F64 = np.einsum("nck,nik->ci", whole, weights)
-    return averaged
+        weighted: F64 = whole @ self._precisions
+        return weighted
 
-
-def _stacked(rows: Sequence[F64], size: int) -> F64:
-    whole = np.zeros((len(rows), size))
-    for i, row in enumerate(rows):
-        whole[i, : len(row)] = row
-    return whole
+    def fused(self, first: int, stop: int) -> Posterior:
+        """Parts ``first`` to before ``stop`` together. Raises ValueError where there is none."""
+        if stop <= first:
+            raise ValueError("there is no batch to fuse")
+        if stop - first == 1:
+            return self._parts[first]
+        some = slice(first, stop)
+        size = int(self._sizes[some].max())
+        precisions = self._precisions[some, :size, :size]
+        own = np.linalg.inv(precisions.sum(axis=0))
+        sources = {}
+        for name, columns in self._columns.items():
+            n_columns = int(self._n_columns[name][some].max())
+            if n_columns >= 0:
+                sources[name] = columns[some, :n_columns, :size].sum(axis=0) @ own
+        weights = np.abs(precisions[:, :, PAYLOAD] @ own[PAYLOAD])
+        low, high = (weights @ self._tails[some] / weights.sum()).tolist()
+        mean = own @ self._means[some, :size].sum(axis=0)
+        return Posterior(mean, 0.5 * (own + own.T), sources, (low, high))
 
 
 def difference(before: Posterior, after: Posterior, *, is_one_load: bool) -> tuple[F64, F64]:
@@ -222,7 +239,7 @@ def difference(before: Posterior, after: Posterior, *, is_one_load: bool) -> tup
     covariance = before.own + after.own
     larger = max(abs(float(before.mean[PAYLOAD])), abs(float(after.mean[PAYLOAD])), 1e-9)
     common = 1.0 if is_one_load else max(0.0, 1.0 - abs(float(mean[PAYLOAD])) / larger)
-    for name in Source:
+    for name in {**before.sources, **after.sources}:
         one, other = _paired(before.sources.get(name), after.sources.get(name), size)
         rho = common if name in ONE_LOAD else 1.0
         crossed = one.T @ other
@@ -232,6 +249,8 @@ def difference(before: Posterior, after: Posterior, *, is_one_load: bool) -> tup
 
 def _paired(one: F64 | None, other: F64 | None, size: int) -> tuple[F64, F64]:
     """Both with as many columns; absent ones are zero."""
+    if one is not None and other is not None and len(one) == len(other):
+        return one, other
     n = max(0 if each is None else len(each) for each in (one, other))
     both = np.zeros((2, n, size))
     for i, each in enumerate((one, other)):

@@ -7,8 +7,7 @@ from itertools import pairwise
 import pytest
 from support.days import RULES, assert_a_restart_changes_nothing, batch, day, told, trips
 
-from gateway.core.events import Entry, Ledger
-from gateway.core.events.ledger import HORIZON, SETTLED
+from gateway.core.events import Entry, Ledger, ledger
 from gateway.estimate import Estimate, Watched
 
 DAY_MIN = 24 * 60.0
@@ -96,11 +95,13 @@ def test_a_restart_after_it_goes_on_as_if_it_had_not_been():
     assert_a_restart_changes_nothing(put_right(0.0, 500.0, 500.0, 320.0, 200.0, ahead=5, batches=2))
 
 
-def test_what_is_old_stays_as_it_was_told_whatever_the_clock_did():
-    whole = put_right(400.0, 300.0, *[300.0] * (HORIZON + 20), ahead=3)
+def test_what_is_old_stays_as_it_was_told_whatever_the_clock_did(monkeypatch):
+    monkeypatch.setattr(ledger, "HORIZON", 60)
+    monkeypatch.setattr(ledger, "SETTLED", 30)
+    whole = put_right(400.0, 300.0, *[300.0] * 80, ahead=3)
     revisions = [(n, entry) for n, entry in told_with(whole) if entry.kind == "event"]
     assert len({entry.id for _, entry in revisions}) == 1
-    assert max(n for n, _ in revisions) <= SETTLED + 1
+    assert max(n for n, _ in revisions) <= 31
     assert not revisions[-1][1].record["is_withdrawn"]
 
 

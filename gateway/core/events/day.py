@@ -1,5 +1,6 @@
 """A stretch of estimates as load events and trips: a pure function of the batches, whenever it is asked."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,7 +17,6 @@ from gateway.core.loads import (
     halts_of,
     links_of,
     loads_of,
-    sides_of,
     weighings_of,
 )
 from gateway.estimate import NOWHERE, Estimate
@@ -52,15 +52,19 @@ class Day:
     def found(self) -> Loads:
         return loads_of(self.weighings, self.links, self.rules)
 
-    def events(self) -> list[Entry]:
-        """One entry for each link, however unlikely a change there is; without a revision."""
-        found = self.found.probabilities
-        same = [self.weighings[i].by == self.weighings[i + 1].by for i in range(len(found))]
-        return [self._event(i, probability) for i, probability in enumerate(found) if same[i]]
+    def events(self, since: tuple[int, int] = (0, 0)) -> Iterator[Entry]:
+        """One entry for each link, however unlikely a change there is; without a revision. ``since`` is the clock and
+        the time (ns) at which the first of them ends at the earliest.
+        """
+        for at, link in enumerate(self.links):
+            is_one_scale = self.weighings[at].by == self.weighings[at + 1].by
+            if is_one_scale and (link.clock, link.span_ns[1]) >= since:
+                yield self._event(at)
 
-    def _event(self, at: int, probability: float) -> Entry:
+    def _event(self, at: int) -> Entry:
         link, halts = self.links[at], self.links[at].likely
-        before, after = sides_of(self.weighings, self.found.of_weighing, at)
+        before, after = self.found.sides(at)
+        probability = self.found.probability(at)
         begin_ns, end_ns = link.span_ns
         place = halts[0].place if len(halts) == 1 else NOWHERE
         newest = self.estimates[-1]

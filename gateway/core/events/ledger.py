@@ -51,9 +51,10 @@ class Ledger:
     def _unsettled(self) -> Iterator[Entry]:
         day = Day(self._estimates, self._rules)
         settled = day.clocks[-SETTLED:][0], self._estimates[-SETTLED:][0].t_start_ns
-        for entry in (*trips_of(day, is_cut=len(self._estimates) == HORIZON), *day.events()):
-            if (entry.clock, entry.t_end_ns) >= settled:
-                yield entry
+        for trip in trips_of(day, is_cut=len(self._estimates) == HORIZON):
+            if (trip.clock, trip.t_end_ns) >= settled:
+                yield trip
+        yield from day.events(settled)
 
     def _news(self, entry: Entry) -> Entry | None:
         before = self._known.get(entry.id)

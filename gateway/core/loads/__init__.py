@@ -1,8 +1,8 @@
 """Which weighings are of one load: stops at which it can have changed (halts), and neighbours that agree (joined)."""
 
 from gateway.core.loads.halts import SLACK_NS, Halt, Link, clocks_of, follows, halts_of, links_of
-from gateway.core.loads.joined import Loads, loads_of, sides_of
-from gateway.core.loads.load import Load, Weighing, load_of, weighings_of
+from gateway.core.loads.joined import Loads, loads_of
+from gateway.core.loads.load import Load, Weighing, Weighings, weighings_of
 
 __all__ = [
     "SLACK_NS",
@@ -11,12 +11,11 @@ __all__ = [
     "Load",
     "Loads",
     "Weighing",
+    "Weighings",
     "clocks_of",
     "follows",
     "halts_of",
     "links_of",
-    "load_of",
     "loads_of",
-    "sides_of",
     "weighings_of",
 ]

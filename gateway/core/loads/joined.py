@@ -11,16 +11,28 @@ from itertools import pairwise
 
 from gateway.core.change import EVEN, Rules, probability
 from gateway.core.loads.halts import Link
-from gateway.core.loads.load import Load, Weighing, load_of
+from gateway.core.loads.load import Load, Weighing, Weighings
 
 
 @dataclass(frozen=True, slots=True)
 class Loads:
-    """The loads in order, and how likely the load changed in each link between two weighings."""
+    """The loads in order, the load of each weighing, and the links between weighings by which they were told apart."""
 
     loads: tuple[Load, ...]
     of_weighing: tuple[Load, ...]
-    probabilities: tuple[float, ...]
+    links: Sequence[Link]
+    rules: Rules
+
+    def sides(self, link: int) -> tuple[Load, Load]:
+        """What lies before and after a link: the loads on its two sides, or the two parts of the load around it."""
+        before, after = self.of_weighing[link], self.of_weighing[link + 1]
+        if before is not after:
+            return before, after
+        return before.weighings.load(before.first, link), before.weighings.load(link + 1, before.last)
+
+    def probability(self, link: int) -> float:
+        """That the load changed there."""
+        return _between(*self.sides(link), self.links, self.rules)
 
 
 def loads_of(weighings: Sequence[Weighing], links: Sequence[Link], rules: Rules, parted_from: float = EVEN) -> Loads:
@@ -28,37 +40,21 @@ def loads_of(weighings: Sequence[Weighing], links: Sequence[Link], rules: Rules,
 
     Other calibrations cannot be compared: there a load ends.
     """
-    loads = [load_of(weighings, i, i) for i in range(len(weighings))]
-    odds = [_between(one, other, weighings, links, rules) for one, other in pairwise(loads)]
+    whole = Weighings(weighings)
+    loads = [whole.load(i, i) for i in range(len(whole))]
+    odds = [_between(one, other, links, rules) for one, other in pairwise(loads)]
     while odds and min(odds) < parted_from:
         at = odds.index(min(odds))
-        loads[at : at + 2] = [load_of(weighings, loads[at].first, loads[at + 1].last)]
+        loads[at : at + 2] = [whole.load(loads[at].first, loads[at + 1].last)]
         del odds[at]
         for near in (at - 1, at):
             if 0 <= near < len(odds):
-                odds[near] = _between(loads[near], loads[near + 1], weighings, links, rules)
-    of_weighing = tuple(load for load in loads for _ in range(load.n_batches))
-    return Loads(
-        tuple(loads), of_weighing, tuple(_within(weighings, links, of_weighing, i, rules) for i in range(len(links)))
-    )
+                odds[near] = _between(loads[near], loads[near + 1], links, rules)
+    return Loads(tuple(loads), tuple(load for load in loads for _ in range(load.n_batches)), links, rules)
 
 
-def sides_of(weighings: Sequence[Weighing], of_weighing: Sequence[Load], link: int) -> tuple[Load, Load]:
-    """What lies before and after a link: the loads on its two sides, or the two parts of the load around it."""
-    before, after = of_weighing[link], of_weighing[link + 1]
-    if before is not after:
-        return before, after
-    return load_of(weighings, before.first, link), load_of(weighings, link + 1, before.last)
-
-
-def _within(
-    weighings: Sequence[Weighing], links: Sequence[Link], of_weighing: Sequence[Load], link: int, rules: Rules
-) -> float:
-    before, after = sides_of(weighings, of_weighing, link)
-    return _between(before, after, weighings, links, rules)
-
-
-def _between(before: Load, after: Load, weighings: Sequence[Weighing], links: Sequence[Link], rules: Rules) -> float:
-    if weighings[before.last].by != weighings[after.first].by:
+def _between(before: Load, after: Load, links: Sequence[Link], rules: Rules) -> float:
+    each = before.weighings.each
+    if each[before.last].by != each[after.first].by:
         return 1.0
     return probability(before.measured, after.measured, links[before.last].prior, rules)

@@ -1,11 +1,12 @@
 """What was weighed, batch by batch, and batches of one load together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 from gateway.core.fusion import teaches
 from gateway.estimate import Estimate
-from gateway.posterior import Posterior, fused
+from gateway.posterior import Fusible, Posterior
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,18 +22,48 @@ class Weighing:
     shown: Posterior
 
 
-@dataclass(frozen=True, slots=True)
+class Weighings:
+    """Weighings in their order, and any that follow one another taken as of one load."""
+
+    def __init__(self, each: Sequence[Weighing]) -> None:
+        self.each = each
+
+    @cached_property
+    def measured(self) -> Fusible:
+        return Fusible([one.measured for one in self.each])
+
+    @cached_property
+    def shown(self) -> Fusible:
+        return Fusible([one.shown for one in self.each])
+
+    def __len__(self) -> int:
+        return len(self.each)
+
+    def load(self, first: int, last: int) -> "Load":
+        """Weighings first to last (inclusive, by their number) together."""
+        return Load(first, last, self)
+
+
+@dataclass(frozen=True)
 class Load:
     """Weighings first to last (inclusive, by their number), taken as of one load."""
 
     first: int
     last: int
-    measured: Posterior
-    shown: Posterior
+    weighings: Weighings = field(repr=False)
 
     @property
     def n_batches(self) -> int:
         return self.last - self.first + 1
+
+    @cached_property
+    def measured(self) -> Posterior:
+        """Without what known weights teach."""
+        return self.weighings.measured.fused(self.first, self.last + 1)
+
+    @cached_property
+    def shown(self) -> Posterior:
+        return self.weighings.shown.fused(self.first, self.last + 1)
 
 
 def weighings_of(estimates: Sequence[Estimate]) -> list[Weighing]:
@@ -42,9 +73,3 @@ def weighings_of(estimates: Sequence[Estimate]) -> list[Weighing]:
         for at, one in enumerate(estimates)
         if teaches(one) and one.as_measured is not None and one.posterior is not None
     ]
-
-
-def load_of(weighings: Sequence[Weighing], first: int, last: int) -> Load:
-    """Weighings first to last together."""
-    parts = weighings[first : last + 1]
-    return Load(first, last, fused([one.measured for one in parts]), fused([one.shown for one in parts]))
