@@ -12,7 +12,9 @@ Recovered = Callable[[float], None]
 
 @pytest.fixture(scope="module")
 def small_disk(installed: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Vehicle]:
-    """The service on a disk of 4 MB, committing a record every two seconds or so. Every test leaves it well."""
+    """The service on a disk of 4 MB: a drive of one window again and again, a record or two every 20 s. Every test leaves
+    it well.
+    """
     vehicle = installed
     vehicle.configure(SETTINGS.replace("silence_s = 3.0", "silence_s = 0.5"))
     vehicle.run(
@@ -21,7 +23,7 @@ def small_disk(installed: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> 
         f"cp -p /root/tokens.json {STATE}/; systemctl start springscale",
         timeout_s=120.0,
     )
-    pulse = vehicle.put_log(log_of(loaded_drive(1.0, 4), tmp_path_factory.mktemp("pulse") / "pulse.log"))
+    pulse = vehicle.put_log(log_of(loaded_drive(20.5, 4), tmp_path_factory.mktemp("pulse") / "pulse.log"))
     vehicle.play_pulses(pulse, pause_s=0.8)
     vehicle.wait_until(lambda status: status["store"]["n_written"] > 2)
     yield vehicle

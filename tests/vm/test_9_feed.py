@@ -32,7 +32,8 @@ def feed(vehicle: Vehicle) -> Iterator[Vehicle]:
     start_sensor(vehicle)
     vehicle.run(f"systemctl daemon-reload && systemctl start {UNIT}", timeout_s=90.0)
     yield vehicle
-    vehicle.run(f"systemctl stop {UNIT} sensor; rm -rf {FOLDER}")
+    vehicle.run(f"systemctl stop {UNIT} sensor; rm -rf {FOLDER} /etc/systemd/system/{UNIT}.service /etc/default/{UNIT}")
+    vehicle.run("systemctl daemon-reload", timeout_s=90.0)
 
 
 def test_what_the_unit_measures_reaches_the_service_over_vcan0(feed: Vehicle) -> None:
