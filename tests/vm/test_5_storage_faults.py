@@ -12,7 +12,7 @@ Recovered = Callable[[float], None]
 
 @pytest.fixture(scope="module")
 def small_disk(installed: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Vehicle]:
-    """The service on a disk of 4 MB: a drive of one window again and again, a record or two every 20 s. Every test leaves
+    """The service on a disk of 4 MB: one window is driven again and again, a record or two every 20 s. Each test leaves
     it well.
     """
     vehicle = installed
