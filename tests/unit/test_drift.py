@@ -5,19 +5,21 @@ import pytest
 
 from gateway.core.cross_spectrum.drift import (
     DAMPERS_TOGETHER_STD,
-    DRIFT_PRECISION,
     DRIFT_STD,
     DRIFTING,
     NATURE_STD,
     NATURE_TOGETHER_STD,
     STEADY,
     day_columns,
+    drift_precision,
     packing_columns,
 )
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
 from gateway.records import F64
 
 N_FITTED = len(DRIFTING) + 2  # and the load's two
+ROLLING = np.zeros(len(PARAMETERS) + len(ROLL_PARAMETERS))
+PRECISION = drift_precision(ROLLING)
 
 
 def natural_covariance(entries: list[int], otherwise: F64) -> F64:
@@ -34,7 +36,7 @@ def natural_covariance(entries: list[int], otherwise: F64) -> F64:
 
 def drift_covariance(found: F64, moves: F64) -> F64:
     """Of the fitted numbers: what the day's causes and the load's packing add to what the search states."""
-    columns = np.vstack([day_columns(found, moves), packing_columns(found)])
+    columns = np.vstack([day_columns(found, moves, PRECISION), packing_columns(found, PRECISION)])
     return np.asarray(columns.T @ columns)
 
 
@@ -46,7 +48,7 @@ def test_it_is_the_covariance_of_the_error_in_a_linear_world(evidence: float) ->
     information = evidence * sensitivity @ sensitivity.T
     of_fitted, across = information[:N_FITTED, :N_FITTED], information[:N_FITTED, N_FITTED:]
     believed = np.array(list(DRIFT_STD.values()))
-    prior = np.pad(DRIFT_PRECISION, (0, 2))
+    prior = np.pad(PRECISION, (0, 2))
     found = np.linalg.inv(of_fitted + prior)
     moves = -found @ across
     drifted = np.pad(natural_covariance(DRIFTING, believed), (0, 2))
@@ -72,7 +74,7 @@ def test_a_day_that_warms_both_axles_hardly_moves_the_share_between_them() -> No
 
 
 def test_dampers_drift_together_more_than_apart() -> None:
-    covariance = np.linalg.inv(DRIFT_PRECISION)
+    covariance = np.linalg.inv(PRECISION)
     front, rear = (list(DRIFT_STD).index(f"damper_{end}_nspm") for end in ("front", "rear"))
     together, apart = (np.zeros(len(DRIFTING)) for _ in range(2))
     together[[front, rear]], apart[[front, rear]] = (0.5, 0.5), (1.0, -1.0)
@@ -80,3 +82,12 @@ def test_dampers_drift_together_more_than_apart() -> None:
         DAMPERS_TOGETHER_STD**2 + DRIFT_STD["damper_front_nspm"] ** 2 / 2
     )
     assert apart @ covariance @ apart == pytest.approx(2.0 * DRIFT_STD["damper_front_nspm"] ** 2)
+
+
+def test_noise_drifts_only_where_roll_is_read() -> None:
+    """What a sensor beside the centre line feels of roll would else be taken for its own noise."""
+    held = np.linalg.inv(drift_precision(ROLLING[: len(PARAMETERS)]))
+    free = np.linalg.inv(PRECISION)
+    for i, name in enumerate(DRIFT_STD):
+        expected = 1e-3 if name.startswith("noise_") else free[i, i] ** 0.5
+        assert held[i, i] ** 0.5 == pytest.approx(expected)

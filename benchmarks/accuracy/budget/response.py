@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFT_STD, DRIFTING, STEADY
+from gateway.core.cross_spectrum.drift import DRIFT_STD, DRIFTING, STEADY, drift_precision
 from gateway.core.cross_spectrum.estimator import Weighed
 from gateway.core.cross_spectrum.likelihood import Whittle
 from gateway.core.cross_spectrum.located import Answer, answer_at
@@ -26,7 +26,7 @@ def response_to(found: Weighed, calibration: CrossSpectrumCalibration, day: Mapp
     """
     at = _at(found, calibration)
     steady = at.steady[-2:] @ [day.get(PARAMETERS[i], 0.0) for i in STEADY]
-    drifting = _held_back(at) @ [day.get(PARAMETERS[i], 0.0) for i in DRIFTING]
+    drifting = _held_back(at, calibration) @ [day.get(PARAMETERS[i], 0.0) for i in DRIFTING]
     response: F64 = -_OUTWARD @ (steady + drifting)
     return response
 
@@ -36,8 +36,8 @@ def day_covariance(found: Weighed, calibration: CrossSpectrumCalibration) -> F64
     stands in the batch's own covariance.
     """
     is_damper = np.array([name.startswith("damper_") for name in DRIFT_STD], dtype=float)
-    believed = np.linalg.inv(DRIFT_PRECISION) * np.outer(is_damper, is_damper)
-    held = _OUTWARD @ _held_back(_at(found, calibration))
+    believed = np.linalg.inv(drift_precision(calibration.parameters)) * np.outer(is_damper, is_damper)
+    held = _OUTWARD @ _held_back(_at(found, calibration), calibration)
     columns = found.posterior.sources[Source.DAY]
     covariance: F64 = columns.T @ columns + held @ believed @ held.T
     return covariance
@@ -50,7 +50,7 @@ def _at(found: Weighed, calibration: CrossSpectrumCalibration) -> Answer:
     return answer_at(Whittle(spectra, ground), point, calibration, expected, EVIDENCE, is_shape_known=False)
 
 
-def _held_back(at: Answer) -> F64:
+def _held_back(at: Answer, calibration: CrossSpectrumCalibration) -> F64:
     """(2, k) of the load by the parameters that drift."""
-    held: F64 = at.covariance[-2:, : len(DRIFTING)] @ DRIFT_PRECISION
+    held: F64 = at.covariance[-2:, : len(DRIFTING)] @ drift_precision(calibration.parameters)
     return held

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from scipy.special import gammaincinv
 
-from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll
 from gateway.records import F64
 
 DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
@@ -22,12 +22,19 @@ DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
         "payload_mode_hz": 0.3,
         "payload_damping_ratio": 0.5,  # chosen: a peak on soft mounts cannot be fitted with a firm floor's damping
         "gyro_lag_s": 0.001,
+        "noise_acceleration_m2ps3": 1.0,
+        "noise_pitch_rate_rad2ps": 1.0,
     }
 )
 """What the search leaves free, and how far off, each by itself: standard deviations, of logarithms of what is positive.
 
-Narrower than nature, for the minutes of a batch repeat one error of the model: less evidence than they seem.
+Narrower than nature, for the minutes of a batch repeat one error of the model: less evidence than they seem. The
+sensors' noise is free by a factor of e, chosen: known loads are driven on roads too alike to tell noise from slack, and
+on a smoother road the one stays while the other falls with the road (benchmarks/accuracy/trials.md).
 """
+
+HELD_STD: Final = 1e-3
+"""Of the noise where no roll rate is read: what the sensor then feels of roll looks like noise that it has not."""
 
 NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
     {
@@ -68,14 +75,20 @@ def _covariance(by_itself: Mapping[str, float], together: Mapping[str, float], n
 
 
 _BELIEVED: Final = _covariance(DRIFT_STD, {"damper": DAMPERS_TOGETHER_STD}, list(DRIFT_STD))
+_OF_NOISE: Final = np.array([name.startswith("noise_") for name in DRIFT_STD])
 _NATURE_OF_DRIFTING: Final = _covariance({**DRIFT_STD, **NATURE_STD}, NATURE_TOGETHER_STD, list(DRIFT_STD))
 NATURE_OF_STEADY: Final = _covariance(NATURE_STD, NATURE_TOGETHER_STD, [PARAMETERS[i] for i in STEADY])
-DRIFT_PRECISION: Final = np.linalg.inv(_BELIEVED)
-"""(k, k) of the DRIFTING parameters: the inverse of what the search believes of them."""
+_PRECISION: Final = np.asarray(np.linalg.inv(_BELIEVED), float)
+_PRECISION_WITHOUT_ROLL: Final = np.asarray(np.where(np.diag(_OF_NOISE), HELD_STD**-2, _PRECISION), float)
 
 
-_OF_THE_VEHICLE: Final = np.array([name != "gyro_lag_s" for name in DRIFT_STD], dtype=float)  # a lag is the computer's
-_NATURAL_PRECISION: Final = np.linalg.inv(_NATURE_OF_DRIFTING)
+def drift_precision(theta: F64) -> F64:
+    """(k, k) of the DRIFTING parameters: the inverse of what the search believes, for parameters theta (n,)."""
+    return _PRECISION if has_roll(theta) else _PRECISION_WITHOUT_ROLL
+
+
+_OF_THE_VEHICLE: Final = np.array([not name.startswith(("gyro_lag", "noise")) for name in DRIFT_STD], dtype=float)
+_NATURAL_PRECISION: Final[F64] = np.linalg.inv(_NATURE_OF_DRIFTING)
 MOST_TENSION: Final = float(2.0 * gammaincinv(int(_OF_THE_VEHICLE.sum()) / 2.0, 1.0 - 1e-4))  # chi-squared quantile
 """A vehicle that drifts as vehicles do exceeds this once in ten thousand batches."""
 
@@ -107,22 +120,23 @@ _DAY_OF_DRIFTING: Final = _factor(np.where(np.outer(~_IS_PACKING, ~_IS_PACKING),
 _PACKING_OF_DRIFTING: Final = _factor(np.where(np.outer(_IS_PACKING, _IS_PACKING), _BEYOND_BELIEVED, 0.0))
 
 
-def day_columns(found: F64, moves: F64) -> F64:
+def day_columns(found: F64, moves: F64, precision: F64) -> F64:
     """(6, k) by how much one day's springs, tyres and dampers move the drifting parameters and the load.
 
-    ``found`` (k, k) is the covariance of these in the search, ``moves`` (k, s) by how much they move with each of the
-    STEADY parameters. A parameter that drifts further than the search believed pulls the answer by the share that the
-    prior holds of it: found times precision (S. F. Schmidt's consider covariance, Adv. Control Syst. 3, 1966).
+    ``found`` (k, k) is the covariance of these in the search, ``precision`` that of its prior, ``moves`` (k, s) by how
+    much they move with each of the STEADY parameters. A parameter that drifts further than the search believed pulls
+    the answer by the share that the prior holds of it: found times precision (S. F. Schmidt's consider covariance, Adv.
+    Control Syst. 3, 1966).
     """
-    return np.concatenate([(moves @ _DAY_OF_STEADY).T, (_pulls(found) @ _DAY_OF_DRIFTING).T])
+    return np.concatenate([(moves @ _DAY_OF_STEADY).T, (_pulls(found, precision) @ _DAY_OF_DRIFTING).T])
 
 
-def packing_columns(found: F64) -> F64:
+def packing_columns(found: F64, precision: F64) -> F64:
     """(1, k) likewise of how firmly this load stands on its floor."""
-    columns: F64 = (_pulls(found) @ _PACKING_OF_DRIFTING).T
+    columns: F64 = (_pulls(found, precision) @ _PACKING_OF_DRIFTING).T
     return columns
 
 
-def _pulls(found: F64) -> F64:
-    pulls: F64 = found[:, : len(DRIFTING)] @ DRIFT_PRECISION
+def _pulls(found: F64, precision: F64) -> F64:
+    pulls: F64 = found[:, : len(DRIFTING)] @ precision
     return pulls

@@ -9,11 +9,11 @@ import numpy as np
 from gateway.core.cargo import ShapePrior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import (
-    DRIFT_PRECISION,
     DRIFTING,
     NATURE_OF_STEADY,
     STEADY,
     day_columns,
+    drift_precision,
     packing_columns,
     tension_of,
 )
@@ -176,10 +176,11 @@ def answer_at(
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
-    covariance = np.asarray(np.linalg.inv(_of_sought(whole)), float)
+    precision = drift_precision(point.theta)
+    covariance = np.asarray(np.linalg.inv(_of_sought(whole, precision)), float)
     pull = whole.gradient[FITTED].copy()
     off = (point.theta[DRIFTING]) - expected
-    pull[: len(DRIFTING)] += DRIFT_PRECISION @ off
+    pull[: len(DRIFTING)] += precision @ off
     free = [i for i in range(len(STEADY)) if is_shape_known or STEADY[i] != _GYRATION]
     t = [STEADY[i] for i in free]
     along = -covariance @ whole.information[np.ix_(FITTED, t)]  # what was sought moves by -C I_xt with each t
@@ -197,7 +198,7 @@ def answer_at(
     steady[:, free] = along @ np.linalg.inv(narrowing)  # S_posterior S^-1
     by_noise = along @ posterior * evidence
     to_peak = -covariance @ pull
-    at_peak = whittle.cost(point) + 0.5 * float(off @ DRIFT_PRECISION @ off + pull @ to_peak)
+    at_peak = whittle.cost(point) + 0.5 * float(off @ precision @ off + pull @ to_peak)
     return Answer(
         whole=whole,
         covariance=covariance,
@@ -208,9 +209,9 @@ def answer_at(
     )
 
 
-def _of_sought(whole: Curvature) -> F64:
+def _of_sought(whole: Curvature, precision: F64) -> F64:
     """Information on what is sought, its prior included."""
-    information: F64 = whole.information[np.ix_(FITTED, FITTED)] + np.pad(DRIFT_PRECISION, (0, 2))
+    information: F64 = whole.information[np.ix_(FITTED, FITTED)] + np.pad(precision, (0, 2))
     return information
 
 
@@ -220,7 +221,7 @@ def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
-    covariance = np.asarray(np.linalg.inv(_of_sought(whole)), float)
+    covariance = np.asarray(np.linalg.inv(_of_sought(whole, drift_precision(point.theta))), float)
     moves = np.zeros((2, len(PARAMETERS)))
     moves[:, STEADY] = -(covariance @ whole.information[np.ix_(FITTED, STEADY)])[-2:]
     return covariance[-2:, -2:], moves
@@ -283,7 +284,11 @@ def _located(
         x = x + np.r_[np.zeros(len(DRIFTING)), at.shift[-2:]]
         point = _point(x, calibration, cg_left_m)
     whole, found = at.whole, at.covariance
-    columns = {Source.DAY: day_columns(found, at.steady)[:, -2:], Source.LOAD_LENGTH: packing_columns(found)[:, -2:]}
+    precision = drift_precision(point.theta)
+    columns = {
+        Source.DAY: day_columns(found, at.steady, precision)[:, -2:],
+        Source.LOAD_LENGTH: packing_columns(found, precision)[:, -2:],
+    }
     if shape is not None:
         columns |= _of_shape(shape, columns[Source.LOAD_LENGTH])
     likeliest = (float(calibration.parameters[_GYRATION]), peak.found.x) if shape is None else shape.likeliest
@@ -389,7 +394,7 @@ def _sought(
 ) -> Found:
     """Drift parameters, then payload (kg) and front share (0..1), of the peak that ``start`` leads to."""
     prior_mean = np.r_[packing.drifting, 0.0, 0.0]
-    prior_precision = np.pad(DRIFT_PRECISION, (0, 2))  # flat in payload and share
+    prior_precision = np.pad(drift_precision(calibration.parameters), (0, 2))  # flat in payload and share
 
     most_kg = MOST_LOAD_SHARE * calibration.empty_mass_kg
 

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import DRIFT_PRECISION, DRIFTING, STEADY
+from gateway.core.cross_spectrum.drift import DRIFTING, STEADY, drift_precision
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
@@ -56,7 +56,7 @@ class SensorScores:
 def scores_of(whole: Curvature, point: Point, covariance: F64, calibration: CrossSpectrumCalibration) -> SensorScores:
     """``whole`` is the curvature at ``point`` for every parameter and the load, ``covariance`` that of FITTED."""
     pull = whole.gradient[FITTED].copy()
-    pull[: len(DRIFTING)] += DRIFT_PRECISION @ (point.theta - calibration.parameters)[DRIFTING]
+    pull[: len(DRIFTING)] += drift_precision(point.theta) @ (point.theta - calibration.parameters)[DRIFTING]
     across = whole.information[np.ix_(FITTED, STEADY)]
     left_open = calibration.covariance[np.ix_(STEADY, STEADY)]
 
