@@ -88,7 +88,7 @@ def drift_precision(theta: F64) -> F64:
 
 
 _OF_THE_VEHICLE: Final = np.array([not name.startswith(("gyro_lag", "noise")) for name in DRIFT_STD], dtype=float)
-_NATURAL_PRECISION: Final[F64] = np.linalg.inv(_NATURE_OF_DRIFTING)
+_NATURAL_PRECISION: Final = np.linalg.inv(_NATURE_OF_DRIFTING)
 MOST_TENSION: Final = float(2.0 * gammaincinv(int(_OF_THE_VEHICLE.sum()) / 2.0, 1.0 - 1e-4))  # chi-squared quantile
 """A vehicle that drifts as vehicles do exceeds this once in ten thousand batches."""
 
