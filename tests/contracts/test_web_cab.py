@@ -94,6 +94,27 @@ def test_what_could_not_be_weighed_since_is_told_with_its_reasons(gateway: Gatew
     assert told(gateway)["rejected"] == []
 
 
+@pytest.mark.parametrize("why", [Why.MODEL_MISFIT, Why.ACCELERATION_STUCK])
+def test_while_batches_are_refused_for_what_they_showed_nothing_is_promised(gateway: Gateway, why: Why) -> None:
+    """Neither by what was weighed before, nor by early looks between refused batches."""
+    early = replace(loaded(9, 310.0, 48.0), is_provisional=True)
+    gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(why))
+    for payload_kg in (300.0, 310.0):
+        cab = told(gateway)
+        assert (cab["light"], cab["room"], cab["is_doubted"], cab["rejected"]) == ("unknown", [], True, [str(why)])
+        assert cab["payload_kg"] == payload_kg
+        gateway.board.publish(early)
+    gateway.publish(loaded(9, 300.0, 48.0))
+    assert (told(gateway)["light"], told(gateway)["is_doubted"]) == ("go", False)
+
+
+def test_a_road_that_told_nothing_takes_nothing_back_and_no_doubt_takes_back_an_overload(gateway: Gateway) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(Why.NOT_ENOUGH_EXCITATION))
+    assert (told(gateway)["light"], told(gateway)["is_doubted"]) == ("go", False)
+    gateway.publish(loaded(2, 620.0, 50.0), loaded(3, 620.0, 50.0).refused(Why.MODEL_MISFIT))
+    assert (told(gateway)["light"], told(gateway)["rejected"]) == ("over", ["model_misfit"])
+
+
 def test_an_old_number_is_stale(gateway: Gateway) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     gateway.clock_s += 3600.0

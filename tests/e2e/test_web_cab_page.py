@@ -242,6 +242,23 @@ def test_a_sensor_that_is_silent_is_said(gateway: Gateway, phone: Watched) -> No
         phone.page.close()
 
 
+def test_while_batches_are_refused_the_light_is_not_green(gateway: Gateway, phone: Watched) -> None:
+    """An early look between two refused batches brings it back no more than what was weighed before."""
+    gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(Why.MODEL_MISFIT))
+    gateway.board.publish(replace(loaded(9, 300.0, 48.0), is_provisional=True))
+    page = phone.page
+    with serving(gateway.app) as server:
+        page.goto(f"{server.url}/cab")
+        expect(page.locator("#light")).to_have_text("Not known")
+        expect(page.locator("#number")).to_have_text("?")
+        expect(page.locator("#why")).to_have_text("The last minutes could not be weighed: model misfit.")
+        expect(page.locator("#main")).to_have_attribute("data-is", "earlier")
+        gateway.publish(loaded(9, 300.0, 48.0))
+        expect(page.locator("#light")).to_have_text("Go")
+        expect(page.locator("#main")).to_have_attribute("data-is", "current")
+        assert phone.complaints == []
+
+
 def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path: Path, phone: Watched) -> None:
     unlimited = replace(VAN.vehicle, gross_limit_kg=None, front_axle_limit_kg=None, rear_axle_limit_kg=None)
     page = phone.page

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +93,25 @@ def test_where_all_was_refused_the_reason_stands_beside_the_missing_number(gatew
         note = watched.page.locator("#note")
         expect(note).to_contain_text("No estimate yet. The last batch could not be weighed: too slow.")
         expect(note).to_contain_text("What to do: nothing; the next open road will do.")
+        gateway.board.close()
+
+
+def test_a_refused_batch_casts_doubt_on_the_number_before_it_and_on_early_ones(
+    gateway: Gateway, watched: Watched
+) -> None:
+    calibrated = demo_calibration()
+    gateway.publish(weighed(0, 270.0, 48.0, calibrated), make_estimate(1, Why.TOO_SLOW))
+    with serving(gateway.app) as server:
+        watched.page.goto(server.url)
+        expect(watched.page.locator("#payload")).to_have_text("270 kg")
+        expect(watched.page.locator("#note")).to_be_hidden()  # of the road: nothing against it
+        gateway.publish(make_estimate(2, Why.MODEL_MISFIT))
+        expect(watched.page.locator("#note")).to_contain_text("could not be weighed: model misfit. This number may not")
+        gateway.board.publish(replace(weighed(4, 270.0, 48.0, calibrated), is_provisional=True))
+        expect(watched.page.locator("#note")).to_contain_text("Early value")
+        expect(watched.page.locator("#note")).to_contain_text("model misfit")
+        gateway.publish(weighed(4, 270.0, 48.0, calibrated))
+        expect(watched.page.locator("#note")).to_be_hidden()
         gateway.board.close()
 
 

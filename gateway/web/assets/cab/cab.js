@@ -49,7 +49,7 @@ function sayBoth(id, [first, one], [second, other]) {
 function validity(silentS) {
   if (isRefused || cab === null) return "asking";
   if (silentS > GONE_AFTER_S || cab.is_stale) return "old";
-  return cab.load === "weighed" ? "current" : "earlier";
+  return cab.load === "weighed" && !cab.is_doubted ? "current" : "earlier";
 }
 
 function writeNumber(kg) {

@@ -60,7 +60,7 @@ export function question(cab, isCurrent) {
 }
 
 function unknownRoom(cab) {
-  if (cab.payload_kg === null) return [phrase("load_more"), null, whyNot(cab)];
+  if (cab.payload_kg === null || cab.is_doubted) return [phrase("load_more"), null, whyNot(cab)];
   return [phrase("aboard_now"), cab.payload_kg, phrase("room_unknown", { missing: phrase(cab.has_limits ? "missing_empty" : "missing_limit") })];
 }
 

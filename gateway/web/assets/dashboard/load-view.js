@@ -18,8 +18,15 @@ function noneYet(refusal, reasons, commissioning) {
   return phrase("none_because", { reasons: named(refusal.rejected) }) + todo;
 }
 
+/** The last batch was refused, none was weighed since, and not merely the road told nothing. */
+function isDoubted({ last_rejection: refusal, ...latest }, reasons) {
+  if (refusal == null || latest.payload_kg == null || (!latest.provisional && refusal.t_end <= latest.t_end)) return false;
+  return refusal.rejected.some((reason) => ["The sensors", "The answer"].includes(reasons.get(reason)?.cause));
+}
+
 function notes(latest, reasons, commissioning) {
   const said = [];
+  if (isDoubted(latest, reasons)) said.push(phrase("note_doubted", { reasons: named(latest.last_rejection.rejected) }));
   if (latest.is_stale) said.push(phrase("note_old"));
   if (latest.provisional) said.push(phrase("note_early"));
   if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons, commissioning));

@@ -110,6 +110,7 @@ export const DASHBOARD = {
   ],
   note_old: ["This estimate is old: the load may have changed since.", "Diese Schätzung ist alt: Die Ladung kann sich geändert haben."],
   note_early: ["Early value: the batch under way is not complete yet.", "Früher Wert: Der laufende Abschnitt ist noch nicht vollständig."],
+  note_doubted: ["The last batch could not be weighed: {reasons}. This number may not hold.", "Der letzte Abschnitt konnte nicht gewogen werden: {reasons}. Diese Zahl muss nicht mehr stimmen."],
   note_none: ["No estimate: {reasons}.", "Keine Schätzung: {reasons}."],
   none_yet: ["No estimate yet.", "Noch keine Schätzung."],
   none_because: ["No estimate yet. The last batch could not be weighed: {reasons}.", "Noch keine Schätzung. Der letzte Abschnitt konnte nicht gewogen werden: {reasons}."],

@@ -10,9 +10,10 @@ from fastapi import APIRouter
 
 from gateway.core.alarms.weighing import as_of_load
 from gateway.core.events import EntryKind
-from gateway.core.weights import Room, nearness, rooms_of
+from gateway.core.weights import Light, Room, nearness, rooms_of
 from gateway.estimate import Estimate, Quantity, Weights
-from gateway.records import iso_utc
+from gateway.reasons import EXPLANATIONS, Cause
+from gateway.records import Why, iso_utc
 from gateway.status import Status
 from gateway.store import StoreReader
 from gateway.web.live.board import Board
@@ -20,6 +21,7 @@ from gateway.web.routes.cab.shapes import Cab, CabEvent, LoadKnown, RoomLeft
 from gateway.web.routes.weights import Scales
 from gateway.web.schemas import problem_responses
 
+_DOUBTING: Final = {Cause.SENSORS, Cause.ANSWER}  # roads and driving say nothing against an earlier weight
 _EVENTS: Final = 20  # a corrected one comes again behind newer ones
 
 
@@ -34,6 +36,8 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
         load = None if shown.estimate is None else as_of_load(shown.estimate)
         weights = scales.weigh(load)
         near = nearness(weights)
+        rejected = _rejected(board.heard(), shown.estimate)
+        is_doubted = near.light is not Light.OVER and any(EXPLANATIONS[why].cause in _DOUBTING for why in rejected)
         return Cab(
             vehicle_id=now.vehicle_id,
             state=now.state,
@@ -43,16 +47,17 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
             age_s=shown.age_s,
             is_stale=shown.is_stale,
             is_early=load is not None and load.is_provisional,
-            light=near.light,
-            light_about=list(near.places()),
+            light=Light.UNKNOWN if is_doubted else near.light,
+            light_about=[] if is_doubted else list(near.places()),
             over_limit_probability=_or_none(max(near.probabilities.values(), default=None), 4),
-            room=[_room(room) for room in rooms_of(weights)],
+            room=[] if is_doubted else [_room(room) for room in rooms_of(weights)],
+            is_doubted=is_doubted,
             has_limits=_has_limits(weights),
             lacks=weights.gross.lacks,
             payload_kg=None if load is None else _or_none(load.payload.number, 1),
             payload_interval95_kg=None if load is None else _interval(load.payload),
             alarms=now.alarms.standing,
-            rejected=_rejected(board.heard(), shown.estimate),
+            rejected=[str(why) for why in rejected],
             last_event=_newest(await asyncio.to_thread(_events, reader)),
             own_readings=now.own_readings,
         )
@@ -82,10 +87,12 @@ def _has_limits(weights: Weights) -> bool:
     return any(one.limit_kg is not None for one in (weights.gross, weights.front_axle, weights.rear_axle))
 
 
-def _rejected(heard: Estimate | None, shown: Estimate | None) -> list[str]:
-    """Of the last whole batch, where it came after what is shown."""
-    is_newer = heard is not None and (shown is None or heard.t_end_ns > shown.t_end_ns)
-    return [str(why) for why in heard.rejected] if heard is not None and is_newer else []
+def _rejected(heard: Estimate | None, shown: Estimate | None) -> tuple[Why, ...]:
+    """Of the last whole batch, where none was weighed since. An early look makes up for no refused batch."""
+    if heard is None:
+        return ()
+    is_weighed_since = shown is not None and not shown.is_provisional and shown.t_end_ns >= heard.t_end_ns
+    return () if is_weighed_since else heard.rejected
 
 
 def _events(reader: StoreReader) -> tuple[str, ...]:

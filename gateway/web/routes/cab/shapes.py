@@ -58,16 +58,21 @@ class Cab(BaseModel):
     is_stale: bool
     is_early: bool = Field(description="true: an early look, not a whole batch yet")
     light: Light = Field(
-        description="near: a limit lies within the 95 % interval; over: too much is more probable than not"
+        description="near: a limit lies within the 95 % interval; over: too much is more probable than not; "
+        "unknown: no limit or no weight is known, or it is doubted"
     )
     light_about: list[str] = Field(description="places the light is about, the worst first", examples=[["rear_axle"]])
     over_limit_probability: float | None = Field(description="of the worst place, 0 to 1", examples=[0.02])
-    room: list[RoomLeft] = Field(description="the tightest first; empty: no limit or no weight is known")
+    room: list[RoomLeft] = Field(description="the tightest first; empty: unknown, as the light is")
+    is_doubted: bool = Field(
+        description="the last whole batch was refused for what sensors or answer showed, so nobody knows whether what "
+        "was weighed before holds; never where that was too heavy"
+    )
     has_limits: bool = Field(description="whether a gross or an axle limit is known at all")
     lacks: Lack | None = Field(description="what the gross weight would need to be known")
     payload_kg: float | None
     payload_interval95_kg: list[float] | None
     alarms: dict[str, str] = Field(description="those that stand, by name: early or final; see /api/v1/alarms")
-    rejected: list[str] = Field(description="why the last batch could not be weighed; empty: it was, or none came")
+    rejected: list[str] = Field(description="why the last whole batch could not be weighed; empty: it was, or none came")
     last_event: CabEvent | None
     own_readings: tuple[OwnReading, ...] = Field(description="of the vehicle's own load sensors, not weighed here")
