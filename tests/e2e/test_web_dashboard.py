@@ -95,7 +95,7 @@ def test_it_shows_how_bus_sensors_and_calibration_are(site: str, watched: Watche
     expect(rows.nth(0)).to_contain_text("100.2 Hz")
     expect(rows.nth(1).locator(".silent")).to_have_text("silent for 75 s")
     expect(rows.nth(2).locator(".silent")).to_have_text("never heard")
-    expect(rows.nth(3)).to_contain_text("Doornot sent (optional)")
+    expect(rows.nth(3)).to_have_text("Optional, not sent: door, odometer")
     expect(rows.nth(3).locator(".silent")).to_have_count(0)
     expect(page.locator("#bus")).to_contain_text("socketcan can0: receiving")
     expect(page.locator("#bus")).to_contain_text("connected; 31 waiting, the oldest for 2.6 h")

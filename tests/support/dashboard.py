@@ -32,6 +32,7 @@ STATUS = Status(
         SignalHealth(signal="pitch_rate", rate_hz=100.0, last_age_s=75.0, rejected_share=0.0),
         SignalHealth(signal="speed"),
         SignalHealth(signal="door"),
+        SignalHealth(signal="odometer"),
     ),
     store=StoreStatus(),
     uplink=UplinkStatus(broker="fleet.example:8883", is_connected=True, n_waiting=31, waiting_age_s=9300.0),

@@ -84,9 +84,10 @@ function alarmName(name) {
   return phrase.named("alarm", name);
 }
 
-/** Those that stand, the confirmed ones first. */
+/** Those that stand, the confirmed ones first; not of what the light is red about. */
 export function alarmText(cab) {
-  const told = (level) => Object.keys(cab.alarms).filter((name) => cab.alarms[name] === level).map(alarmName);
+  const isSaid = (name) => cab.light === "over" && cab.light_about.some((place) => name === `overload.${place}`);
+  const told = (level) => Object.keys(cab.alarms).filter((name) => cab.alarms[name] === level && !isSaid(name)).map(alarmName);
   const [sure, early] = [told("final"), told("early")];
   return [sure.length ? phrase("alarms", { names: sure.join(", ") }) : "", early.length ? phrase("first_signs", { names: early.join(", ") }) : ""].filter(Boolean).join(" ");
 }

@@ -12,7 +12,7 @@ const NEEDED = new Set(["vertical_acceleration", "pitch_rate", "speed"]);
 function stateOf(signal, isCalm) {
   if (!isSilent(signal)) return [phrase("heard"), ""];
   const isNeeded = NEEDED.has(signal.signal);
-  if (signal.last_age_s == null) return [phrase(isNeeded ? "never_heard" : "not_sent"), isNeeded && !isCalm ? "silent" : ""];
+  if (signal.last_age_s == null) return [phrase("never_heard"), isCalm ? "" : "silent"];
   const text = phrase(isCalm ? "paused" : "silent_for", { duration: duration(signal.last_age_s) });
   return [text, isNeeded && !isCalm ? "silent" : ""];
 }
@@ -27,6 +27,17 @@ function signalRow(signal, isCalm) {
   ]);
   built.cells[1].className = tone;
   return built;
+}
+
+/** What a vehicle may send and this one never did is one line. */
+function signalRows(signals, isCalm) {
+  const isNotSent = ({ signal, last_age_s: age }) => age == null && !NEEDED.has(signal);
+  const rows = signals.filter((signal) => !isNotSent(signal)).map((signal) => signalRow(signal, isCalm));
+  const names = signals.filter(isNotSent).map(({ signal }) => phrase.named("signal", signal));
+  if (!names.length) return rows;
+  const last = made("tr", [made("td", phrase("not_sent", { signals: names.join(", ") }), "not-sent")]);
+  last.firstChild.colSpan = 4;
+  return [...rows, last];
 }
 
 function queue({ n_waiting, waiting_age_s }) {
@@ -57,7 +68,7 @@ show((known) => {
   const { status } = known;
   const isCalm = isAsleep(known);
   const { bus, batches, store, uplink, webhook } = status;
-  element("signals").replaceChildren(...status.signals.map((one) => signalRow(one, isCalm)));
+  element("signals").replaceChildren(...signalRows(status.signals, isCalm));
   element("bus").replaceChildren(
     pair(phrase("bus"), `${bus.interface} ${bus.channel}: ${phrase.named("bus", bus.state)}`),
     pair(phrase("frames"), number(bus.n_frames, 0)),

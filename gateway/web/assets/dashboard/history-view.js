@@ -4,7 +4,7 @@ import { known, show } from "/assets/dashboard/known.js";
 import { element, made, row, write } from "/assets/dashboard/page.js";
 import { colour, plot } from "/assets/dashboard/plot.js";
 import { phrase } from "/assets/dashboard/phrases.js";
-import { between, clock, figure, kmh, reasons, withStd } from "/assets/dashboard/words.js";
+import { axisDay, between, clock, figure, kmh, reasons, withStd } from "/assets/dashboard/words.js";
 
 const HOUR_MS = 3600e3;
 const QUANTITIES = {
@@ -97,6 +97,8 @@ function range(batches) {
   return [ends[0] - margin, ends[1] + margin].map((ms) => local(new Date(ms).toISOString()));
 }
 
+const HALF_DAY_MS = 43_200_000;
+const TICKS = [{ dtickrange: [null, HALF_DAY_MS], value: `%H:%M\n${axisDay()}` }, { dtickrange: [HALF_DAY_MS, null], value: axisDay() }];
 const floor = { overlaying: "y", range: [0, 1], visible: false, fixedrange: true };
 
 function drawCharts() {
@@ -110,7 +112,7 @@ function drawCharts() {
     if (!isTold) continue;
     element(`${name}-chart-words`).textContent = inWords(batches, quantity);
     plot(element(`${name}-chart`), traces(batches, quantity), {
-      xaxis: { type: "date", range: range(batches) },
+      xaxis: { type: "date", range: range(batches), tickformatstops: TICKS },
       yaxis: { zeroline: name !== "share" },
       yaxis2: floor,
     });

@@ -77,21 +77,24 @@ function announce(latest) {
   announcedId = latest.id;
 }
 
-/** Each source with what it adds and what would narrow it; the widths are half those of 95 % intervals. */
-show(({ latest, sources, remedies }) => {
+/** Each source with what it adds, and once each what would narrow it; the widths are half those of 95 % intervals. */
+show(({ latest, sources, remedies: advised }) => {
   const lines = latest?.error_budget ?? [];
   element("budget").hidden = lines.length === 0;
   if (lines.length === 0) return;
   const half = (std) => figure(Z95 * std, 0, "kg");
   write("budget-why", phrase("why", { kg: half(latest.payload_std_kg) }));
-  element("budget-lines").replaceChildren(...lines.filter((line) => line.payload_kg > 0).map((line) => {
-    const advice = line.remedy && remedies.get(line.remedy);
-    const source = capital(sources.get(line.source) ?? words(line.source));
-    const said = { source, kg: half(line.payload_kg), advice: advice && capital(advice), now: half(latest.payload_std_kg), then: half(line.payload_with_remedy_kg) };
-    const built = made("li", phrase(advice ? "budget_remedy" : "budget_line", said));
+  const told = lines.filter((line) => line.payload_kg > 0);
+  element("budget-lines").replaceChildren(...told.map((line) => {
+    const built = made("li", [made("span", capital(sources.get(line.source) ?? words(line.source))), made("span", `±\u00a0${half(line.payload_kg)}`)]);
     built.style.setProperty("--part", `${(100 * line.payload_kg) / latest.payload_std_kg}%`);
     return built;
   }));
+  const helps = ({ remedy, payload_with_remedy_kg: then }) => advised.has(remedy) && half(then) !== half(latest.payload_std_kg);
+  const remedies = new Map(told.filter(helps).map((line) => [line.remedy, line.payload_with_remedy_kg]));
+  element("budget-better").hidden = remedies.size === 0;
+  element("budget-remedies").replaceChildren(...[...remedies].sort(([, one], [, other]) => one - other).map(([remedy, then]) =>
+    made("li", phrase("budget_remedy", { advice: capital(advised.get(remedy)), now: half(latest.payload_std_kg), then: half(then) }))));
 }, "latest", "sources", "remedies");
 
 show(({ latest, vehicle, reasons, commissioning, isReachable }) => {

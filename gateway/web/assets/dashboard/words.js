@@ -1,6 +1,6 @@
 // Numbers, times and names for people, as their language writes them.
 
-import { locale, speaker } from "/assets/language.js";
+import { language, locale, speaker } from "/assets/language.js";
 import { COMMON } from "/assets/words/common.js";
 
 const common = speaker(COMMON);
@@ -40,6 +40,12 @@ function format(...instants) {
 }
 
 export const clock = (iso) => format(new Date(iso)).format(new Date(iso));
+
+/** A day on a chart's axis, in the notation of d3-time-format: in the order of the locale, by number in German. */
+export function axisDay() {
+  if (language === "de") return "%-d.%-m.";
+  return new Intl.DateTimeFormat(locale, { month: "short", day: "numeric" }).formatToParts(0)[0].type === "month" ? "%b %-d" : "%-d %b";
+}
 
 /** From one instant to another, as "09:05 – 09:35". */
 export function span(from, to) {

@@ -73,6 +73,6 @@ class Cab(BaseModel):
     payload_kg: float | None
     payload_interval95_kg: list[float] | None
     alarms: dict[str, str] = Field(description="those that stand, by name: early or final; see /api/v1/alarms")
-    rejected: list[str] = Field(description="why the last whole batch could not be weighed; empty: it was, or none came")
+    rejected: list[str] = Field(description="why the last whole batch was refused; empty: it was not, or none came")
     last_event: CabEvent | None
     own_readings: tuple[OwnReading, ...] = Field(description="of the vehicle's own load sensors, not weighed here")
