@@ -25,12 +25,13 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 IMAGES: Final = Path(__file__).with_name("images")
 SPRINGSCALE: Final = (sys.executable, "-m", "gateway")
-N_FIRST_DRIVE: Final = 7  # its last rest is closed by the first frames of the second drive
+N_FIRST_DRIVE: Final = 5
 N_WEIGHED: Final = 9  # the first drive's five batches, the second's three empty ones and its first loaded one
 PATIENCE_S: Final = 300.0
 MOST_BYTES: Final = 300_000
 GAP_PX: Final = 24
-LAPTOP: Final[dict[str, Any]] = {"viewport": {"width": 1240, "height": 1075}, "color_scheme": "light"}
+LAPTOP: Final[dict[str, Any]] = {"viewport": {"width": 1600, "height": 1000}, "color_scheme": "light"}
+REPORT: Final[dict[str, Any]] = {"viewport": {"width": 1240, "height": 1075}, "color_scheme": "light"}
 PHONE: Final[dict[str, Any]] = {
     "viewport": {"width": 390, "height": 844},
     "device_scale_factor": 2,
@@ -158,7 +159,7 @@ def take_report(browser: Browser) -> None:
             ["calibrate", bench / "campaign.toml", "--output", f"{folder}/vehicle.json", "--report", report],
         ):
             subprocess.run([*SPRINGSCALE, *command], stdout=subprocess.DEVNULL, check=True)
-        page = browser.new_page(locale="en-GB", **LAPTOP)
+        page = browser.new_page(locale="en-GB", **REPORT)
         page.goto((report / "report.html").as_uri())
         page.wait_for_timeout(2000)
         save(page.screenshot(), "calibration-report.png")

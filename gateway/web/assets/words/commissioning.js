@@ -7,7 +7,7 @@ export const COMMISSIONING_WORDS = {
     "Dieses Fahrzeug ist nicht kalibriert. Seine Achslasten und eine Viertelstunde Leerfahrt genügen.",
   ],
   com_begun: ["Begun {time} by {by}. Everything entered is kept, also when this page is closed.", "Begonnen {time} von {by}. Alles Eingegebene bleibt erhalten, auch wenn diese Seite geschlossen wird."],
-  com_not_here: ["Not possible here: {why}.", "Hier nicht möglich: [commissioning] in den Einstellungen sagt, was hier erlaubt ist."],
+  com_not_here: ["Not possible here: {why}.", "Hier nicht möglich. Das Gateway meldet: {why}."],
   "com_step.line": ["Line", "Baureihe"],
   "com_step.vehicle": ["Vehicle", "Fahrzeug"],
   "com_step.empty": ["Empty", "Leer"],
