@@ -114,6 +114,9 @@ def test_too_heavy_says_what_must_come_out_by_the_same_logic(gateway: Gateway, p
             "Overload: best estimate 20 kg (95 %: 8 to 32 kg). Limit: whole vehicle."
         )
         expect(phone.page.locator("#rooms")).to_contain_text("Front axle10 kg too much")
+        standing = {"overload.gross": "final", "drift.zero": "final"}
+        gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=standing)})
+        expect(phone.page.locator("#alarms")).to_have_text("Alarm: drift: zero.")  # the light says the other
         phone.page.close()
 
 
