@@ -28,7 +28,7 @@ pytestmark = [needs("hass"), needs_mosquitto]
 
 BIRTH = {"vehicle_id": "van-17", "vin": "WVWZZZ1KZAW000001", "version": "1.2.3", "estimator": "cross_spectrum"}
 PAYLOAD, OVERLOAD = "sensor.van_17_payload", "binary_sensor.van_17_overload"
-CONNECTED = "binary_sensor.van_17_connected"
+CONNECTED, GROSS = "binary_sensor.van_17_connected", "sensor.van_17_gross_weight"
 HEAVY = Weights(gross=Weight(2600.4, 8.0, 2500.0, None), front_axle=Weight(1200.2, 6.0, None, None))
 
 
@@ -72,15 +72,14 @@ def test_a_vehicle_appears_fills_and_is_seen_to_be_away(home: tuple[HomeAssistan
     assistant, broker = home
     with vehicle(store, broker):
         assert wait_until(lambda: PAYLOAD in assistant.states("van_17")), assistant.log
+        assert wait_until(lambda: len(assistant.states("van_17")) == len(ENTITIES)), assistant.states("van_17")
         weighed_and_shown(assistant, store, 3, HEAVY)
+        for entity, state in ((GROSS, "2600.4"), (OVERLOAD, "on"), (CONNECTED, "on")):  # each takes it for itself
+            assert wait_until(lambda entity=entity, state=state: assistant.state(entity) == state), entity
         states = assistant.states("van_17")
-        assert len(states) == len(ENTITIES)
-        assert states["sensor.van_17_gross_weight"]["state"] == "2600.4"
-        assert states[OVERLOAD]["state"] == "on"
         assert states["sensor.van_17_rear_axle"]["state"] == "unknown"  # which is not 0
         payload = states[PAYLOAD]["attributes"]
         assert (payload["unit_of_measurement"], payload["device_class"]) == ("kg", "weight")
-        assert states[CONNECTED]["state"] == "on"
     # switched off: it is seen to be away, and its last weight stays, as that of a parked van
     assert wait_until(lambda: assistant.state(CONNECTED) == "off"), assistant.state(CONNECTED)
     assert assistant.state(PAYLOAD) == "103.0"

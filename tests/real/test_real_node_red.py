@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from paho.mqtt import publish
 from support.broker import Broker, Listener, needs_mosquitto, running_broker
 from support.estimates import make_estimate
 from support.parts import found, needs
@@ -30,6 +31,21 @@ def weighing(n: int, gross_kg: float) -> Estimate:
     estimate = make_estimate(n)
     weights = Weights(gross=Weight(gross_kg, 8.0, 2500.0, None))
     return replace(estimate, vehicle_id="van-17", weights=weights)
+
+
+def wait_for_its_subscription(broker: Broker) -> None:
+    """It says that it is connected before the broker has its subscription: until then what is told is lost."""
+    told = json.dumps(estimate_to_json(replace(weighing(0, 2600.0), vehicle_id="probe")))
+    listener = Listener(broker.port, "alarms/probe", "probe")
+
+    def is_heard() -> bool:
+        publish.single("springscale/probe/estimates", told, qos=1, port=broker.port)
+        return bool(listener.heard)
+
+    try:
+        assert wait_until(is_heard)
+    finally:
+        listener.close()
 
 
 @pytest.fixture
@@ -56,6 +72,7 @@ def node_red(tmp_path: Path, broker: Broker) -> Iterator[None]:
         process = subprocess.Popen(command, stdout=said, stderr=said)
     try:
         assert wait_until(lambda: "Connected to broker" in log.read_text(errors="replace")), log.read_text()
+        wait_for_its_subscription(broker)
         yield
     finally:
         process.terminate()
