@@ -22,6 +22,7 @@ import performance
 import phone_import
 import reference
 import scale
+import studies
 from made import ROOT, StaleError, filled, keep_up_to_date
 
 DOCS: Final = ROOT / "docs"
@@ -29,7 +30,9 @@ PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     **{f"docs/{page}": parts for page, parts in reference.PARTS.items()},
     "docs/feed.md": {"cost": feed_cost.cost},
     "docs/fleet.md": {"fleet test": fleet_counts.counted},
-    "docs/phone.md": {"output": phone_import.printed},
+    "docs/kuksa.md": {"cost": feed_cost.kuksa},
+    "docs/phone.md": {"output": phone_import.printed, "accuracy": studies.phone_beside_can},
+    "docs/traccar.md": {"cost": feed_cost.traccar},
 }
 """Pages with words of their own, by their place; each part between its marks."""
 

@@ -3,8 +3,9 @@
     phones(n_rounds, seed) -> {"rows": [...], ...}
 
 Every van of gateway.sim.vans is driven ``n_rounds`` times: empty and with two known loads to calibrate, then with three
-others. Both sensors lie at the same place of the same drive; the phone's recording is exported as each app writes it,
-imported by ``springscale import``, and everything after that is what any log goes through, by the command line.
+others. Both sensors lie at the same place of the same drive; the phone's recording is exported as an app writes it,
+imported by ``springscale import``, and everything after that is what any log goes through, by the command line. One app
+is enough: the others' exports become the same log but for their digits (tests/unit/test_phone_import.py).
 """
 
 import json
@@ -28,16 +29,13 @@ from gateway.sim.sensors import REFERENCE
 from gateway.sim.vans import VANS
 from gateway.sim.vehicle import Load, Vehicle
 from gateway.workbench.campaigns import share_range_pct
-from gateway.workbench.phones import APPS, PHONE, Lying, write_export
+from gateway.workbench.phones import PHONE, Lying, write_export
 from gateway.workbench.wiring import Wiring
 
 SEED: Final = 20_280
 CAN: Final = "CAN IMU"
-NAMES: Final = {
-    "sensor_logger_android": "Sensor Logger, Android",
-    "sensor_logger_ios": "Sensor Logger, iOS",
-    "phyphox": "phyphox",
-}
+BY_PHONE: Final = "phone"
+APP: Final = "sensor_logger_android"
 KNOWN: Final = ((0.0, 0.5), (0.35, 0.45), (0.8, 0.8))  # share of the rated payload, of the wheelbase
 JUDGED: Final = ((0.2, 0.6), (0.5, 0.7), (0.7, 0.5))
 OnDrive = Callable[[int, int], None]
@@ -56,13 +54,13 @@ def phones(n_rounds: int, seed: int = SEED, on_drive: OnDrive = lambda done, of:
                     _drive(Path(folder), van, i, int(one.generate_state(1)[0]))
                     done += 1
                     on_drive(done, of)
-                for name in (CAN, *APPS):
+                for name in (CAN, BY_PHONE):
                     batches.setdefault(name, []).extend(_judged(Path(folder) / name, van))
     return {
         "seed": seed,
         "n_rounds": n_rounds,
         "n_vans": len(VANS),
-        "rows": [{"sensor": NAMES.get(name, name), **_figures(each)} for name, each in batches.items()],
+        "rows": [{"sensor": name, **_figures(each)} for name, each in batches.items()],
     }
 
 
@@ -77,11 +75,10 @@ def _drive(folder: Path, van: Vehicle, i: int, seed: int) -> None:
     (folder / CAN).mkdir(exist_ok=True)
     write_candump(Wiring("reference").frames_of(recorded), "can0", folder / CAN / f"{i}.log.gz")
     by_phone = simulate_drive(van, loads, road, drive, PHONE, seed).recording
-    for app in APPS:
-        (folder / app).mkdir(exist_ok=True)
-        export = folder / f"{app}_{i}.zip"
-        write_export(by_phone, export, app, Lying(), seed)
-        import_recording(export, folder / app / f"{i}.log.gz")
+    (folder / BY_PHONE).mkdir(exist_ok=True)
+    export = folder / f"{i}.zip"
+    write_export(by_phone, export, APP, Lying(), seed)
+    import_recording(export, folder / BY_PHONE / f"{i}.log.gz")
 
 
 def _loads(van: Vehicle, wanted: tuple[float, float]) -> tuple[Load, ...]:
@@ -175,9 +172,9 @@ def phones_page(found: Mapping[str, Any]) -> str:
             "and two known loads, then judged on three drives with other loads; 15 minutes a drive, town and country. "
             "Phone and CAN IMU lie at the same place on the floor of the same drives. The phone has a phone's noise, "
             "rate (100 Hz, a fix a second), clock and GPS gaps, lies turned by 130 degrees, and is in a hand for the "
-            "first and last 15 seconds; its recording goes through the app's format and `springscale import`. The "
-            "simulated floor is rigid: a phone on a carpet, or one that slides, will do worse. No real phone has been "
-            "tried yet.",
+            "first and last 15 seconds; its recording goes through Sensor Logger's format and `springscale import`, "
+            "which makes the same log of every app's. The simulated floor is rigid: a phone on a carpet, or one that "
+            "slides, will do worse. No real phone has been tried yet.",
             "",
             "| Sensor | Batches | Refused | Payload, mean abs. error (of the rated) | Half-width (95 %) | Held "
             "| Front share, mean abs. error | Half-width (95 %) | Held |",

@@ -44,6 +44,12 @@ def peak_mb(pid: int | str = "self") -> float:
     return int(status["VmHWM"].split()[0]) / 1024
 
 
+def cpu_of_s(pid: int) -> float:
+    """CPU time that another process has taken so far."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def in_own_process(module: str, *arguments: object) -> dict[str, Any]:
     """What ``python -m benchmarks.speed.MODULE`` prints, one thread each."""
     command = [sys.executable, "-m", f"benchmarks.speed.{module}", *map(str, arguments)]

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.speed.live import listening_socket
-from benchmarks.speed.meter import ONE_THREAD, peak_mb
+from benchmarks.speed.meter import ONE_THREAD, cpu_of_s, peak_mb
 from benchmarks.speed.start import REPOSITORY, SETTINGS
 from gateway.bus.live.socketcan import SocketCanReceiver
 from gateway.config import load_settings
@@ -79,11 +79,11 @@ def measure(seconds: float) -> dict[str, Any]:
         assert service.stdout is not None
         try:
             where = json.loads(service.stdout.readline())
-            begun_s, begun_cpu_s = time.monotonic(), _cpu_s(service.pid)
+            begun_s, begun_cpu_s = time.monotonic(), cpu_of_s(service.pid)
             sender = [*PROGRAM, "--send", str(where["port"]), "--seconds", str(seconds)]
             sent = subprocess.run(sender, check=True, stdout=subprocess.PIPE, text=True)
             time.sleep(1.0)
-            cpu_s, taken_s = _cpu_s(service.pid) - begun_cpu_s, time.monotonic() - begun_s
+            cpu_s, taken_s = cpu_of_s(service.pid) - begun_cpu_s, time.monotonic() - begun_s
             with urllib.request.urlopen(f"{where['url']}/api/v1/status") as answer:
                 bus = json.load(answer)["bus"]
             with urllib.request.urlopen(f"{where['url']}/api/v1/estimates/latest") as answer:
@@ -94,11 +94,6 @@ def measure(seconds: float) -> dict[str, Any]:
             service.wait(30.0)
     lost = int(sent.stdout) - bus["n_frames"]
     return {**found, "seconds": seconds, "frames": bus["n_frames"], "lost": lost, "payload_kg": latest["payload_kg"]}
-
-
-def _cpu_s(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def main() -> None:

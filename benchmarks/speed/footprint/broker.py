@@ -23,6 +23,7 @@ import paho.mqtt.client as mqtt
 import trustme
 from paho.mqtt.enums import CallbackAPIVersion
 
+from benchmarks.speed.meter import cpu_of_s
 from gateway.uplink.link import MqttLink
 from gateway.uplink.outbox import Letter
 from gateway.uplink.settings import UplinkSettings
@@ -113,8 +114,7 @@ class Broker:
 
     def cpu_s(self) -> float:
         """Processor time it has used, user and system (proc(5))."""
-        fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / float(os.sysconf("SC_CLK_TCK"))
+        return cpu_of_s(self._process.pid)
 
     def memory_bytes(self) -> int:
         """What it holds in memory now (proc(5), statm)."""
