@@ -230,6 +230,7 @@ def test_metrics_can_be_parsed_and_follow_the_status(gateway: Gateway, client: C
     assert samples["springscale_bus_dropped_frames_total", "kernel"] == 6
     assert samples["springscale_decoded_frames_total", "not_valid", "speed"] == 7
     assert samples["springscale_rejections_total", "gap"] == 2
+    assert samples["springscale_rejections_total", "too_slow"] == 0  # which a rate needs to see the first
     assert samples["springscale_state", "estimating"] == 1
     assert samples["springscale_state", "stale"] == 0
 

@@ -11,6 +11,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 
 from gateway.estimate import PLACES
 from gateway.quantities import FOUND, Outward
+from gateway.records import Why
 from gateway.status import State, Status
 from gateway.web.live.board import Board, Shown
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
@@ -162,7 +163,7 @@ TABLE: Final = (
         "springscale_rejections_total",
         "Batches by reason of rejection.",
         "reason",
-        lambda m: dict(m.now.batches.rejected_by_reason),
+        lambda m: dict.fromkeys(map(str, Why), 0) | m.now.batches.rejected_by_reason,  # rates see the first one too
     ),
     Row(
         "springscale_store_degraded",
