@@ -18,8 +18,14 @@ def cost() -> str:
         f"{told['cpu_pct']:.1f} % of one core and {told['rss_mb']:.0f} MB at {told['rate_hz']:.0f} samples a second, "
         f"{told['frames_per_s']:.0f} frames a second ({told['machine']}; `python -m benchmarks.speed.feed`). A "
         f"phone's recording of {told['import']['drive_s'] / 60:.0f} minutes is imported in "
-        f"{told['import']['seconds']:.1f} s with {told['import']['rss_mb']:.0f} MB.\n"
+        f"{told['import']['cpu_s']:.1f} s of one core with {told['import']['rss_mb']:.0f} MB.\n"
     )
+
+
+def told() -> str:
+    """What the feed printed when that was measured."""
+    found = json.loads((DOCS / "feed_cost.json").read_text(encoding="utf-8"))
+    return f"```json\n{json.dumps(found['told'], separators=(',', ':'))}\n```\n"
 
 
 def kuksa() -> str:

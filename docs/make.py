@@ -18,6 +18,7 @@ import errors_table
 import faults
 import feed_cost
 import fleet_counts
+import packed
 import performance
 import phone_import
 import reference
@@ -28,8 +29,10 @@ from made import ROOT, StaleError, filled, keep_up_to_date
 DOCS: Final = ROOT / "docs"
 PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     **{f"docs/{page}": parts for page, parts in reference.PARTS.items()},
-    "docs/feed.md": {"cost": feed_cost.cost},
+    "docs/contribute.md": {"packed": packed.printed},
+    "docs/feed.md": {"cost": feed_cost.cost, "told": feed_cost.told},
     "docs/fleet.md": {"fleet test": fleet_counts.counted},
+    "docs/hardware.md": {"noise": studies.noise_that_works},
     "docs/kuksa.md": {"cost": feed_cost.kuksa},
     "docs/phone.md": {"output": phone_import.printed, "accuracy": studies.phone_beside_can},
     "docs/traccar.md": {"cost": feed_cost.traccar},

@@ -22,6 +22,7 @@ from benchmarks.accuracy import delivery as on_delivery
 from benchmarks.accuracy import disturbances as on_disturbances
 from benchmarks.accuracy import false_facts as on_false_facts
 from benchmarks.accuracy import faults as on_faults
+from benchmarks.accuracy import grades as on_grades
 from benchmarks.accuracy import phones as on_phones
 from benchmarks.accuracy import sensitivity as on_sensitivity
 from benchmarks.accuracy import siblings as on_siblings
@@ -32,6 +33,7 @@ from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.delivery_page import delivery_page
 from benchmarks.accuracy.disturbances_page import disturbances_page
 from benchmarks.accuracy.faults_page import faults_page
+from benchmarks.accuracy.grades_page import grades_page
 from benchmarks.accuracy.pages import advice_page, learning_curve_page
 from benchmarks.accuracy.sensitivity import sensitivity_page
 from benchmarks.accuracy.siblings import siblings_page
@@ -50,9 +52,9 @@ Study = Callable[..., None]
 WORKERS: Final = "processes that drive"
 
 
-def _vans(seed: int) -> Callable[[Study], Study]:
+def _vans(seed: int, n_vans: int = Scope().n_vans) -> Callable[[Study], Study]:
     """Options of a study that drives fresh vans."""
-    vans = click.option("--vans", "n_vans", type=click.IntRange(min=2), default=Scope().n_vans, show_default=True)
+    vans = click.option("--vans", "n_vans", type=click.IntRange(min=2), default=n_vans, show_default=True)
     seeds = click.option("--seed", type=click.IntRange(min=0), default=seed, show_default=True)
     workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
     return lambda study: vans(seeds(workers(study)))
@@ -146,6 +148,16 @@ def disturbances(n_vans: int, seed: int, workers: int, output: Path | None) -> N
     with counted("calibrating, driving and disturbing vans") as on_van:
         found = on_disturbances.disturbances(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("disturbances", found, disturbances_page(found), output)
+
+
+@studies.command("sensor-grades")
+@_vans(on_grades.SEED, on_grades.N_VANS)
+@_output
+def sensor_grades(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
+    """What sensors of other noise, resolution and rate weigh on the same drives of the same vans; ~5 minutes a van."""
+    with counted("calibrating and driving vans with every sensor") as on_van:
+        found = on_grades.grades(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van)
+    _hand_out("sensor-grades", found, grades_page(found), output)
 
 
 @studies.command("faults")

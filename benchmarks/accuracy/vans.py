@@ -43,11 +43,16 @@ def van_of(seed: int, number: int) -> Vehicle:
     return draw_van(number, np.random.default_rng(van_seed))
 
 
-def fresh_van(scope: Scope, seed: int, number: int) -> FreshVan:
-    """The ``number``-th van of a study with this seed; it does not depend on the others."""
+def fresh_van(
+    scope: Scope, seed: int, number: int, sensors_of: Callable[[Sensors], Sensors] = lambda mounted: mounted
+) -> FreshVan:
+    """The ``number``-th van of a study with this seed; it does not depend on the others.
+
+    ``sensors_of`` replaces the reference unit where it is mounted: van, loads, roads and drives stay the same.
+    """
     van_seed, load_seed, known_seed, test_seed, sensor_seed = np.random.SeedSequence([seed, number]).spawn(5)
     van, rng = draw_van(number, np.random.default_rng(van_seed)), np.random.default_rng(load_seed)
-    sensors = draw_sensors(np.random.default_rng(sensor_seed))
+    sensors = sensors_of(draw_sensors(np.random.default_rng(sensor_seed)))
     loads = known_loads(van, scope.n_known_loads, rng)
     runs = [
         driven(van, carried, AS_CALIBRATED, scope, one, i, sensors)

@@ -13,12 +13,15 @@ import pytest
 from benchmarks.accuracy.coverage_drives import TRIPS
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.coverage_table import ALL_KINDS
+from benchmarks.accuracy.grades import GRADES
+from benchmarks.accuracy.grades_page import grades_page
 from benchmarks.accuracy.phones import CAN, phones_page
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "coverage": coverage_page,
     "phone_accuracy": phones_page,
+    "sensor-grades": grades_page,
 }
 
 
@@ -40,8 +43,15 @@ def test_coverage_pools_at_least_200_batches_of_every_kind_of_drive() -> None:
 
 def test_a_phone_errs_little_more_than_a_can_imu_and_its_intervals_hold() -> None:
     rows = {row["sensor"]: row for row in numbers("phone_accuracy")["rows"]}
-    assert len(rows) == 4
+    assert len(rows) == 2
     for row in rows.values():
         assert row["payload"]["mean_abs_pct_of_rated"] < 2.0 * rows[CAN]["payload"]["mean_abs_pct_of_rated"]
         assert min(row["payload"]["coverage95"], row["front_share"]["coverage95"]) >= 0.95
         assert row["n_rejected"] < 0.5 * row["n_batches"]
+
+
+def test_every_sensor_was_tried_on_every_van() -> None:
+    found = numbers("sensor-grades")
+    assert [one["name"] for one in found["grades"]] == [*GRADES]
+    lines = {line["kind"]: line for line in found["lines"] if line["kind"] in GRADES}
+    assert {line["n_vans"] for line in lines.values()} == {len(found["vans"])}

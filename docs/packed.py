@@ -1,0 +1,24 @@
+"""What `springscale campaign pack` prints (docs/contribute.md), for a campaign that is simulated."""
+
+import contextlib
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from click.testing import CliRunner
+
+from gateway.cli import springscale
+from gateway.offline.bundle import CONTRIBUTION, TEMPLATE
+from gateway.workbench.simulate import bench_of, write_campaign
+
+
+def printed() -> str:
+    """The output for ten runs of a minute with the page's own contribution.toml."""
+    with TemporaryDirectory() as folder, contextlib.chdir(folder):
+        write_campaign(bench_of("experiment", longest_s=60.0), Path.cwd())
+        Path(CONTRIBUTION).write_text(TEMPLATE, encoding="utf-8")
+        command = ["campaign", "pack", ".", "--output", "my-van.zip"]
+        result = CliRunner().invoke(springscale, command, catch_exceptions=False)
+    if result.exit_code:
+        sys.exit(result.output)
+    return f"```text\n{result.stdout}```\n"
