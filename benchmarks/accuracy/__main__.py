@@ -154,7 +154,7 @@ def disturbances(n_vans: int, seed: int, workers: int, output: Path | None) -> N
 @_vans(on_grades.SEED, on_grades.N_VANS)
 @_output
 def sensor_grades(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
-    """What sensors of other noise, resolution and rate weigh on the same drives of the same vans; ~5 minutes a van."""
+    """What sensors of other noise, resolution and rate weigh on the same drives of the same vans; ~6 minutes a van."""
     with counted("calibrating and driving vans with every sensor") as on_van:
         found = on_grades.grades(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van)
     _hand_out("sensor-grades", found, grades_page(found), output)

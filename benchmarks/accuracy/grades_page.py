@@ -18,6 +18,7 @@ SETS: Final = {  # those of which the noisiest that works is named, by the begin
     "accelerometer": ("accelerometer's noise", "accel_noise_mps2_per_rthz"),
     "gyro": ("gyro's noise", "gyro_noise_radps_per_rthz"),
 }
+OTHERS: Final = ("resolutions of CANmod.gps", "50 samples a second", "one fix a second")
 COLUMNS: Final = (
     "Sensor", "Accelerometer, m/s2/√Hz", "Gyro, rad/s/√Hz", "Batches", "Refused, and why",
     "Payload, mean abs. error %", "+- %", "95 % covers", "Share, mean abs. error %", "+- %", "95 % covers", "Verdict",
@@ -60,7 +61,7 @@ def grades_page(found: Mapping[str, Any]) -> str:
 
 def limits(found: Mapping[str, Any]) -> str:
     """The noisiest accelerometer and gyro that are as good as the reference unit, and that work; data sheets' units."""
-    return "".join(
+    noisiest = "".join(
         f"- {words}: accelerometer up to {_accel(_noisiest(found, verdicts, 'accelerometer'))}, gyro up to "
         f"{_gyro(_noisiest(found, verdicts, 'gyro'))}, each with the other as in the reference unit.\n"
         for words, verdicts in (
@@ -68,6 +69,8 @@ def limits(found: Mapping[str, Any]) -> str:
             (f"Works, with intervals up to {WORKS_WITHIN:g} times as wide", (AS_GOOD, WORKS)),
         )
     )
+    others = [f"{name} ({verdict_of(found, name)})" for name in OTHERS]
+    return f"{noisiest}- Else tried: {', '.join(others)}.\n"
 
 
 def verdict_of(found: Mapping[str, Any], name: str) -> str:

@@ -65,9 +65,10 @@ def test_the_noisiest_lies_before_the_first_that_is_worse() -> None:
     assert verdict_of(told, "accelerometer's noise x 10") == WORKS
     assert verdict_of(told, "accelerometer's noise x 20") == FAILS
     assert verdict_of(told, "gyro's noise x 10") == AS_GOOD
-    as_good, works = limits(told).splitlines()
+    as_good, works, others = limits(told).splitlines()
     assert "up to 0.0075 m/s2/√Hz (765 µg/√Hz), gyro up to 0.00017 rad/s/√Hz (0.01 °/s/√Hz)" in as_good
     assert "up to 0.015 m/s2/√Hz (1530 µg/√Hz), gyro up to 0.00035 rad/s/√Hz (0.02 °/s/√Hz)" in works
+    assert "50 samples a second (as good)" in others
     page = grades_page(told)
     assert "| accelerometer's noise x 10 | 0.015 | 0.00017 | 10 | 0 | 2.00 | 8.00 | 100 % |" in page
 
