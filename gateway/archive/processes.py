@@ -12,6 +12,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from typing import Any, Final, TypeVar
 
+from gateway.allocator import keep_freed_memory
 from gateway.errors import SpringscaleError
 
 Answer = TypeVar("Answer")
@@ -114,6 +115,7 @@ class _Worker:
 def _answer(pipe: "Connection[Any, Any]") -> None:
     """What a process does all its life. The driver alone hears Ctrl-C, and ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    keep_freed_memory()
     while True:
         try:
             fn, args, kwargs = pipe.recv()
