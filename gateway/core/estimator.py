@@ -27,8 +27,8 @@ class Estimator(Protocol):
         ...
 
 
-BROKEN_DOWN: Final = (ArithmeticError, ValueError, RuntimeError)
-"""What numpy.linalg (LinAlgError is a ValueError), math, scipy's nnls and interpolation raise on numbers."""
+BROKEN_DOWN: Final = (ArithmeticError, ValueError)
+"""What numpy.linalg (LinAlgError is a ValueError), math and scipy.linalg raise on numbers."""
 
 
 def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str) -> Estimate:

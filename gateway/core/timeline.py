@@ -3,9 +3,9 @@
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.ndimage import maximum_filter1d
 
+from gateway.core.spline import between, smooth_slopes
 from gateway.records import F64, I64, Bool
 from gateway.units import NS_PER_S
 
@@ -52,7 +52,7 @@ def onto_grid(t_ns: I64, x: F64, t_start_ns: int, n: int, rate_hz: float, gap_s:
     fine_s = np.arange((n - 1) * step + 1) / (rate_hz * step)
     fine = np.where(
         _covered(fine_s, t_s, max(gap_s, 2.5 / raw_rate_hz)),
-        CubicSpline(t_s, x)(np.clip(fine_s, t_s[0], t_s[-1])),
+        between(np.clip(fine_s, t_s[0], t_s[-1]), t_s, x, smooth_slopes(t_s, x)),
         np.nan,
     )
     return fine if step == 1 else _low_pass(fine, step, rate_hz)[::step]

@@ -17,7 +17,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.change import Rules
 from gateway.core.cross_spectrum import estimator as cross_spectrum
-from gateway.core.cross_spectrum import reach, search
+from gateway.core.cross_spectrum import search
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.likelihood import Curvature
 from gateway.core.estimator import estimate
@@ -160,10 +160,6 @@ def singular(*_: object) -> F64:
     raise np.linalg.LinAlgError("Singular matrix")
 
 
-def exhausted(*_: object) -> tuple[F64, float]:
-    raise RuntimeError("Maximum number of iterations reached.")
-
-
 def indefinite(matrix: F64) -> F64:
     """An inverse that rounding has turned over."""
     return -np.eye(len(matrix))
@@ -176,9 +172,8 @@ def indefinite(matrix: F64) -> F64:
         (np.linalg, "solve", singular),
         (np.linalg, "eigh", singular),
         (np.linalg, "inv", indefinite),
-        (reach, "nnls", exhausted),
     ],
-    ids=["inv", "solve", "eigh", "an indefinite inverse", "nnls"],
+    ids=["inv", "solve", "eigh", "an indefinite inverse"],
 )
 def test_a_routine_that_fails_refuses_the_batch(
     calibration: CrossSpectrumCalibration,

@@ -4,7 +4,17 @@ import json
 import subprocess
 import sys
 
-HEAVY = ("scipy.stats", "scipy.signal", "asammdf", "pandas", "matplotlib", "numba", "pyarrow")
+HEAVY = (
+    "scipy.stats",
+    "scipy.signal",
+    "scipy.optimize",
+    "scipy.interpolate",
+    "asammdf",
+    "pandas",
+    "matplotlib",
+    "numba",
+    "pyarrow",
+)
 
 
 def test_the_service_starts_without_what_it_does_not_need():

@@ -10,12 +10,10 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from scipy.optimize import nnls
 
 from gateway.core.vehicle import Load
 from gateway.records import F64
 
-_SUM_WEIGHT: Final = 1e3  # holds the weights of a mixture to a sum of one
 _TOUCHING: Final = 1e-3  # nearer than this is inside: a kilogram or two
 
 
@@ -28,10 +26,22 @@ def beyond(load: Load, seen: Sequence[Load], empty_mass_kg: float) -> float:
         return 0.0
     corners = np.array([_axle_loads(one, empty_mass_kg) for one in seen])
     wanted = _axle_loads(load, empty_mass_kg)
-    mixing = np.vstack([corners.T, np.full(len(corners), _SUM_WEIGHT)])
-    weights, _ = nnls(mixing, np.r_[wanted, _SUM_WEIGHT])
-    distance = float(np.linalg.norm(corners.T @ weights - wanted))
+    distance = 0.0 if _is_surrounded(corners - wanted) else _nearest(corners - wanted)
     return distance if distance > _TOUCHING else 0.0
+
+
+def _is_surrounded(corners: F64) -> bool:
+    """Whether corners (n, 2) stand round the origin: seen from it, no gap between them is as wide as half the view."""
+    seen_at = np.sort(np.arctan2(corners[:, 1], corners[:, 0]))
+    return bool(np.max(np.diff(seen_at, append=seen_at[0] + 2.0 * np.pi)) < np.pi)
+
+
+def _nearest(corners: F64) -> float:
+    """How near the lines between any two corners (n, 2), or the corners, come to the origin."""
+    start, along = corners[:, None], corners[None] - corners[:, None]
+    length2 = np.sum(along**2, axis=-1)
+    part = np.clip(-np.sum(start * along, axis=-1) / np.where(length2 > 0.0, length2, 1.0), 0.0, 1.0)
+    return float(np.min(np.linalg.norm(start + part[..., None] * along, axis=-1)))
 
 
 def _axle_loads(load: Load, empty_mass_kg: float) -> F64:

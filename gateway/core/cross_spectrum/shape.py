@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 from scipy.special import log_ndtr
 
 from gateway.core.cargo import ShapePrior
+from gateway.core.spline import between, monotone_slopes
 from gateway.posterior import NORMAL_TAILS
 from gateway.records import F64
 
@@ -97,13 +97,14 @@ def shaped(
     within = (prior.log_s >= nodes[0]) & (prior.log_s <= nodes[-1])
     log_s = prior.log_s[within]
     least = min(found.cost for found in founds)
-    against = [_against(found.cost - least, evidence) + found.improbable for found in founds]
-    cost = PchipInterpolator(nodes, against)(log_s)
-    path = PchipInterpolator(nodes, np.stack([found.x for found in founds]))
+    against = np.array([_against(found.cost - least, evidence) + found.improbable for found in founds])
+    cost = between(log_s, nodes, against, monotone_slopes(nodes, against))
+    answers = np.stack([found.x for found in founds])
+    slopes = monotone_slopes(nodes, answers)
     weight = prior.probability[within] * np.exp(-(cost - cost.min()))
     weight /= weight.sum()
     mean_log_s = float(weight @ log_s)
-    loads = path(log_s)[:, -2:]
+    loads = between(log_s, nodes, answers, slopes)[:, -2:]
     away = loads - weight @ loads
     payload_std = float(np.sqrt(weight @ away[:, 0] ** 2))
     load, column, tails = weight @ loads, np.zeros(2), NORMAL_TAILS
@@ -116,7 +117,8 @@ def shaped(
     narrowed = float(weight @ (log_s - mean_log_s) ** 2) / prior.variance
     goods_part = prior.habit * min(narrowed, 1.0)
     is_converged = founds[best].is_converged
-    return Shaped(mean_log_s, path(mean_log_s), load, column, tails, goods_part, likeliest, is_converged)
+    [x] = between(np.array([mean_log_s]), nodes, answers, slopes)
+    return Shaped(mean_log_s, x, load, column, tails, goods_part, likeliest, is_converged)
 
 
 def _profile(
