@@ -132,6 +132,12 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "signal map",
         ),
         Why.SENSOR_RATE_LOW: Explanation(Cause.SENSORS, "the sensor sends too seldom for `rate_hz`", "raise its rate"),
+        Why.SAMPLE_RATE: Explanation(
+            Cause.SENSORS,
+            "the sensors sample at another rate than in calibration, by more than a quarter: other vibration folds "
+            "into what they send",
+            "set the device to the rate that it was calibrated at, or calibrate again at this one",
+        ),
         Why.SENSOR_CHANGED: Explanation(
             Cause.SENSORS,
             "the sensor is not where, or not what, it was when it was calibrated: moved, turned, or with another gain",

@@ -82,6 +82,7 @@ class Why(StrEnum):
     PITCH_RATE_SATURATED = "pitch_rate_saturated"
     GRAVITY_MISSING = "gravity_missing"
     SENSOR_RATE_LOW = "sensor_rate_low"
+    SAMPLE_RATE = "sample_rate"
     TIME_STAMPS = "time_stamps"
     OUT_OF_RANGE = "out_of_range"
     NOT_ENOUGH_EXCITATION = "not_enough_excitation"
@@ -213,7 +214,7 @@ class Batch:
     ``gravity_mps2``); pitch_rate_radps keeps its bias (segments are detrended). roll_rate_radps (positive
     left side up) keeps its bias too; it is None where the signal map has none, and neither masks nor rejects.
     ``shares`` tells which part of the window each cause masked. ``rejected`` holds the reasons
-    that no estimator can mend.
+    that no estimator can mend. ``sensor_rate_hz`` is how often the slower of accelerometer and gyro sends.
     """
 
     t_start_ns: int
@@ -231,6 +232,7 @@ class Batch:
     rejected: tuple[Why, ...] = ()
     is_provisional: bool = False
     roll_rate_radps: F64 | None = None
+    sensor_rate_hz: float = math.nan
 
     @property
     def duration_s(self) -> float:

@@ -61,7 +61,7 @@ def of_one_van(scope: Scope, seed: int, number: int) -> list[JudgedBatch]:
         drives: dict[tuple[tuple[Load, ...], Sensors, bool], tuple[Motion, Vehicle, tuple[Load, ...]]] = {}
         for name, one in DISTURBANCES.items():
             carried = (Load(OVERLOAD * van.rated_payload_kg, place_m),) if one.is_overloaded else within
-            sensors = replace(mounted, mount=one.remount(mounted.mount))
+            sensors = one.sensors(mounted)
             key = (carried, sensors, one.is_sideways)
             if key not in drives:
                 taken = replace(trip, off_m=SIDEWAYS_M) if one.is_sideways else trip

@@ -1,7 +1,7 @@
 """What may go wrong with a calibrated vehicle's sensors and stamps: each disturbance by name.
 
 Some disturb the rows of a drive that was recorded well; the others are driven again with sensors that sit
-elsewhere, or with a load that calibration never saw the like of.
+elsewhere or are others, or with a load that calibration never saw the like of.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from gateway.records import F64, I64, Motion, Signal, Why
-from gateway.sim.sensors import Mount
+from gateway.sim.sensors import Sensors
 from gateway.units import NS_PER_S
 
 Rows = Callable[[Motion, np.random.Generator], Motion]
@@ -20,14 +20,14 @@ Rows = Callable[[Motion, np.random.Generator], Motion]
 
 @dataclass(frozen=True, slots=True)
 class Disturbance:
-    """One line of the table. ``rows`` disturbs what was decoded, a ``remount`` drives again.
+    """One line of the table. ``rows`` disturbs what was decoded, other ``sensors`` drive again.
 
     ``is_mended``: errors should stay within a quarter of the undisturbed; ``reasons`` are the right ones to refuse.
     """
 
     name: str
     rows: Rows = lambda motion, rng: motion
-    remount: Callable[[Mount], Mount] = lambda mount: mount
+    sensors: Callable[[Sensors], Sensors] = lambda sensors: sensors
     is_overloaded: bool = False
     is_sideways: bool = False
     has_roll_rate: bool = True
@@ -129,13 +129,24 @@ def missing(samples: F64) -> F64:
     return np.full_like(samples, np.nan)
 
 
-def _moved(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -> Callable[[Mount], Mount]:
-    return lambda mount: replace(
-        mount,
-        position_m=mount.position_m + back_m,
-        left_m=mount.left_m + left_m,
-        yaw_deg=mount.yaw_deg + yaw_deg,
-    )
+def _moved(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -> Callable[[Sensors], Sensors]:
+    def moved(sensors: Sensors) -> Sensors:
+        mount = sensors.mount
+        return replace(
+            sensors,
+            mount=replace(
+                mount,
+                position_m=mount.position_m + back_m,
+                left_m=mount.left_m + left_m,
+                yaw_deg=mount.yaw_deg + yaw_deg,
+            ),
+        )
+
+    return moved
+
+
+def _sampled_at(rate_hz: float) -> Callable[[Sensors], Sensors]:
+    return lambda sensors: replace(sensors, imu=replace(sensors.imu, rate_hz=rate_hz))
 
 
 _SENSOR_MOVED: Final = (Why.SENSOR_CHANGED, Why.MODEL_MISFIT)
@@ -159,9 +170,10 @@ DISTURBANCES: Final[Mapping[str, Disturbance]] = MappingProxyType(
             Disturbance("gyro late by 20 ms", lagging(0.020), is_mended=True),
             Disturbance("accelerometer's gain + 2 %", amplified(0.02), reasons=_SENSOR_MOVED),
             Disturbance("accelerometer's gain + 5 %", amplified(0.05), reasons=_SENSOR_MOVED),
-            Disturbance("sensor moved 0.2 m left", remount=_moved(left_m=0.2), reasons=_SENSOR_MOVED),
-            Disturbance("sensor moved 0.2 m back", remount=_moved(back_m=0.2), reasons=_SENSOR_MOVED),
-            Disturbance("sensor turned by 10 degrees", remount=_moved(yaw_deg=10.0), reasons=_SENSOR_MOVED),
+            Disturbance("sensor moved 0.2 m left", sensors=_moved(left_m=0.2), reasons=_SENSOR_MOVED),
+            Disturbance("sensor moved 0.2 m back", sensors=_moved(back_m=0.2), reasons=_SENSOR_MOVED),
+            Disturbance("sensor turned by 10 degrees", sensors=_moved(yaw_deg=10.0), reasons=_SENSOR_MOVED),
+            Disturbance("sampled at 50 Hz", sensors=_sampled_at(50.0), reasons=(Why.SAMPLE_RATE,)),
             Disturbance("no roll rate", has_roll_rate=False),
             Disturbance("load sideways", is_sideways=True),
             Disturbance("load sideways, no roll rate", is_sideways=True, has_roll_rate=False, reasons=_UNSEEN),

@@ -14,7 +14,7 @@ from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, LikeFi
 from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
 from gateway.calibration.inheritance import Seen
 from gateway.calibration.inspection import Inspection, Kind, Severity, SplitRun
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.line import Line
 from gateway.calibration.line_files import line_of_files, line_part
 from gateway.calibration.ratio_index import BandChoice, RatioIndexFit, StructureChoice, fit_ratio_index
@@ -141,6 +141,7 @@ def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], by_line: Seen | No
         ),
         speed_mps=_span([*(b.mean_speed_mps for b in counted), *(by_line.speed_seen_mps if by_line else ())]),
         roughness_mps2=_roughness_span(counted),
+        sensor_rate_hz=sensor_rate_seen_hz(runs),
     )
 
 

@@ -1,5 +1,7 @@
 """A drive whose load was weighed: what calibration learns from and evaluation is measured against."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gateway.core.vehicle import PAYLOAD_LEFT_NOTED_STD_M, PAYLOAD_LEFT_STD_M, Load
@@ -29,3 +31,10 @@ class KnownRun:
     def payload_left_std_m(self) -> float:
         """How sure the payload's place to the side is; where nobody noted it, it lies about the centre line."""
         return PAYLOAD_LEFT_STD_M if self.payload_left_m is None else PAYLOAD_LEFT_NOTED_STD_M
+
+
+def sensor_rate_seen_hz(runs: Sequence[KnownRun]) -> tuple[float, float] | None:
+    """The slowest and the fastest rate of the batches that count; None where no stamps tell."""
+    rates_hz = [batch.sensor_rate_hz for run in runs for batch in run.batches if not batch.rejected]
+    known = [one for one in rates_hz if math.isfinite(one)]
+    return (min(known), max(known)) if known else None

@@ -64,6 +64,7 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
         rejected=_reasons((acceleration, pitch_rate), window, n, usable, gravity, shares, settings),
         is_provisional=window.is_provisional,
         roll_rate_radps=_known(roll_rate, settings) if Signal.ROLL_RATE in rows.signals else None,
+        sensor_rate_hz=_slower_hz(acceleration, pitch_rate),
     )
 
 
@@ -106,6 +107,12 @@ def _sensed(rows: Motion, signal: Signal, window: Window, n: int, settings: Batc
     stuck = _spans_onto_grid(_constant_runs(t_ns, x, stuck_ns), window, n, settings.rate_hz)
     saturated = _spans_onto_grid(_saturated_spans(t_ns, x, trait), window, n, settings.rate_hz)
     return _Sensed(on_grid, (missing, untimed, stuck, saturated), sample_rate_hz(t_ns[is_believed]))
+
+
+def _slower_hz(*sensors: _Sensed) -> float:
+    """How often the slower one sends; NaN where any is silent."""
+    slower_hz = min(sensor.rate_hz for sensor in sensors)
+    return slower_hz if slower_hz > 0.0 else float("nan")
 
 
 def _causes(names: tuple[Why, ...], sensed: _Sensed) -> dict[Why, Bool]:

@@ -10,6 +10,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.core.weights import NOT_CALIBRATED, Unsprung
 
 RANGE_MARGIN = 0.25  # of the span seen in calibration, at either end
+RATE_MARGIN = 0.25  # of a sampling rate: devices of one setting differ by 1 %, settings by a factor of 2; chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,7 @@ class CalibratedVehicle:
     ratio_index: RatioIndexCalibration | None = None
     cross_spectrum: CrossSpectrumCalibration | None = None
     is_shape_known: bool = False
+    sensor_rate_seen_hz: tuple[float, float] | None = None
 
     @property
     def unsprung(self) -> Unsprung:
@@ -46,6 +48,16 @@ class CalibratedVehicle:
         ):
             return None
         return _shape_prior(self.vehicle, *known.known_shape)
+
+    def is_sampled_otherwise(self, sensor_rate_hz: float) -> bool:
+        """True where sensors send so much faster or slower than in calibration that other vibration folds into the
+        bands; NaN, and a calibration that does not say how often they sent, tell nothing.
+        """
+        if self.sensor_rate_seen_hz is None:
+            return False
+        slowest_hz, fastest_hz = self.sensor_rate_seen_hz
+        margin = 1.0 + RATE_MARGIN
+        return sensor_rate_hz * margin < slowest_hz or sensor_rate_hz > fastest_hz * margin
 
     def is_out_of_range(self, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]) -> bool:
         """True where a 95 % interval lies wholly outside what calibration saw, plus a quarter of its span.

@@ -41,6 +41,8 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
         blank = _blank(batch, calibrated, estimator)
         if calibrated is None or batch.rejected:
             return blank
+        if calibrated.is_sampled_otherwise(batch.sensor_rate_hz):
+            return replace(blank, rejected=(Why.SAMPLE_RATE,))
         weigh = ESTIMATORS[estimator]
         try:
             found = weigh(batch, calibrated, blank)

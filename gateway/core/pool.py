@@ -174,6 +174,7 @@ def spanned(parts: Sequence[Part], begin_ns: int, end_ns: int) -> Batch:
         longest_stop_s=max(cut.longest_stop_s for cut in cuts),
         is_provisional=last.is_provisional,
         roll_rate_radps=_roll_rate(cuts),
+        sensor_rate_hz=min(cut.sensor_rate_hz for cut in cuts),
     )
 
 

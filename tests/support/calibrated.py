@@ -67,6 +67,7 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
                 "payload_kg": [0.0, 400.0],
                 "front_share_pct": [46.0, 50.0],
                 "speed_mps": [14.0, 16.0],
+                "sensor_rate_hz": [100.0, 100.0],
                 "roughness_mps2": None,
             },
             "ratio_index": ratio_index_calibration(payload_kg, front_share_pct),

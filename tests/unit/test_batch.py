@@ -120,6 +120,14 @@ def test_a_slow_sensor_cannot_fill_the_grid() -> None:
     assert batch_of(drive(LENGTH_S, steady(15.0), rate_hz=25.0)).rejected == (Why.SENSOR_RATE_LOW,)
 
 
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0, 200.0])
+def test_a_batch_knows_how_often_its_sensors_send(rate_hz: float) -> None:
+    sampled = drive(LENGTH_S, steady(15.0), rate_hz=rate_hz)
+    assert batch_of(sampled).sensor_rate_hz == pytest.approx(rate_hz)
+    assert batch_of(changed(sampled, G, 0.0, 60.0, silent)).sensor_rate_hz == pytest.approx(rate_hz)
+    assert np.isnan(batch_of(changed(sampled, G, 0.0, LENGTH_S, silent)).sensor_rate_hz)
+
+
 def test_a_short_window_is_too_short_and_tells_what_ended_it() -> None:
     short = replace(WINDOW, t_end_ns=T0_NS + 50_000_000_000, ended_by=Why.CLOCK_STEP)
     assert build_batch(WHOLE, short, SETTINGS, TRAITS).rejected == (Why.TOO_SHORT, Why.CLOCK_STEP)

@@ -121,6 +121,14 @@ def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_o
     assert told == {1: [], 2: [], 3: [], 4: [], 5: [Kind.SPEED_DIFFERS], 6: [Kind.SMOOTH_ROAD]}
 
 
+def test_a_run_sampled_at_another_rate_calibrates_nothing(runs: list[KnownRun]) -> None:
+    at_100_hz = [replace(run, batches=tuple(replace(b, sensor_rate_hz=100.0) for b in run.batches)) for run in runs]
+    slower = replace(runs[0], number=5, batches=tuple(replace(b, sensor_rate_hz=50.0) for b in runs[0].batches))
+    verdicts, _ = inspect_campaign([inspected(run) for run in (*at_100_hz, slower)], VAN, SETTINGS)
+    assert [one.number for one in verdicts if not one.is_usable] == [5]
+    assert Kind.RATE_DIFFERS in [finding.kind for finding in verdicts[-1].findings]
+
+
 FAULT = finding_of(Kind.PITCH_RATE_SIGN, Severity.FAULT, "it is turned")
 WARNING = finding_of(Kind.SMOOTH_ROAD, Severity.WARNING, "it is smooth")
 

@@ -23,14 +23,14 @@ from gateway.toml_file import describe_faults
 
 Content = dict[str, Any]
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 9
+VERSION: Final = 10
 
 
 class CalibrationFile(Part):
     """The whole file but for its id."""
 
     format: Literal["springscale-calibration"] = FORMAT
-    version: Literal[9] = VERSION
+    version: Literal[10] = VERSION
     vehicle: Vehicle
     seen: SeenPart
     cross_spectrum: CrossSpectrumCalibration | None = None
@@ -76,6 +76,7 @@ class CalibrationFile(Part):
             front_share_seen_pct=self.seen.front_share_pct,
             ratio_index=self.ratio_index,
             cross_spectrum=self.cross_spectrum,
+            sensor_rate_seen_hz=self.seen.sensor_rate_hz,
         )
 
     def require_known(self) -> None:

@@ -19,6 +19,9 @@ class SeenPart(Part):
     payload_kg: tuple[float, float]
     front_share_pct: tuple[float, float]
     speed_mps: tuple[float, float]
+    sensor_rate_hz: tuple[float, float] | None = Field(
+        description="how often the slower of accelerometer and gyro sent; null: not known"
+    )
     roughness_mps2: tuple[float, float] | None = Field(
         description="of the roads: vertical acceleration, root mean square from 1 to 15 Hz, brought to 80 km/h"
     )

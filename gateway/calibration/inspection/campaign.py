@@ -13,6 +13,7 @@ from gateway.calibration.inspection.log import SplitRun, same_drive_findings
 from gateway.calibration.inspection.roll_sign import RollSign, roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
+from gateway.core.calibrated import RATE_MARGIN
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 
@@ -128,7 +129,7 @@ def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> Iterator[tupl
 
 
 def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Finding]]:
-    """Runs at another speed, or on a far smoother road, than the median run."""
+    """Runs at another speed, on a far smoother road, or sampled at another rate than the median run."""
     counted = [(one.identification.number, [b for b in one.batches if not b.rejected]) for one in drives]
     runs = [(number, batches) for number, batches in counted if batches]
     if len(runs) < 3:
@@ -137,8 +138,12 @@ def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Findin
     shaking_mps2 = [
         float(np.mean([np.std(b.vertical_acceleration_mps2[b.usable]) for b in batches])) for _, batches in runs
     ]
-    usual_mps, usual_mps2 = float(np.median(speeds_mps)), float(np.median(shaking_mps2))
-    for (number, _), speed_mps, shakes_mps2 in zip(runs, speeds_mps, shaking_mps2, strict=True):
+    rates_hz = [float(np.median([b.sensor_rate_hz for b in batches])) for _, batches in runs]
+    usual_mps, usual_mps2, usual_hz = (float(np.median(of_runs)) for of_runs in (speeds_mps, shaking_mps2, rates_hz))
+    for (number, _), speed_mps, shakes_mps2, rate_hz in zip(runs, speeds_mps, shaking_mps2, rates_hz, strict=True):
+        if abs(np.log(rate_hz / usual_hz)) > np.log1p(RATE_MARGIN):
+            text = f"the sensors send {rate_hz:.3g} times a second, in the median run {usual_hz:.3g} times"
+            yield number, finding_of(Kind.RATE_DIFFERS, Severity.FAULT, text)
         if abs(speed_mps / usual_mps - 1.0) > SPEED_DIFFERS_BY:
             text = f"{speed_mps:.1f} m/s in the mean, the median run {usual_mps:.1f} m/s"
             yield number, finding_of(Kind.SPEED_DIFFERS, Severity.NOTE, text)

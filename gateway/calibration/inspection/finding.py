@@ -18,6 +18,7 @@ class Kind(StrEnum):
     SIGNAL_UNMAPPED = "signal_unmapped"
     SENSOR_SILENT = "sensor_silent"
     RATE_LOW = "rate_low"
+    RATE_DIFFERS = "rate_differs"
     JITTER = "jitter"
     GAPS = "gaps"
     SENSOR_STUCK = "sensor_stuck"

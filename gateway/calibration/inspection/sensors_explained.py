@@ -26,6 +26,12 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             "a sensor sends too seldom",
             "raise its rate in the device: 100 Hz is good",
         ),
+        Kind.RATE_DIFFERS: Explained(
+            Topic.SENSORS,
+            (Severity.FAULT,),
+            "the sensors sample at another rate than in most runs, so that other vibration folds into what they send",
+            "drive all runs at one rate of the device, the one that it is to weigh at",
+        ),
         Kind.JITTER: Explained(
             Topic.SENSORS,
             (Severity.WARNING,),

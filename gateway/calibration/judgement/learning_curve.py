@@ -15,7 +15,7 @@ import numpy as np
 from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.inspection import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index import fit_ratio_index
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.calibrated import CalibratedVehicle
@@ -302,4 +302,5 @@ def calibrated_on(runs: Sequence[KnownRun], vehicle: Vehicle, estimator: str) ->
         front_share_seen_pct=(min(shares_pct), max(shares_pct)),
         ratio_index=fit_ratio_index(runs, vehicle).calibration if is_ratio_index else None,
         cross_spectrum=None if is_ratio_index else calibrate_cross_spectrum(runs, vehicle),
+        sensor_rate_seen_hz=sensor_rate_seen_hz(with_batches),
     )

@@ -21,7 +21,7 @@ from gateway.errors import KeptBatchError
 from gateway.records import F64, Batch, Motion, Signal, Why
 
 FORMAT: Final = "springscale-batch"
-VERSION: Final = 1
+VERSION: Final = 2
 MOST_SAMPLES: Final = 1_000_000  # an hour at 200 Hz has 720 000
 _FLOATS: Final = ("vertical_acceleration_mps2", "pitch_rate_radps", "speed_mps")
 _DIGEST_BYTES: Final = 32
@@ -68,6 +68,7 @@ def packed(kept: KeptBatch) -> bytes:
             "longest_stop_s": batch.longest_stop_s,
             "rejected": [str(why) for why in batch.rejected],
             "is_provisional": batch.is_provisional,
+            "sensor_rate_hz": _known(batch.sensor_rate_hz),
         },
         "facts": {
             "duration_s": kept.facts.duration_s,
@@ -113,7 +114,8 @@ def _unpacked(content: bytes) -> KeptBatch:
 
 def _batch(header: Mapping[str, Any], arrays: list[F64], usable: np.typing.NDArray[np.bool_]) -> Batch:
     told = dict(header["batch"])
-    told["gravity_mps2"] = _nan_if_none(told["gravity_mps2"])
+    for name in ("gravity_mps2", "sensor_rate_hz"):
+        told[name] = _nan_if_none(told[name])
     told["shares"] = {Why(why): share for why, share in told["shares"].items()}
     told["rejected"] = tuple(map(Why, told["rejected"]))
     told |= zip((*_FLOATS, "roll_rate_radps"), arrays, strict=False)

@@ -55,6 +55,7 @@ export const COMMON = {
   "reason.gravity_missing": ["gravity missing", "Erdbeschleunigung fehlt"],
   "reason.time_stamps": ["time stamps", "Zeitstempel"],
   "reason.sensor_rate_low": ["sensor rate low", "Sensor sendet zu selten"],
+  "reason.sample_rate": ["sample rate", "andere Abtastrate"],
   "reason.sensor_changed": ["sensor changed", "Sensor verändert"],
   "reason.sensor_disagreement": ["sensor disagreement", "Sensoren widersprechen sich"],
   "reason.wrong_sign": ["wrong sign", "falsches Vorzeichen"],

@@ -24,6 +24,7 @@ export const REASONS_DE = {
   gravity_missing: ["die mittlere Vertikalbeschleunigung ist weit von 9,81 m/s² entfernt", "falsche Achse, falsches Vorzeichen oder falsche Einheit im Signalplan, oder das Gerät zieht die Erdbeschleunigung ab"],
   time_stamps: ["die Zeitstempel sind zu ungleichmäßig, oder zu viele Botschaften fehlen", "im Kernel stempeln (socketcan), den Rechner entlasten oder `counter` der Botschaft im Signalplan nennen"],
   sensor_rate_low: ["der Sensor sendet für `rate_hz` zu selten", "seine Rate erhöhen"],
+  sample_rate: ["die Sensoren tasten um mehr als ein Viertel schneller oder langsamer ab als bei der Kalibrierung: andere Schwingungen falten sich in ihre Werte", "das Gerät auf die kalibrierte Rate einstellen oder mit dieser neu kalibrieren"],
   sensor_changed: ["der Sensor ist nicht mehr, wo oder was er bei der Kalibrierung war: versetzt, gedreht oder mit anderer Verstärkung", "wie zuvor montieren oder neu kalibrieren"],
   sensor_disagreement: ["Beschleunigung und Nickrate bewegen sich nicht wie ein Körper", "prüfen, ob beide vom selben starren Ort und Zeitgeber kommen"],
   wrong_sign: ["die Nickrate passt nur umgekehrt zum Fahrzeug", "`sign` von `pitch_rate` im Signalplan umkehren (positiv: Nase nach unten)"],
