@@ -229,6 +229,10 @@ DIAGNOSTICS: Final = {
     "tension": "how far the vehicle lies off its calibration: chi-squared of five; refused above 25.7",
     "sensor_position_score": "pull to another place or gain of the sensor, in standard deviations; refused beyond 6",
     "sensor_noise_score": "pull towards more noise in the acceleration, as roll makes it, likewise; refused above 6",
+    "noise_acceleration_ratio": "how loud the accelerometer is from 16.5 to 20 Hz over what is expected at most: from "
+    "2 on its noise is reckoned with",
+    "noise_pitch_rate_ratio": "likewise of the pitch rate",
+    "noise_roll_rate_ratio": "likewise of the roll rate",
     "payload_gyration_m2": "squared radius of gyration in pitch of the load, as the fit began with it",
     "payload_mode_hz": "frequency at which the payload rings on its floor",
     "payload_damping_ratio": "how much its floor or mount damps that, of critical",

@@ -143,6 +143,11 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "the sensor is not where, or not what, it was when it was calibrated: moved, turned, or with another gain",
             "mount it as it was, or calibrate again",
         ),
+        Why.SENSOR_NOISY: Explanation(
+            Cause.SENSORS,
+            "a sensor is more than twice as loud as in calibration, and its noise leaves no load that can be told",
+            "look for a loose mount, a bad supply or a changed filter or range in the device; or replace it",
+        ),
         Why.LOAD_CHANGED: Explanation(
             Cause.DRIVE,
             "the load changed at a stop, and too little was driven with the load before it to weigh that (a minute)",

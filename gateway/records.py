@@ -92,6 +92,7 @@ class Why(StrEnum):
     NO_SOLUTION = "no_solution"
     SENSOR_DISAGREEMENT = "sensor_disagreement"
     SENSOR_CHANGED = "sensor_changed"
+    SENSOR_NOISY = "sensor_noisy"
     WRONG_SIGN = "wrong_sign"
     LOAD_CHANGED = "load_changed"
 

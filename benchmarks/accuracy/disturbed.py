@@ -145,6 +145,15 @@ def _moved(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -> Ca
     return moved
 
 
+def _noisy(times: float) -> Callable[[Sensors], Sensors]:
+    def noisy(sensors: Sensors) -> Sensors:
+        imu = sensors.imu
+        accel, gyro = (replace(one, noise_density=times * one.noise_density) for one in (imu.accel, imu.gyro))
+        return replace(sensors, imu=replace(imu, accel=accel, gyro=gyro))
+
+    return noisy
+
+
 def _sampled_at(rate_hz: float) -> Callable[[Sensors], Sensors]:
     return lambda sensors: replace(sensors, imu=replace(sensors.imu, rate_hz=rate_hz))
 
@@ -173,6 +182,7 @@ DISTURBANCES: Final[Mapping[str, Disturbance]] = MappingProxyType(
             Disturbance("sensor moved 0.2 m left", sensors=_moved(left_m=0.2), reasons=_SENSOR_MOVED),
             Disturbance("sensor moved 0.2 m back", sensors=_moved(back_m=0.2), reasons=_SENSOR_MOVED),
             Disturbance("sensor turned by 10 degrees", sensors=_moved(yaw_deg=10.0), reasons=_SENSOR_MOVED),
+            Disturbance("sensor noise x 5", sensors=_noisy(5.0), reasons=(Why.SENSOR_NOISY,)),
             Disturbance("sampled at 50 Hz", sensors=_sampled_at(50.0), reasons=(Why.SAMPLE_RATE,)),
             Disturbance("no roll rate", has_roll_rate=False),
             Disturbance("load sideways", is_sideways=True),

@@ -175,7 +175,7 @@ class Gateway:
                 "pipeline",
                 self.pipeline.start,
                 self.pipeline.stop,
-                lambda: self.pipeline.roll_rate_fault,
+                lambda: self.pipeline.sensor_fault,
                 lambda: _died(self.pipeline.failure) or _ended(self.pipeline),
                 is_vital=True,
             ),

@@ -12,6 +12,7 @@ from typing import Final
 
 from gateway.bus.live import Inbox
 from gateway.bus.signals import Decoder
+from gateway.core.cross_spectrum.floor import NOISY_RATIO, SENSOR_OF
 from gateway.core.flow import Flow
 from gateway.core.fusion import WeighedLoad
 from gateway.estimate import Estimate
@@ -27,6 +28,10 @@ ROLL_RATE_KNOWN_SHARE: Final = 0.9  # of a batch's usable samples; with fewer th
 ROLL_RATE_LOST: Final = (
     "the roll rate is known in only {:.0%} of the last batch (silent, stuck, at the end of its range or too slow): "
     "check the sensor and the signal map; payload and front share go on"
+)
+NOISY: Final = (
+    "{} {:.1f} times as loud as expected in the last batch: look for a loose mount, a bad supply or a changed filter "
+    "or range in the device; what can be weighed goes on"
 )
 LATE_S: Final = 1.0  # a frame may be so much later here than its stamp
 STOP_WITHIN_S: Final = 6.0  # a full inbox holds several windows
@@ -53,6 +58,7 @@ class Pipeline:
         self.n_estimates = self.n_rejected = self.n_provisional = self.n_remainders = 0
         self.rejected_by_reason: Counter[str] = Counter()
         self.roll_rate_fault: str | None = None  # of the last batch, as people read it
+        self.noise_fault: str | None = None  # likewise
         self.failure: BaseException | None = None
         self.n_frames = 0  # frames whose estimates, if any, are handed over
         self.progress = 0  # grows with every turn of the loop: what the watchdog follows
@@ -142,10 +148,17 @@ class Pipeline:
                     self._store.write_estimate(estimate_to_json(found))
             self._on_batch(found)
 
+    @property
+    def sensor_fault(self) -> str | None:
+        """What of the sensors is at fault though they weigh on, as people read it."""
+        return "; ".join(fault for fault in (self.roll_rate_fault, self.noise_fault) if fault) or None
+
     def _count(self, found: Estimate) -> None:
         if math.isfinite(found.roll_usable_share) and not found.is_remainder:
             is_lost = found.roll_usable_share < ROLL_RATE_KNOWN_SHARE
             self.roll_rate_fault = ROLL_RATE_LOST.format(found.roll_usable_share) if is_lost else None
+        if not SENSOR_OF.keys().isdisjoint(found.diagnostics):
+            self.noise_fault = noise_fault(found)
         if found.is_provisional:
             self.n_provisional += 1
         elif found.is_remainder:
@@ -155,6 +168,12 @@ class Pipeline:
         else:
             self.n_rejected += 1
             self.rejected_by_reason.update(map(str, found.rejected))
+
+
+def noise_fault(found: Estimate) -> str | None:
+    """Which sensor has become noisy and by how much, as people read it; None where none has."""
+    ratio, name = max((found.diagnostics.get(key, 0.0), name) for key, name in SENSOR_OF.items())
+    return NOISY.format(name, ratio) if ratio > NOISY_RATIO else None
 
 
 def _name_this_thread(name: str) -> None:

@@ -78,7 +78,8 @@ def test_every_figure_of_the_default_estimator_is_explained() -> None:
     shipped = load_calibration(ROOT / "gateway" / "demo" / "paper_van.json").for_core().cross_spectrum
     assert shipped is not None
     found = weighed(batch_over_road(225.0, 50.0, seed=1), shipped)
-    assert list(found.diagnostics) == list(reference.DIAGNOSTICS)
+    told = [name for name in reference.DIAGNOSTICS if name != "noise_roll_rate_ratio"]  # this batch has none
+    assert list(found.diagnostics) == told
 
 
 def test_the_example_of_an_archive_s_manifest_is_one() -> None:

@@ -29,13 +29,16 @@ def spectra() -> CrossSpectra:
     return spectra_of(READING)
 
 
-@pytest.mark.parametrize("usually", [0.5, 1.0, 3.0])
-def test_the_gradient_is_the_slope_of_the_cost(usually: float, spectra: CrossSpectra) -> None:
-    """Wherever the vehicle moves more or less than it usually does, too."""
+@pytest.mark.parametrize(("usually", "is_noisy"), [(0.5, False), (1.0, False), (3.0, False), (1.0, True)])
+def test_the_gradient_is_the_slope_of_the_cost(usually: float, is_noisy: bool, spectra: CrossSpectra) -> None:
+    """Wherever the vehicle moves more or less than it usually does, and where sensors have become noisy, too."""
     own = spectra.reading.usual_log_amplitude
     assert own is not None
     usual_log_amplitude = own + np.log(usually)
-    whittle = Whittle(spectra_of(replace(READING, usual_log_amplitude=usual_log_amplitude)), GROUND)
+    read = spectra_of(replace(READING, usual_log_amplitude=usual_log_amplitude))
+    if is_noisy:
+        read = replace(read, noise=np.outer([1e-4, 1e-6], np.linspace(1.0, 3.0, read.acceleration.shape[1])))
+    whittle = Whittle(read, GROUND)
     prior = prior_of(VAN)
     free = list(range(len(PARAMETERS)))
     point = Point(prior.mean, 150.0, 0.49)

@@ -24,6 +24,7 @@ from gateway.calibration.half_car.prior import Inherited, Prior, can_roll, prior
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import moves_of, weigh
+from gateway.core.cross_spectrum.floor import usual_floor
 from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.located import raw_moves
@@ -226,4 +227,5 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         least_slack=known[0].whittle.ground.least_slack,
         usual_stroke_mps=reading.usual_stroke_mps,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),
+        floor=usual_floor(b for run in runs for b in run.batches if not b.rejected),
     )

@@ -34,7 +34,9 @@ class CrossSpectrumCalibration:
     usual_log_amplitude: see model.reading. gravity_mps2 is what the accelerometer read on average; None where the file
     does not say. The two scores are the largest that are believed of a sensor that nobody touched (sensor_change). As
     stated, the sensor sits sensor_left_m left of the centre line. least_slack: see parameters.Ground.
-    usual_stroke_mps: see model.reading; None too where no roll rate was read.
+    usual_stroke_mps: see model.reading; None too where no roll rate was read. floor is how loud each sensor was in
+    the quietest and in the loudest batch, above what is weighed (cross_spectrum.floor), in the square of its unit per
+    hertz; None: not known.
     """
 
     __pydantic_config__ = STRICT
@@ -67,6 +69,7 @@ class CrossSpectrumCalibration:
     sensor_left_std_m: float = field(default=UNKNOWN_OFFSET_STD_M, metadata=_POSITIVE)
     least_slack: float = field(default=LEAST_SLACK, metadata=_POSITIVE)
     usual_stroke_mps: tuple[Positive, Positive] | None = None
+    floor: tuple[tuple[Positive, Positive], ...] | None = None
 
     @property
     def ground(self) -> Ground:

@@ -18,6 +18,7 @@ import numpy as np
 from gateway.core.cargo import ShapePrior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import MOST_TENSION
+from gateway.core.cross_spectrum.floor import SENSOR_OF, as_read, expected_floor, floor_of, noise_over
 from gateway.core.cross_spectrum.lateral.told import with_place
 from gateway.core.cross_spectrum.located import Located, locate
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
@@ -37,6 +38,15 @@ UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over w
 UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
 MOST_LAG_CHANGE_S: Final = 0.002  # beyond it, roll is taken out again, at the lag that was found
 MOST_LAGS: Final = 4  # tried; a lag that still moves has no fixed point
+_BY_NOISE: Final = (
+    Why.SENSOR_DISAGREEMENT,
+    Why.WRONG_SIGN,
+    Why.MODEL_MISFIT,
+    Why.TOO_UNCERTAIN,
+    Why.AMBIGUOUS,
+    Why.NO_SOLUTION,
+)
+"""What a sensor that has become noisy looks like."""
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
 
 
@@ -45,7 +55,8 @@ class Weighed:
     """What a batch's spectra show: the most probable load, how far it lies beyond the known ones (reach), how much more
     the model errs away from the calibration's speeds and roads (unseen, 1 or more), and all of it as a posterior.
 
-    is_settled: the lag at which roll was taken out is the lag that was found, by searches that converged.
+    is_settled: the lag at which roll was taken out is the lag that was found, by searches that converged. loudness (p,)
+    is how loud each sensor is over what is expected at most, in amplitude; is_noisy: so loud that it was reckoned with.
     """
 
     spectra: CrossSpectra
@@ -54,6 +65,8 @@ class Weighed:
     unseen: float
     posterior: Posterior
     is_settled: bool
+    loudness: F64
+    is_noisy: bool
 
 
 def by_cross_spectrum(
@@ -79,8 +92,14 @@ def weigh(batch: Batch, calibration: CrossSpectrumCalibration, prior: ShapePrior
     """The most probable load of a batch, however badly it fits, or why nothing could be held against the model."""
     spectra = cross_spectra_of([batch], calibration.reading)
     why = _unfit(batch, spectra, calibration) or _off_its_speeds(batch, calibration) or _unlike(batch, calibration)
-    if spectra is None or why is not None:
+    if spectra is None:
         return why or Why.TOO_SHORT
+    floor, expected = floor_of(batch), _expected_floor(spectra, calibration)
+    noise = noise_over(floor, expected)
+    is_noisy = bool(noise.any())
+    if why is not None:
+        return Why.SENSOR_NOISY if is_noisy and why in _BY_NOISE else why
+    spectra = _with_noise(spectra, noise)
     unseen = _unseen(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
     taken_out_s = float(calibration.parameters[INDEX["gyro_lag_s"]])
     for _ in range(MOST_LAGS):
@@ -89,12 +108,36 @@ def weigh(batch: Batch, calibration: CrossSpectrumCalibration, prior: ShapePrior
         is_settled = located.sideways is None or abs(lag_s - taken_out_s) <= MOST_LAG_CHANGE_S
         if is_settled:
             break
-        spectra = cross_spectra_of([batch], calibration.reading.with_gyro_late_by(lag_s)) or spectra
+        again = cross_spectra_of([batch], calibration.reading.with_gyro_late_by(lag_s))
+        spectra = spectra if again is None else _with_noise(again, noise)
         taken_out_s = lag_s
     reach = beyond(located.point.load, calibration.known_loads, calibration.empty_mass_kg)
     gain = gain_of(batch.gravity_mps2, calibration.gravity_mps2)
     posterior = posterior_of(located, calibration, unseen, reach, gain)
-    return Weighed(spectra, located, reach, unseen, posterior, is_settled and located.is_converged)
+    return Weighed(
+        spectra,
+        located,
+        reach,
+        unseen,
+        posterior,
+        is_settled=is_settled and located.is_converged,
+        loudness=np.sqrt(floor[: len(expected)] / expected[: len(floor)]),
+        is_noisy=is_noisy,
+    )
+
+
+def _with_noise(spectra: CrossSpectra, noise: F64) -> CrossSpectra:
+    """With what the sensors add by themselves (p,) more than in calibration."""
+    if not noise.any():
+        return spectra
+    with_roll = spectra.roll is not None
+    return replace(spectra, noise=as_read(noise, spectra.reading, spectra.freq_hz[1:-1], with_roll=with_roll))
+
+
+def _expected_floor(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> F64:
+    """(p,) how loud sensors may be at most where the vehicle moves so much; empty where calibration does not say."""
+    times = (spectra.acceleration_rms_mps2 / calibration.acceleration_rms_mps2) ** 2
+    return np.empty(0) if calibration.floor is None else expected_floor(calibration.floor, times)
 
 
 def _unfit(batch: Batch, spectra: CrossSpectra | None, calibration: CrossSpectrumCalibration) -> Why | None:
@@ -201,6 +244,7 @@ def _diagnostics(found: Weighed, calibration: CrossSpectrumCalibration) -> dict[
         "tension": located.tension,
         "sensor_position_score": located.scores.position,
         "sensor_noise_score": located.scores.noise,
+        **dict(zip(SENSOR_OF, found.loudness.tolist(), strict=False)),
         "payload_gyration_m2": math.exp(theta[INDEX["payload_gyration_m2"]]),
         "payload_mode_hz": math.exp(theta[INDEX["payload_mode_hz"]]),
         "payload_damping_ratio": math.exp(theta[INDEX["payload_damping_ratio"]]),
@@ -210,10 +254,13 @@ def _diagnostics(found: Weighed, calibration: CrossSpectrumCalibration) -> dict[
 
 
 def disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why | None:
-    """Why an answer is not believed.
+    """Why an answer is not believed; where a sensor has become so noisy that it may be the cause, that is why."""
+    why = _disbelieved(found, calibration)
+    return Why.SENSOR_NOISY if found.is_noisy and why in _BY_NOISE else why
 
-    Beyond the known loads the half-car itself errs: what looks like another sensor there is no proof of one.
-    """
+
+def _disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why | None:
+    """Beyond the known loads the half-car itself errs: what looks like another sensor there is no proof of one."""
     located = found.located
     if located.is_reversed:
         return Why.WRONG_SIGN

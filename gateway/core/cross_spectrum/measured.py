@@ -48,7 +48,8 @@ class CrossSpectra:
     multiplied by, log_amplitude (b, 1) how much they moved over the usual. The two root mean squares are of
     the segments before division, in m/s2 and rad/s within the band; reading is how they were taken, the usual
     amplitude filled in. roll is None where no roll rate was read. log_strokes (b, 2) is how much faster than usual the
-    springs of front and rear axle move (model.strokes); None where nobody worked it out.
+    springs of front and rear axle move (model.strokes); None where nobody worked it out. noise (p, m) is the power
+    density that the sensors add by themselves beyond what calibration found (cross_spectrum.floor); None: nothing.
     """
 
     freq_hz: F64
@@ -65,6 +66,7 @@ class CrossSpectra:
     reading: Reading
     roll: RollSpectra | None = None
     log_strokes: F64 | None = None
+    noise: F64 | None = None
 
     @property
     def log_movement(self) -> F64:
@@ -89,14 +91,15 @@ class CrossSpectra:
     @property
     def without_roll(self) -> "CrossSpectra":
         """Acceleration and pitch rate alone."""
-        return replace(self, roll=None)
+        return replace(self, roll=None, noise=None if self.noise is None else self.noise[:2])
 
     def within(self, band_hz: tuple[float, float]) -> "CrossSpectra":
         """The same at fewer frequencies; the guard frequencies lie outside the band."""
         kept = np.flatnonzero((self.freq_hz[1:-1] >= band_hz[0]) & (self.freq_hz[1:-1] <= band_hz[1]))
         inner, guarded = slice(kept[0], kept[-1] + 1), slice(kept[0], kept[-1] + 3)
         matrix = SpectralMatrix(self.matrix.auto[..., inner], self.matrix.cross[..., inner])
-        fewer = replace(self, freq_hz=self.freq_hz[guarded], delay_phase=self.delay_phase[:, guarded])
+        noise = None if self.noise is None else self.noise[:, inner]
+        fewer = replace(self, freq_hz=self.freq_hz[guarded], delay_phase=self.delay_phase[:, guarded], noise=noise)
         return fewer.showing(matrix)
 
     def showing(self, matrix: SpectralMatrix) -> "CrossSpectra":

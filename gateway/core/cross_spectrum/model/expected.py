@@ -85,12 +85,22 @@ def _mixed(x: _Spectra) -> _Spectra:
 
 
 def noise(model: SpectralModel, matrix: SpectralMatrix, spectra: CrossSpectra) -> F64:
-    """Sensor noise (p, ..., b, 1) beside ``matrix``: segments were divided by their power, and so their noise.
+    """Sensor noise (p, ..., b, 1) beside ``matrix``, or (p, ..., b, m) where the spectra hold more than the model's."""
+    density = model.noise[..., None, :]
+    if spectra.noise is not None:
+        p, m = spectra.noise.shape
+        density = density + spectra.noise.reshape(p, *(1,) * (density.ndim - 2), m)
+    found: F64 = density * noise_scale(matrix, spectra)
+    return found
+
+
+def noise_scale(matrix: SpectralMatrix, spectra: CrossSpectra) -> F64:
+    """(..., b, 1) what a noise density becomes beside ``matrix``: segments were divided by their power, and so their
+    noise.
 
     That power is the mean of acceleration's and of pitch rate's: what these would have been divided by, had they been
     ``matrix``.
     """
     size = np.sqrt(matrix.auto[0].mean(axis=-1, keepdims=True) * matrix.auto[1].mean(axis=-1, keepdims=True))
     per_density: F64 = spectra.inverse_power * size
-    found: F64 = model.noise[..., None, :] * per_density
-    return found
+    return per_density

@@ -16,7 +16,7 @@ from gateway.core.cross_spectrum.model.driven import (
     numbers_of,
     spectral_model,
 )
-from gateway.core.cross_spectrum.model.expected import noise, power, tapered, tapered_parts, without_noise
+from gateway.core.cross_spectrum.model.expected import noise, noise_scale, power, tapered, tapered_parts, without_noise
 from gateway.core.cross_spectrum.model.friction import level_weights
 from gateway.core.cross_spectrum.model.matrix import PAIRS, SpectralMatrix
 from gateway.core.cross_spectrum.model.motion import Motion
@@ -197,10 +197,10 @@ def _add_noise(
     slopes: F64, matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra, free: Sequence[int]
 ) -> None:
     """That of ``matrix`` (expected.noise) grows with the power of acceleration and of pitch rate."""
-    sensed = noise(model, matrix, spectra)
+    sensed, scale = noise(model, matrix, spectra), noise_scale(matrix, spectra)
     grown = 0.5 * sum(slopes[:, :, i].mean(axis=1) / matrix.auto[i].mean(axis=-1)[:, None] for i in (0, 1))
     for sensor, one in enumerate(sensed):
-        slopes[:, :, sensor] += (one * grown)[:, None]
+        slopes[:, :, sensor] += one[:, :, None] * grown[:, None]
         for row, entry in enumerate(free):
             if entry == INDEX[NOISES[sensor]]:
-                slopes[:, :, sensor, row] += one
+                slopes[:, :, sensor, row] += model.noise[sensor] * scale

@@ -57,6 +57,7 @@ export const COMMON = {
   "reason.sensor_rate_low": ["sensor rate low", "Sensor sendet zu selten"],
   "reason.sample_rate": ["sample rate", "andere Abtastrate"],
   "reason.sensor_changed": ["sensor changed", "Sensor verändert"],
+  "reason.sensor_noisy": ["sensor noisy", "Sensor rauscht"],
   "reason.sensor_disagreement": ["sensor disagreement", "Sensoren widersprechen sich"],
   "reason.wrong_sign": ["wrong sign", "falsches Vorzeichen"],
   "reason.out_of_range": ["out of range", "außerhalb des Bereichs"],

@@ -26,6 +26,7 @@ export const REASONS_DE = {
   sensor_rate_low: ["der Sensor sendet für `rate_hz` zu selten", "seine Rate erhöhen"],
   sample_rate: ["die Sensoren tasten um mehr als ein Viertel schneller oder langsamer ab als bei der Kalibrierung: andere Schwingungen falten sich in ihre Werte", "das Gerät auf die kalibrierte Rate einstellen oder mit dieser neu kalibrieren"],
   sensor_changed: ["der Sensor ist nicht mehr, wo oder was er bei der Kalibrierung war: versetzt, gedreht oder mit anderer Verstärkung", "wie zuvor montieren oder neu kalibrieren"],
+  sensor_noisy: ["ein Sensor rauscht mehr als doppelt so stark wie bei der Kalibrierung, und sein Rauschen lässt keine Ladung erkennen", "nach lockerer Befestigung, schlechter Versorgung oder geändertem Filter oder Messbereich suchen; oder ihn ersetzen"],
   sensor_disagreement: ["Beschleunigung und Nickrate bewegen sich nicht wie ein Körper", "prüfen, ob beide vom selben starren Ort und Zeitgeber kommen"],
   wrong_sign: ["die Nickrate passt nur umgekehrt zum Fahrzeug", "`sign` von `pitch_rate` im Signalplan umkehren (positiv: Nase nach unten)"],
   out_of_range: ["das 95-%-Intervall liegt ganz außerhalb der kalibrierten Ladungen oder Anteile", "mit solchen Ladungen kalibrieren oder Fahrzeug und Sensor prüfen"],
