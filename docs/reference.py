@@ -56,6 +56,7 @@ MEANINGS: Final = {
     Signal.DOOR: "of the journey; above 0 while any door of the load room is open",
     Signal.AIR_SPRING_PRESSURE: "of the vehicle's own load sensors; shown beside, see below",
     Signal.RIDE_HEIGHT: "likewise; its zero is the sensor's own",
+    Signal.TRAILER: "above 0 while a trailer is drawn, at least once a window; nothing is weighed then",
 }
 SI_UNITS: Final = {
     "acceleration": "m/s²", "angular_rate": "rad/s", "speed": "m/s", "angle": "°",

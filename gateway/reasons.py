@@ -80,6 +80,12 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "time stamps stepped back by more than `clock_step_s`",
             "let the clock be set before the service starts",
         ),
+        Why.TRAILER: Explanation(
+            Cause.DRIVE,
+            "a trailer was drawn for too much of the window (the signal `trailer`): it pushes and pulls at the "
+            "vehicle, and its drawbar is no load in it",
+            "nothing; without the trailer the vehicle is weighed again",
+        ),
         Why.TOO_SLOW: Explanation(
             Cause.DRIVE,
             "too much of the window below `speed_min_mps`: town, queue, yard",

@@ -48,6 +48,7 @@ class Signal(StrEnum):
     DOOR = "door"
     AIR_SPRING_PRESSURE = "air_spring_pressure"
     RIDE_HEIGHT = "ride_height"
+    TRAILER = "trailer"
 
 
 JOURNEY: Final = frozenset({Signal.IGNITION, Signal.LATITUDE, Signal.LONGITUDE, Signal.ODOMETER, Signal.DOOR})
@@ -56,8 +57,8 @@ JOURNEY: Final = frozenset({Signal.IGNITION, Signal.LATITUDE, Signal.LONGITUDE, 
 STATIC: Final = frozenset({Signal.AXLE_WEIGHT, Signal.AIR_SPRING_PRESSURE, Signal.RIDE_HEIGHT})
 """What sensors of the vehicle's own say of its load, standing too: shown beside what we weigh, and never part of it."""
 
-ASIDE: Final = JOURNEY | STATIC
-"""Signals on which no batch hangs."""
+ASIDE: Final = JOURNEY | STATIC | {Signal.TRAILER}
+"""Signals on which neither a drive nor a window hangs: they are sent while the vehicle stands, too."""
 
 
 class Why(StrEnum):
@@ -68,6 +69,7 @@ class Why(StrEnum):
     TOO_SHORT = "too_short"
     GAP = "gap"
     CLOCK_STEP = "clock_step"
+    TRAILER = "trailer"
     TOO_SLOW = "too_slow"
     TOO_FAST = "too_fast"
     SPEED_MISSING = "speed_missing"
@@ -120,7 +122,7 @@ class Motion:
 
     t_ns (n,); columns (n, len(signals)) in SI and vehicle axes (ISO 8855), gravity still in. counters: the
     message counter (n,) of the frames that carry a signal, where the signal map names one. aside (n,): rows of messages
-    that carry nothing but a journey's signals; None where there is no such message.
+    that carry nothing but signals of ASIDE; None where there is no such message.
     """
 
     signals: tuple[Signal, ...]
@@ -156,8 +158,13 @@ class Motion:
 
     @property
     def weighing(self) -> "Motion":
-        """Without the rows aside: what there would be if the map named no message of theirs."""
-        return self if self.aside is None else self.rows(~self.aside)
+        """Without the rows aside but those of a trailer, which weighs nothing and yet decides what can be weighed."""
+        if self.aside is None:
+            return self
+        kept = ~self.aside
+        if Signal.TRAILER in self.signals:
+            kept |= np.isfinite(self.columns[:, self.signals.index(Signal.TRAILER)])
+        return self.rows(kept)
 
     def part(self, begin: int, end: int) -> "Motion":
         """Rows begin to end (exclusive)."""

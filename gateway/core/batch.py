@@ -42,7 +42,7 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
     causes = _merge_missing(
         _either(_causes(_ACCELERATION_FAULTS, acceleration), _causes(_PITCH_RATE_FAULTS, pitch_rate))
     )
-    causes |= _speed_causes(speed, frozen, settings)
+    causes |= _speed_causes(speed, frozen, settings) | _trailer_cause(rows, window, n, settings)
     usable = np.ones(n, bool)
     for masked in causes.values():
         usable &= ~masked
@@ -183,6 +183,16 @@ def _speed_causes(speed: F64, frozen: Bool, settings: BatchSettings) -> dict[Why
         Why.TOO_FAST: speed > settings.speed_max_mps,
         Why.SPEED_FROZEN: frozen,
     }
+
+
+def _trailer_cause(rows: Motion, window: Window, n: int, settings: BatchSettings) -> dict[Why, Bool]:
+    """Where a trailer is drawn, each reading holding until the next and the first one from the start; none without."""
+    t_ns, x = sort_by_time(*rows.of(Signal.TRAILER))
+    if not len(t_ns):
+        return {}
+    at_ns = window.t_start_ns + np.rint(np.arange(n) * (NS_PER_S / settings.rate_hz)).astype(np.int64)
+    latest = np.maximum(np.searchsorted(t_ns, at_ns, side="right") - 1, 0)
+    return {Why.TRAILER: x[latest] > 0.0}
 
 
 def _either(one: dict[Why, Bool], other: dict[Why, Bool]) -> dict[Why, Bool]:

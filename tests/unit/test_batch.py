@@ -120,6 +120,41 @@ def test_a_slow_sensor_cannot_fill_the_grid() -> None:
     assert batch_of(drive(LENGTH_S, steady(15.0), rate_hz=25.0)).rejected == (Why.SENSOR_RATE_LOW,)
 
 
+def with_trailer(*states: tuple[float, float]) -> Motion:
+    """The whole drive with a frame aside for each (time in s, state)."""
+    n, k = len(WHOLE), len(states)
+    t_ns = np.r_[WHOLE.t_ns, np.array([T0_NS + round(s * 1e9) for s, _ in states], np.int64)]
+    columns = np.full((n + k, len(WHOLE.signals) + 1), np.nan)
+    columns[:n, :-1] = WHOLE.columns
+    columns[n:, -1] = [state for _, state in states]
+    order = np.argsort(np.r_[np.maximum.accumulate(WHOLE.t_ns), t_ns[n:]], kind="stable")
+    aside = np.arange(n + k) >= n
+    return Motion((*WHOLE.signals, Signal.TRAILER), t_ns[order], columns[order], aside=aside[order])
+
+
+def test_nothing_is_weighed_while_a_trailer_is_drawn() -> None:
+    assert batch_of(with_trailer((50.0, 1.0))).rejected == (Why.TRAILER,)
+    assert batch_of(with_trailer((10.0, 1.0), (45.0, 0.0))).rejected == (Why.TRAILER,)
+    uncoupled = batch_of(with_trailer((5.0, 1.0), (30.0, 0.0)))
+    assert uncoupled.rejected == ()
+    assert uncoupled.shares[Why.TRAILER] == pytest.approx(0.3, abs=0.001)
+    assert not uncoupled.usable[: round(29.9 * uncoupled.rate_hz)].any()
+
+
+@pytest.mark.parametrize("states", [(), ((50.0, 0.0),)])
+def test_without_a_trailer_a_batch_is_what_it_was(states: tuple[tuple[float, float], ...]) -> None:
+    alone, whole = batch_of(with_trailer(*states)), batch_of(WHOLE)
+    assert alone.rejected == ()
+    np.testing.assert_array_equal(alone.usable, whole.usable)
+    np.testing.assert_array_equal(alone.vertical_acceleration_mps2, whole.vertical_acceleration_mps2)
+
+
+def test_what_calibrates_knows_of_the_trailer_and_of_no_journey() -> None:
+    rows = with_trailer((50.0, 1.0)).weighing
+    assert len(rows) == len(WHOLE) + 1
+    assert batch_of(rows).rejected == (Why.TRAILER,)
+
+
 @pytest.mark.parametrize("rate_hz", [50.0, 100.0, 200.0])
 def test_a_batch_knows_how_often_its_sensors_send(rate_hz: float) -> None:
     sampled = drive(LENGTH_S, steady(15.0), rate_hz=rate_hz)

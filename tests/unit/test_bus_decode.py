@@ -139,6 +139,17 @@ def test_j1939_codes_by_length(length, codes, last_number):
     assert not is_j1939_code(field, np.array([0, last_number], np.uint64)).any()
 
 
+def test_a_trailer_of_a_j1939_group_is_two_bits_and_their_codes(write_map):
+    signal_map = write_map(
+        'BO_ 2566844926 M: 8 A\n SG_ S : 0|2@1+ (1,0) [0|3] "" A\n',
+        'j1939 = true\n[signals.trailer]\nmessage = "M"\nsignal = "S"\n',
+    )
+    motion = Decoder(signal_map).decode(frames(*((0x98FEF1C8, bytes([raw]) + bytes(7)) for raw in range(4))))
+    np.testing.assert_array_equal(motion.columns[:, 0], [0.0, 1.0, np.nan, np.nan])
+    assert motion.aside is not None
+    assert motion.aside.all()
+
+
 def test_a_signed_signal_of_a_j1939_map_keeps_its_negative_numbers(write_map):
     signal_map = write_map(
         'BO_ 2566844926 M: 8 A\n SG_ S : 0|16@1- (0.01,0) [0|0] "m/s" A\n',

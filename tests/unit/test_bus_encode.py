@@ -21,6 +21,7 @@ TYPICAL = {
     Signal.ODOMETER: (50_000.0, 100.0),
     Signal.DOOR: (1.0, 0.0),
     Signal.AIR_SPRING_PRESSURE: (300_000.0, 50_000.0),
+    Signal.TRAILER: (0.0, 0.0),
     Signal.RIDE_HEIGHT: (0.0, 0.02),
     Signal.AXLE_WEIGHT: (800.0, 100.0),
 }

@@ -27,6 +27,7 @@ QUANTITIES: Final[Mapping[Signal, str]] = {
     Signal.DOOR: "state",
     Signal.AIR_SPRING_PRESSURE: "pressure",
     Signal.RIDE_HEIGHT: "distance",
+    Signal.TRAILER: "state",
 }
 LONGEST_BYTES = 64  # of a CAN FD frame
 FEWEST_COUNTER_BITS: Final = 2

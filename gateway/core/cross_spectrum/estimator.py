@@ -256,7 +256,7 @@ def _diagnostics(found: Weighed, calibration: CrossSpectrumCalibration) -> dict[
 def disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why | None:
     """Why an answer is not believed; where a sensor has become so noisy that it may be the cause, that is why."""
     why = _disbelieved(found, calibration)
-    return Why.SENSOR_NOISY if found.is_noisy and why in _BY_NOISE else why
+    return Why.SENSOR_NOISY if found.is_noisy and why in (*_BY_NOISE, Why.SENSOR_CHANGED) else why
 
 
 def _disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why | None:

@@ -38,6 +38,7 @@ export const COMMON = {
   "reason.too_short": ["too short", "zu kurz"],
   "reason.gap": ["gap", "Lücke"],
   "reason.clock_step": ["clock step", "Uhr gestellt"],
+  "reason.trailer": ["trailer", "Anhänger"],
   "reason.too_slow": ["too slow", "zu langsam"],
   "reason.too_fast": ["too fast", "zu schnell"],
   "reason.speed_spread": ["speed spread", "Geschwindigkeit zu ungleichmäßig"],

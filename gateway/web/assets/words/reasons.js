@@ -7,6 +7,7 @@ export const REASONS_DE = {
   too_short: ["die Fahrt endete, bevor der Abschnitt voll war (`last_batch_share_min`), oder sie war zu unruhig", "weiterfahren oder `window_s` verkürzen"],
   gap: ["Botschaften beider Sensoren fehlen (`gap_s`, `gap_share_max`), oder Stille beendete die Fahrt (`silence_s`)", "Verluste und Buszustand in `/api/v1/status` ansehen; Verkabelung und Last des Gateways prüfen"],
   clock_step: ["Zeitstempel sprangen um mehr als `clock_step_s` zurück", "die Uhr stellen, bevor der Dienst startet"],
+  trailer: ["zu lange im Abschnitt hing ein Anhänger am Fahrzeug (Signal `trailer`): er schiebt und zieht, und seine Deichsel ist keine Ladung", "nichts; ohne Anhänger wird wieder gewogen"],
   too_slow: ["zu viel des Abschnitts war langsamer als `speed_min_mps`: Stadt, Stau, Hof", "nichts; die nächste freie Straße genügt"],
   too_fast: ["zu viel des Abschnitts war schneller als `speed_max_mps`", "die Einheit der Geschwindigkeit im Signalplan prüfen"],
   speed_spread: ["die Geschwindigkeit schwankte stärker, als der Verhältnisindex verträgt", "gleichmäßig fahren; `cross_spectrum` verträgt mehr als `ratio_index`"],
