@@ -92,15 +92,21 @@ def lagging(by_s: float) -> Rows:
     return disturb
 
 
-def amplified(by: float) -> Rows:
-    """An accelerometer whose gain has changed, gravity included."""
+def amplified(by: float, *of: Signal) -> Rows:
+    """Sensors whose gain has changed; the accelerometer's changes gravity too."""
 
     def disturb(motion: Motion, rng: np.random.Generator) -> Motion:
         columns = motion.columns.copy()
-        columns[:, motion.signals.index(Signal.VERTICAL_ACCELERATION)] *= 1.0 + by
+        columns[:, [motion.signals.index(signal) for signal in of]] *= 1.0 + by
         return replace(motion, columns=columns)
 
     return disturb
+
+
+def drawing_a_trailer(motion: Motion, rng: np.random.Generator) -> Motion:
+    """Every frame says that a trailer is drawn; nothing else changes."""
+    drawn = np.ones((len(motion), 1))
+    return replace(motion, signals=(*motion.signals, Signal.TRAILER), columns=np.hstack([motion.columns, drawn]))
 
 
 def half_of_the_time(signal: Signal, to: Callable[[F64], F64]) -> Rows:
@@ -177,11 +183,19 @@ DISTURBANCES: Final[Mapping[str, Disturbance]] = MappingProxyType(
             Disturbance("10 % of frames lost", lossy(0.1), is_mended=True, reasons=(Why.GAP, Why.TIME_STAMPS)),
             Disturbance("gyro late by 5 ms", lagging(0.005), is_mended=True),
             Disturbance("gyro late by 20 ms", lagging(0.020), is_mended=True),
-            Disturbance("accelerometer's gain + 2 %", amplified(0.02), reasons=_SENSOR_MOVED),
-            Disturbance("accelerometer's gain + 5 %", amplified(0.05), reasons=_SENSOR_MOVED),
+            Disturbance(
+                "accelerometer's gain + 2 %", amplified(0.02, Signal.VERTICAL_ACCELERATION), reasons=_SENSOR_MOVED
+            ),
+            Disturbance(
+                "accelerometer's gain + 5 %", amplified(0.05, Signal.VERTICAL_ACCELERATION), reasons=_SENSOR_MOVED
+            ),
+            Disturbance(
+                "gyro's gain + 3 %", amplified(0.03, Signal.PITCH_RATE, Signal.ROLL_RATE), reasons=_SENSOR_MOVED
+            ),
             Disturbance("sensor moved 0.2 m left", sensors=_moved(left_m=0.2), reasons=_SENSOR_MOVED),
             Disturbance("sensor moved 0.2 m back", sensors=_moved(back_m=0.2), reasons=_SENSOR_MOVED),
             Disturbance("sensor turned by 10 degrees", sensors=_moved(yaw_deg=10.0), reasons=_SENSOR_MOVED),
+            Disturbance("a trailer is drawn", drawing_a_trailer, reasons=(Why.TRAILER,)),
             Disturbance("sensor noise x 5", sensors=_noisy(5.0), reasons=(Why.SENSOR_NOISY,)),
             Disturbance("sampled at 50 Hz", sensors=_sampled_at(50.0), reasons=(Why.SAMPLE_RATE,)),
             Disturbance("no roll rate", has_roll_rate=False),
