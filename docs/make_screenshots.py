@@ -121,7 +121,7 @@ def take_cab(browser: Browser) -> None:
 def take_fleet(browser: Browser) -> None:
     """fleet.md's picture: five vans after their first drives."""
     with demonstration("1", "--fleet", "5") as url:
-        page = browser.new_page(locale="en-GB", timezone_id="UTC", viewport={"width": 1240, "height": 480})
+        page = browser.new_page(locale="en-GB", timezone_id="UTC", viewport={"width": 1240, "height": 545})
         page.goto(url)
         page.wait_for_selector("#vehicles tr:nth-child(5) .bar", timeout=PATIENCE_S * 1000.0)
         save(page.screenshot(), "fleet.png")
