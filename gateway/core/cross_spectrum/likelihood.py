@@ -20,7 +20,7 @@ import numpy as np
 
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.driven import Driven, SpectralModel
-from gateway.core.cross_spectrum.model.expected import expected_of_driven
+from gateway.core.cross_spectrum.model.expected import expected_of_driven, tapered, with_noise, without_noise
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix, Whitener
 from gateway.core.cross_spectrum.model.parameters import Ground, has_roll
 from gateway.core.cross_spectrum.model.slopes import solved_at, spectral_slopes
@@ -87,12 +87,13 @@ class Curvature:
 class _Whitened:
     """The model solved at a point, and L^-1 S L^-H for its M = L L^H, with what whitens other matrices alike.
 
-    The trace is (b, m).
+    The trace is (b, m); noiseless is M as sensors without noise would show it.
     """
 
     point: Point
     model: SpectralModel
     driven: Driven
+    noiseless: SpectralMatrix
     by: Whitener
     seen: SpectralMatrix
 
@@ -159,7 +160,8 @@ class Whittle:
 
     def _curvature(self, point: Point, free: Sequence[int]) -> Curvature:
         z = self._whitened(point)
-        slopes = spectral_slopes(point.theta, point.loaded, self.ground, self.spectra, free, (z.model, z.driven))
+        solved = z.model, z.driven, z.noiseless
+        slopes = spectral_slopes(point.theta, point.loaded, self.ground, self.spectra, free, solved)
         d = self._by_part(z) @ slopes
         level, root_w, x = _centred(np.log(z.trace / self._p)), np.sqrt(self._level_weight), self._slope
         along, stiffness = np.sum(root_w**2 * x * level), np.sum(root_w**2 * x * x) + ROAD_SLOPE_STD**-2
@@ -188,8 +190,9 @@ class Whittle:
         """Solved once for a point: a search asks for the cost and then for the slopes."""
         if self._last is None or not self._last.point.is_at(point):
             model, driven = solved_at(point.theta, point.loaded, self.ground, self.spectra)
-            by = Whitener.of(expected_of_driven(driven, model, self.spectra))
-            self._last = _Whitened(point, model, driven, by, by(self._seen))
+            noiseless = tapered(without_noise(driven, model), self.spectra)
+            by = Whitener.of(with_noise(noiseless, model, self.spectra))
+            self._last = _Whitened(point, model, driven, noiseless, by, by(self._seen))
         return self._last
 
     def _cost(self, by: Whitener, trace: F64) -> F64:

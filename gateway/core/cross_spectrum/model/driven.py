@@ -8,7 +8,7 @@ Three things make groups differ that carry the same load:
 - sensor noise, which is the same on every road, so that it counts for more on a smooth one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import k1
@@ -97,11 +97,13 @@ def spectral_model(
 
 def numbers_of(theta: F64, load: tuple[F64 | float, ...], ground: Ground) -> Numbers:
     """What is in the equations of motion (..., 5, 1) at each of friction.levels()."""
-    acting = at_levels(theta)
     payload_kg, front_share, *cg_left_m = (np.asarray(one)[..., None, None] for one in load)
+    still = theta[..., None, :]
     if not has_roll(theta):
-        return half_car_numbers(half_car(acting, ground), payload_kg, front_share)
-    return rolling_numbers(rolling_car(acting, ground), SidewaysLoad(payload_kg, front_share, cg_left_m[0]))
+        return half_car_numbers(at_levels(half_car(still, ground), theta), payload_kg, front_share)
+    car = rolling_car(still, ground)
+    acting = replace(car, half_car=at_levels(car.half_car, theta))
+    return rolling_numbers(acting, SidewaysLoad(payload_kg, front_share, cg_left_m[0]))
 
 
 def driven(model: SpectralModel, spectra: CrossSpectra) -> Driven:

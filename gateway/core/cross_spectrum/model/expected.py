@@ -28,7 +28,11 @@ def expected_spectra(model: SpectralModel, spectra: CrossSpectra) -> SpectralMat
 
 def expected_of_driven(by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
     """The same of a model that drives already as the groups of ``spectra`` do."""
-    matrix = tapered(without_noise(by, model), spectra)
+    return with_noise(tapered(without_noise(by, model), spectra), model, spectra)
+
+
+def with_noise(matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
+    """What the sensors show in place of ``matrix``, which sensors without noise would show."""
     return SpectralMatrix(matrix.auto + noise(model, matrix, spectra), matrix.cross)
 
 
@@ -67,8 +71,11 @@ def tapered(matrix: SpectralMatrix, spectra: CrossSpectra) -> SpectralMatrix:
 
 def tapered_parts(slopes: F64, spectra: CrossSpectra) -> F64:
     """The same of changes (b, m, p^2, k) of a matrix's parts, frequencies before these."""
-    rough = (slopes * _road(spectra)[:, None, None]).swapaxes(1, -1)
-    return _mixed(rough).swapaxes(1, -1)
+    rough = slopes * _road(spectra)[:, None, None]
+    mixed: F64 = 4.0 * rough[:, 1:-1]
+    mixed += rough[:, :-2]
+    mixed += rough[:, 2:]
+    return mixed
 
 
 def _road(spectra: CrossSpectra) -> F64:

@@ -7,10 +7,12 @@ J. Appl. Polym. Sci. 6, 1962). Of the rate of each damper and of each spring a s
 moves as much as it usually does; where it moves s times as much, the rate is 1 - p + p/s times as large.
 """
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
+from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.records import F64
 
@@ -39,15 +41,22 @@ def levels() -> tuple[tuple[float, float], ...]:
     return (-u, -u), (0.0, 0.0), (u, u), (d, -d), (-d, d)
 
 
-_AXLES, _SHARES, _RATES = (list(each) for each in zip(*RATES, strict=True))
+_AXLES, _SHARES, _ = (list(each) for each in zip(*RATES, strict=True))
 _LESS: Final = np.expm1(-np.array(levels()))[:, _AXLES]  # (5, 4) of the axle of each rate: 1/s - 1
 
 
-def at_levels(theta: F64) -> F64:
-    """Parameters theta (..., p) as they act at each of :func:`levels`: (..., 5, p)."""
-    moved = np.repeat(theta[..., None, :], len(_LESS), axis=-2)
-    moved[..., _RATES] += np.log(np.maximum(1.0 + moved[..., _SHARES] * _LESS, LEAST_LEFT))
-    return moved
+def at_levels(car: HalfCar, theta: F64) -> HalfCar:
+    """The vehicles theta (..., p), of which ``car`` has numbers (..., 1, 1), as they act at each of :func:`levels`: the
+    rates of springs and dampers are (..., 5, 1).
+    """
+    left = np.maximum(1.0 + theta[..., None, _SHARES] * _LESS, LEAST_LEFT)[..., None]
+    dampers, springs = left[..., :2, :], left[..., 2:, :]
+
+    def acting(axle: Axle, i: int) -> Axle:
+        damper_nspm, spring_npm = axle.damper_nspm * dampers[..., i, :], axle.spring_npm * springs[..., i, :]
+        return replace(axle, damper_nspm=damper_nspm, spring_npm=spring_npm)
+
+    return replace(car, front=acting(car.front, 0), rear=acting(car.rear, 1))
 
 
 def level_weights(log_amplitudes: F64) -> F64:

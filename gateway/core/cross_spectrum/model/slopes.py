@@ -16,7 +16,7 @@ from gateway.core.cross_spectrum.model.driven import (
     numbers_of,
     spectral_model,
 )
-from gateway.core.cross_spectrum.model.expected import noise, noise_scale, power, tapered, tapered_parts, without_noise
+from gateway.core.cross_spectrum.model.expected import noise, noise_scale, power, tapered_parts, without_noise
 from gateway.core.cross_spectrum.model.friction import level_weights
 from gateway.core.cross_spectrum.model.matrix import PAIRS, SpectralMatrix
 from gateway.core.cross_spectrum.model.motion import Motion
@@ -43,7 +43,7 @@ def spectral_slopes(
     ground: Ground,
     spectra: CrossSpectra,
     free: Sequence[int],
-    solved: tuple[SpectralModel, Driven],
+    solved: tuple[SpectralModel, Driven, SpectralMatrix],
 ) -> F64:
     """Derivatives (b, m, p^2, k) of the expected spectra, as SpectralMatrix.parts has them, for the ``free`` entries of
     theta (n,) and of the load.
@@ -51,9 +51,9 @@ def spectral_slopes(
     ``load`` is payload in kg, front share (0..1) and, for a vehicle that rolls, the lateral place: entries n, n + 1 and
     n + 2. The chain rule goes from parameters to the numbers in the equations of motion by central differences, on to
     the responses and to the spectra by closed forms; the others are closed forms throughout. All of it is real matrix
-    products. ``solved`` is the model at this very point.
+    products. ``solved`` is the model at this very point, and what sensors without noise would show of it.
     """
-    model, by = solved
+    model, by, noiseless = solved
     slopes = np.zeros((*by.phase.shape, spectra.n_sensors**2, len(free)))
     rows = [row for row, entry in enumerate(free) if entry in VEHICLE_PARAMETERS or entry >= len(theta)]
     if rows:
@@ -67,7 +67,7 @@ def spectral_slopes(
         if entry in _OF_ROAD:
             slopes[..., row] = _by_road(entry, by, model, spectra).parts
     slopes = tapered_parts(slopes, spectra)
-    _add_noise(slopes, tapered(without_noise(by, model), spectra), model, spectra, free)
+    _add_noise(slopes, noiseless, model, spectra, free)
     return slopes
 
 
