@@ -51,11 +51,11 @@ def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("drives", "arguments", "n_batches", "payload_pct", "front_share_pct", "cg_left_m"),
     [
-        ("known_loads", [], 10, 1.0, 0.6, None),
+        ("known_loads", [], 10, 1.2, 0.6, None),
         ("known_loads", ["--window-s", "60"], 50, 2.0, 1.2, None),
-        ("speeds", [], 15, 2.5, 1.0, None),
-        ("sideways", [], 10, 2.0, 0.8, 0.006),
-        ("mixed", [], 24, 2.6, 1.3, 0.006),
+        ("speeds", [], 15, 2.4, 1.0, None),
+        ("sideways", [], 10, 1.3, 0.7, 0.006),
+        ("mixed", [], 24, 2.5, 1.2, 0.006),
     ],
     ids=["known loads", "known loads by the minute", "speeds", "sideways", "mixed"],
 )

@@ -78,7 +78,7 @@ def test_with_a_vehicle_fully_known_the_spread_is_the_cramer_rao_bound(
     """Of parameters that drift each by itself, as the bound takes them."""
     target = placed(220.0, 1.9)
     by_itself = np.diag(np.array(list(DRIFT_STD.values())) ** -2.0)
-    monkeypatch.setattr("gateway.core.cross_spectrum.located.drift_precision", lambda theta: by_itself)
+    monkeypatch.setattr("gateway.core.cross_spectrum.located.drift_precision", lambda: by_itself)
     found = Design(VAN, calibration.parameters, DRIVE, [target]).spread(np.zeros_like(UNKNOWN))
     bound = cramer_rao(calibration, 220.0, target.front_share_pct, Drive(300.0, 14.0), DRIFT_STD)
     assert found.payload_std_kg == pytest.approx(bound.payload_std_kg, rel=1e-6)

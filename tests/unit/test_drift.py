@@ -7,19 +7,20 @@ from gateway.core.cross_spectrum.drift import (
     DAMPERS_TOGETHER_STD,
     DRIFT_STD,
     DRIFTING,
+    HELD_STD,
     NATURE_STD,
     NATURE_TOGETHER_STD,
+    NOISE_STD,
     STEADY,
     day_columns,
     drift_precision,
     packing_columns,
 )
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.records import F64
 
 N_FITTED = len(DRIFTING) + 2  # and the load's two
-ROLLING = np.zeros(len(PARAMETERS) + len(ROLL_PARAMETERS))
-PRECISION = drift_precision(ROLLING)
+PRECISION = drift_precision()
 
 
 def natural_covariance(entries: list[int], otherwise: F64) -> F64:
@@ -84,10 +85,9 @@ def test_dampers_drift_together_more_than_apart() -> None:
     assert apart @ covariance @ apart == pytest.approx(2.0 * DRIFT_STD["damper_front_nspm"] ** 2)
 
 
-def test_noise_drifts_only_where_roll_is_read() -> None:
-    """What a sensor beside the centre line feels of roll would else be taken for its own noise."""
-    held = np.linalg.inv(drift_precision(ROLLING[: len(PARAMETERS)]))
-    free = np.linalg.inv(PRECISION)
-    for i, name in enumerate(DRIFT_STD):
-        expected = 1e-3 if name.startswith("noise_") else free[i, i] ** 0.5
-        assert held[i, i] ** 0.5 == pytest.approx(expected)
+def test_noise_that_is_free_leaves_the_rest_as_it_is() -> None:
+    held, free = (np.linalg.inv(drift_precision(is_noise_free=is_free)) for is_free in (False, True))
+    is_noise = np.array([name.startswith("noise_") for name in DRIFT_STD])
+    assert np.diag(held)[is_noise] ** 0.5 == pytest.approx(HELD_STD)
+    assert np.diag(free)[is_noise] ** 0.5 == pytest.approx(NOISE_STD)
+    assert np.allclose(held[~is_noise], free[~is_noise])

@@ -10,7 +10,7 @@ from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum import located
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import DRIFTING
+from gateway.core.cross_spectrum.drift import DRIFTING, drift_precision
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT
 from gateway.core.cross_spectrum.packing import DECISIVE, SOFT_COST, Packing, packings
 from gateway.core.cross_spectrum.search import Found
@@ -60,7 +60,7 @@ def test_it_would_not_be_if_loads_were_only_thought_to_stand_firmly(
     """Nowhere near as well: further off, and a few times as uncertain."""
     load = (400.0, 44.0)
     rightly = ringing(calibration, load, 9.0, 0.1, seed=41)
-    monkeypatch.setattr(located, "packings", lambda parameters: packings(parameters)[:1] * 2)
+    monkeypatch.setattr(located, "packings", lambda parameters, precision: packings(parameters, precision)[:1] * 2)
     found = ringing(calibration, load, 9.0, 0.1, seed=41)
     assert not found.counted or found.payload.std > 3.0 * rightly.payload.std
 
@@ -77,7 +77,7 @@ def test_a_firm_load_is_not_taken_for_soft(
 
 def test_a_real_cars_rattle_is_no_soft_load() -> None:
     """What a soft packing gains must be far beyond what seats and people gain (51), and a prior cost beside it."""
-    firm, soft = packings(np.zeros(100))
+    firm, soft = packings(np.zeros(100), drift_precision())
     assert firm.decisive == firm.cost == 0.0
     assert soft.decisive == DECISIVE > 51.0
     assert soft.cost == SOFT_COST > 0.0
@@ -88,7 +88,7 @@ def peak(payload_kg: float, front_share: float, cost: float, packing: Packing) -
     return located._Peak(Found(x, cost, np.eye(len(x)), is_converged=True, near=x), packing)
 
 
-FIRM, SOFT = packings(np.zeros(100))
+FIRM, SOFT = packings(np.zeros(100), drift_precision())
 
 
 def test_a_peak_alone_adds_nothing() -> None:
@@ -128,7 +128,9 @@ def test_an_answer_of_two_peaks_is_wider(
         return rivalry(found, [*peaks, peak_of(rival, found.cost + behind)])
 
     def peak_of(x: np.ndarray, cost: float) -> located._Peak:
-        return located._Peak(Found(x, cost, np.eye(len(x)), is_converged=True, near=x), Packing(x[: len(DRIFTING)]))
+        return located._Peak(
+            Found(x, cost, np.eye(len(x)), is_converged=True, near=x), Packing(x[: len(DRIFTING)], drift_precision())
+        )
 
     monkeypatch.setattr(located, "_rivalry", beside)
     found = weighed(batch, calibration)

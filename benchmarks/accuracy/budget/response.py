@@ -5,12 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import DRIFT_STD, DRIFTING, STEADY, drift_precision
+from gateway.core.cross_spectrum.drift import DRIFT_STD, DRIFTING, STEADY
 from gateway.core.cross_spectrum.estimator import Weighed
 from gateway.core.cross_spectrum.likelihood import Whittle
-from gateway.core.cross_spectrum.located import Answer, answer_at
+from gateway.core.cross_spectrum.located import Answer, answer_at, precision_of
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.core.cross_spectrum.model.strokes import with_strokes
+from gateway.core.cross_spectrum.packing import Packing
 from gateway.core.cross_spectrum.shape import EVIDENCE
 from gateway.posterior import Source
 from gateway.records import F64
@@ -26,7 +27,7 @@ def response_to(found: Weighed, calibration: CrossSpectrumCalibration, day: Mapp
     """
     at = _at(found, calibration)
     steady = at.steady[-2:] @ [day.get(PARAMETERS[i], 0.0) for i in STEADY]
-    drifting = _held_back(at, calibration) @ [day.get(PARAMETERS[i], 0.0) for i in DRIFTING]
+    drifting = _held_back(at, found, calibration) @ [day.get(PARAMETERS[i], 0.0) for i in DRIFTING]
     response: F64 = -_OUTWARD @ (steady + drifting)
     return response
 
@@ -36,8 +37,8 @@ def day_covariance(found: Weighed, calibration: CrossSpectrumCalibration) -> F64
     stands in the batch's own covariance.
     """
     is_damper = np.array([name.startswith("damper_") for name in DRIFT_STD], dtype=float)
-    believed = np.linalg.inv(drift_precision(calibration.parameters)) * np.outer(is_damper, is_damper)
-    held = _OUTWARD @ _held_back(_at(found, calibration), calibration)
+    believed = np.linalg.inv(precision_of(found.spectra, calibration)) * np.outer(is_damper, is_damper)
+    held = _OUTWARD @ _held_back(_at(found, calibration), found, calibration)
     columns = found.posterior.sources[Source.DAY]
     covariance: F64 = columns.T @ columns + held @ believed @ held.T
     return covariance
@@ -46,11 +47,11 @@ def day_covariance(found: Weighed, calibration: CrossSpectrumCalibration) -> F64
 def _at(found: Weighed, calibration: CrossSpectrumCalibration) -> Answer:
     point, ground = found.located.point, calibration.ground
     spectra = with_strokes(found.spectra.without_roll, calibration.parameters, point.load, ground)
-    expected = calibration.parameters[DRIFTING]
-    return answer_at(Whittle(spectra, ground), point, calibration, expected, EVIDENCE, is_shape_known=False)
+    prior = Packing(calibration.parameters[DRIFTING], precision_of(found.spectra, calibration))
+    return answer_at(Whittle(spectra, ground), point, calibration, prior, EVIDENCE, is_shape_known=False)
 
 
-def _held_back(at: Answer, calibration: CrossSpectrumCalibration) -> F64:
+def _held_back(at: Answer, found: Weighed, calibration: CrossSpectrumCalibration) -> F64:
     """(2, k) of the load by the parameters that drift."""
-    held: F64 = at.covariance[-2:, : len(DRIFTING)] @ drift_precision(calibration.parameters)
+    held: F64 = at.covariance[-2:, : len(DRIFTING)] @ precision_of(found.spectra, calibration)
     return held

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from gateway.allocator import keep_freed_memory
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, CampaignTable, RunTable
 from gateway.calibration.commissioning.job import JOB, RESULT, Job, Result, findings_of, to_file
@@ -121,5 +120,4 @@ def _most_memory_mb() -> float:
 
 
 if __name__ == "__main__":
-    keep_freed_memory()
     main(Path(sys.argv[1]))

@@ -11,8 +11,15 @@ from typing import Final
 import numpy as np
 from scipy.special import gammaincinv
 
-from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll
+from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
+
+HELD_STD: Final = 1e-3  # of what does not drift
+NOISE_STD: Final = 1.0
+"""Of the logarithm of each sensor's own noise, where it is free: known loads are driven on roads too alike to tell it
+from slack, and on a smoother road the one stays while the other falls with the road (benchmarks/accuracy/trials.md).
+Chosen.
+"""
 
 DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
     {
@@ -22,19 +29,15 @@ DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
         "payload_mode_hz": 0.3,
         "payload_damping_ratio": 0.5,  # chosen: a peak on soft mounts cannot be fitted with a firm floor's damping
         "gyro_lag_s": 0.001,
-        "noise_acceleration_m2ps3": 1.0,
-        "noise_pitch_rate_rad2ps": 1.0,
+        "noise_acceleration_m2ps3": HELD_STD,
+        "noise_pitch_rate_rad2ps": HELD_STD,
     }
 )
 """What the search leaves free, and how far off, each by itself: standard deviations, of logarithms of what is positive.
 
 Narrower than nature, for the minutes of a batch repeat one error of the model: less evidence than they seem. The
-sensors' noise is free by a factor of e, chosen: known loads are driven on roads too alike to tell noise from slack, and
-on a smoother road the one stays while the other falls with the road (benchmarks/accuracy/trials.md).
+sensors' noise is held here; where it is free, NOISE_STD stands in its place.
 """
-
-HELD_STD: Final = 1e-3
-"""Of the noise where no roll rate is read: what the sensor then feels of roll looks like noise that it has not."""
 
 NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
     {
@@ -79,12 +82,11 @@ _OF_NOISE: Final = np.array([name.startswith("noise_") for name in DRIFT_STD])
 _NATURE_OF_DRIFTING: Final = _covariance({**DRIFT_STD, **NATURE_STD}, NATURE_TOGETHER_STD, list(DRIFT_STD))
 NATURE_OF_STEADY: Final = _covariance(NATURE_STD, NATURE_TOGETHER_STD, [PARAMETERS[i] for i in STEADY])
 _PRECISION: Final = np.asarray(np.linalg.inv(_BELIEVED), float)
-_PRECISION_WITHOUT_ROLL: Final = np.asarray(np.where(np.diag(_OF_NOISE), HELD_STD**-2, _PRECISION), float)
 
 
-def drift_precision(theta: F64) -> F64:
-    """(k, k) of the DRIFTING parameters: the inverse of what the search believes, for parameters theta (n,)."""
-    return _PRECISION if has_roll(theta) else _PRECISION_WITHOUT_ROLL
+def drift_precision(*, is_noise_free: bool = False) -> F64:
+    """(k, k) of the DRIFTING parameters: the inverse of what the search believes."""
+    return np.where(np.diag(_OF_NOISE), NOISE_STD**-2, _PRECISION) if is_noise_free else _PRECISION
 
 
 _OF_THE_VEHICLE: Final = np.array([not name.startswith(("gyro_lag", "noise")) for name in DRIFT_STD], dtype=float)

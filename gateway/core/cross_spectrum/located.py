@@ -106,7 +106,7 @@ def locate(
     if evidence is None:
         evidence = EVIDENCE if is_rolling else EVIDENCE_WITHOUT_ROLL
     if not is_rolling:
-        whittle, peak = _best(spectra.without_roll, calibration)
+        whittle, peak = _best(spectra.without_roll, calibration, precision_of(spectra, calibration))
         shape = _shaped(whittle, peak, calibration, 0.0, prior, evidence)
         located = _located(whittle, peak, shape, calibration, 0.0, evidence)
 
@@ -118,7 +118,7 @@ def locate(
         unseen = sideways_columns(whittle.spectra, as_known, calibration, weigh)
         return replace(located, columns={**located.columns, Source.SIDEWAYS: unseen})
     placed = replace(calibration, parameters=level(calibration.parameters))
-    _, peak = _best(spectra.without_roll, calibration.upright)
+    _, peak = _best(spectra.without_roll, calibration.upright, precision_of(spectra, calibration))
     moving = _moving(spectra, peak.found.x, placed)
     whittle = Whittle(moving.without_roll, calibration.ground)
     rolling = Whittle(moving.within(ROLL_BAND_HZ), calibration.ground)
@@ -131,6 +131,15 @@ def locate(
     located = _located(whittle, peak, shape, placed, place.cg_left_m, evidence)
     sideways = told_sideways(rolling, place, located.point)
     return replace(located, sideways=sideways, is_converged=located.is_converged and place.found.is_converged)
+
+
+def precision_of(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> F64:
+    """(k, k) how precisely the drifting parameters are known before a batch is weighed.
+
+    Where roll is read, each batch tells its sensors' noise. Without, what they feel of roll looks like noise, and noise
+    stays as calibrated.
+    """
+    return drift_precision(is_noise_free=spectra.roll is not None and has_roll(calibration.parameters))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,12 +172,12 @@ def answer_at(
     whittle: Whittle,
     point: Point,
     calibration: CrossSpectrumCalibration,
-    expected: F64,
+    prior: Packing,
     evidence: float,
     *,
     is_shape_known: bool = True,
 ) -> Answer:
-    """``expected`` (k,) are the drifting parameters that the prior expects; a shape that is sought is no error of t.
+    """``prior`` is what was believed of the drifting parameters; a shape that is sought is no error of t.
 
     With g and I the gradient and information of t at the peak and N its covariance by nature, the step is
     -w (w I + N^-1)^-1 g, w being how much the batch's evidence counts. What calibration left open is not moved: its
@@ -176,11 +185,10 @@ def answer_at(
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
-    precision = drift_precision(point.theta)
-    covariance = np.asarray(np.linalg.inv(_of_sought(whole, precision)), float)
+    covariance = np.asarray(np.linalg.inv(_of_sought(whole, prior.precision)), float)
     pull = whole.gradient[FITTED].copy()
-    off = (point.theta[DRIFTING]) - expected
-    pull[: len(DRIFTING)] += precision @ off
+    off = point.theta[DRIFTING] - prior.drifting
+    pull[: len(DRIFTING)] += prior.precision @ off
     free = [i for i in range(len(STEADY)) if is_shape_known or STEADY[i] != _GYRATION]
     t = [STEADY[i] for i in free]
     along = -covariance @ whole.information[np.ix_(FITTED, t)]  # what was sought moves by -C I_xt with each t
@@ -198,7 +206,7 @@ def answer_at(
     steady[:, free] = along @ np.linalg.inv(narrowing)  # S_posterior S^-1
     by_noise = along @ posterior * evidence
     to_peak = -covariance @ pull
-    at_peak = whittle.cost(point) + 0.5 * float(off @ precision @ off + pull @ to_peak)
+    at_peak = whittle.cost(point) + 0.5 * float(off @ prior.precision @ off + pull @ to_peak)
     return Answer(
         whole=whole,
         covariance=covariance,
@@ -221,7 +229,7 @@ def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
-    covariance = np.asarray(np.linalg.inv(_of_sought(whole, drift_precision(point.theta))), float)
+    covariance = np.asarray(np.linalg.inv(_of_sought(whole, drift_precision())), float)
     moves = np.zeros((2, len(PARAMETERS)))
     moves[:, STEADY] = -(covariance @ whole.information[np.ix_(FITTED, STEADY)])[-2:]
     return covariance[-2:, -2:], moves
@@ -238,13 +246,12 @@ def _shaped(
     """The load under every shape that it may have; None where that is known."""
     if prior is None:
         return None
-    expected = peak.packing.drifting
 
     def weighed_as(log_s: float, start: F64) -> Node:
         of_shape = _with_gyration(calibration, log_s)
         found = _sought(whittle, start, peak.packing, of_shape, cg_left_m, OF_SHAPES)
         point = _point(found.near, of_shape, cg_left_m)
-        at = answer_at(whittle, point, of_shape, expected, evidence, is_shape_known=False)
+        at = answer_at(whittle, point, of_shape, peak.packing, evidence, is_shape_known=False)
         ended = Waypoint(log_s, found.x, -at.covariance @ at.whole.information[FITTED, _GYRATION])
         own_std_kg = float(np.sqrt(at.covariance[-2, -2]))
         return Node(ended, at.cost, found.near + at.shift, own_std_kg, found.is_converged)
@@ -276,18 +283,17 @@ def _located(
     evidence: float,
 ) -> Located:
     calibration = _as_shaped(calibration, shape)
-    drifting = peak.packing.drifting
+    prior = peak.packing
     x = peak.found.x if shape is None else np.r_[shape.x[:-2], shape.load]
     point = _point(x, calibration, cg_left_m)
-    at = answer_at(whittle, point, calibration, drifting, evidence, is_shape_known=shape is None)
+    at = answer_at(whittle, point, calibration, prior, evidence, is_shape_known=shape is None)
     if shape is None:
         x = x + np.r_[np.zeros(len(DRIFTING)), at.shift[-2:]]
         point = _point(x, calibration, cg_left_m)
     whole, found = at.whole, at.covariance
-    precision = drift_precision(point.theta)
     columns = {
-        Source.DAY: day_columns(found, at.steady, precision)[:, -2:],
-        Source.LOAD_LENGTH: packing_columns(found, precision)[:, -2:],
+        Source.DAY: day_columns(found, at.steady, prior.precision)[:, -2:],
+        Source.LOAD_LENGTH: packing_columns(found, prior.precision)[:, -2:],
     }
     if shape is not None:
         columns |= _of_shape(shape, columns[Source.LOAD_LENGTH])
@@ -297,7 +303,7 @@ def _located(
     misfit = whittle.misfit(at_peak)
     judged = whittle.curvature(at_peak, [*range(len(PARAMETERS)), len(point.theta), len(point.theta) + 1])
     parameters = fitted.parameters.copy()
-    parameters[DRIFTING] = drifting
+    parameters[DRIFTING] = prior.drifting
     own = found[-2:, -2:] + at.own[-2:, -2:]
     rivalled = own + sum((each.T @ each for each in columns.values()), np.zeros((2, 2)))
     return Located(
@@ -309,8 +315,10 @@ def _located(
         gain_moves=gain_moves(whole, whittle, point, found)[-2:],
         rival_covariance=peak.rivals,
         misfit=misfit,
-        tension=min(tension_of(likeliest[1][:-2] - one.drifting) for one in packings(calibration.parameters)),
-        scores=scores_of(judged, at_peak, found, replace(fitted, parameters=parameters)),
+        tension=min(
+            tension_of(likeliest[1][:-2] - one.drifting) for one in packings(calibration.parameters, prior.precision)
+        ),
+        scores=scores_of(judged, at_peak, found, replace(fitted, parameters=parameters), prior.precision),
         is_reversed=_is_reversed(whittle, at_peak, misfit, fitted),
         as_known=_point(peak.found.x, calibration, cg_left_m).load,
         is_converged=peak.found.is_converged if shape is None else shape.is_converged,
@@ -355,13 +363,13 @@ def _moving(spectra: CrossSpectra, x: F64, calibration: CrossSpectrumCalibration
     return with_strokes(spectra, calibration.parameters, load, calibration.ground)
 
 
-def _best(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> tuple[Whittle, _Peak]:
+def _best(spectra: CrossSpectra, calibration: CrossSpectrumCalibration, precision: F64) -> tuple[Whittle, _Peak]:
     """The best of the peaks that a few starting loads, firm and soft, lead to, and how far the others compete; before
     it the likelihood under which it was sought.
     """
     whittle = Whittle(spectra, calibration.ground)
     peaks = []
-    for packing, n in zip(packings(calibration.parameters), (STARTS_TRIED, 1), strict=True):
+    for packing, n in zip(packings(calibration.parameters, precision), (STARTS_TRIED, 1), strict=True):
         starts = [np.r_[packing.drifting, load] for load in _starting_loads(calibration)]
         costs = whittle.costs([_point(x, calibration, 0.0) for x in starts])
         tried = [starts[i] for i in np.argsort(costs, kind="stable")[:n].tolist()]
@@ -394,7 +402,7 @@ def _sought(
 ) -> Found:
     """Drift parameters, then payload (kg) and front share (0..1), of the peak that ``start`` leads to."""
     prior_mean = np.r_[packing.drifting, 0.0, 0.0]
-    prior_precision = np.pad(drift_precision(calibration.parameters), (0, 2))  # flat in payload and share
+    prior_precision = np.pad(packing.precision, (0, 2))  # flat in payload and share
 
     most_kg = MOST_LOAD_SHARE * calibration.empty_mass_kg
 

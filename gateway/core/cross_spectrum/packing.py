@@ -27,18 +27,19 @@ more (recorded drives, 9 Hz), firm ones at most 10; a real car, where seats and 
 
 @dataclass(frozen=True, slots=True)
 class Packing:
-    """What the drifting parameters (k,) are expected to be, the cost of taking a load to stand so, and by how much it
-    must be better to be believed.
+    """What the drifting parameters (k,) are expected to be and how precisely (k, k), the cost of taking a load to stand
+    so, and by how much it must be better to be believed.
     """
 
     drifting: F64
+    precision: F64
     cost: float = 0.0
     decisive: float = 0.0
 
 
-def packings(parameters: F64) -> tuple[Packing, Packing]:
+def packings(parameters: F64, precision: F64) -> tuple[Packing, Packing]:
     """Firm as in calibration, and soft."""
     firm = parameters[DRIFTING]
     soft = firm.copy()
     soft[DRIFTING.index(INDEX["payload_mode_hz"])] = log(SOFT_MODE_HZ)
-    return Packing(firm), Packing(soft, SOFT_COST, DECISIVE)
+    return Packing(firm, precision), Packing(soft, precision, SOFT_COST, DECISIVE)

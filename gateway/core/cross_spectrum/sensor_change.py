@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import DRIFTING, STEADY, drift_precision
+from gateway.core.cross_spectrum.drift import DRIFTING, STEADY
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
@@ -53,10 +53,14 @@ class SensorScores:
         return abs(self.position) > calibration.most_position_score or self.noise > calibration.most_noise_score
 
 
-def scores_of(whole: Curvature, point: Point, covariance: F64, calibration: CrossSpectrumCalibration) -> SensorScores:
-    """``whole`` is the curvature at ``point`` for every parameter and the load, ``covariance`` that of FITTED."""
+def scores_of(
+    whole: Curvature, point: Point, covariance: F64, calibration: CrossSpectrumCalibration, precision: F64
+) -> SensorScores:
+    """``whole`` is the curvature at ``point`` for every parameter and the load, ``covariance`` that of FITTED,
+    ``precision`` that of the drifting parameters beforehand.
+    """
     pull = whole.gradient[FITTED].copy()
-    pull[: len(DRIFTING)] += drift_precision(point.theta) @ (point.theta - calibration.parameters)[DRIFTING]
+    pull[: len(DRIFTING)] += precision @ (point.theta - calibration.parameters)[DRIFTING]
     across = whole.information[np.ix_(FITTED, STEADY)]
     left_open = calibration.covariance[np.ix_(STEADY, STEADY)]
 
