@@ -150,7 +150,6 @@ def test_commissioned_at_a_service_a_sister_weighs_as_calibrated_at_a_desk(
     assert [[one[key] for key in NUMBERS] for one in van.weighed if not one["rejected"]] == counted
 
 
-@SISTERS_FALL_SHORT
 def test_commissioned_at_a_service_errors_stay_small_and_intervals_true(
     commissioned_vans: Callable[[str], Commissioned],
 ) -> None:
