@@ -185,7 +185,10 @@ class Fusible:
         for known in set(self._sizes.tolist()):
             alike = np.flatnonzero(self._sizes == known).tolist()
             self._precisions[alike, :known, :known] = np.linalg.inv(np.array([parts[i].own for i in alike]))
-        self._means = self._weighted([part.mean[None] for part in parts])[:, 0]
+        self._about = np.zeros(size)  # what is equal everywhere stays so to the last bit
+        if parts:
+            self._about[: parts[0].size] = parts[0].mean
+        self._means = self._weighted([(part.mean - self._about[: part.size])[None] for part in parts])[:, 0]
         self._columns = {
             name: self._weighted([part.sources.get(name, np.zeros((0, size))) for part in parts])
             for name in Source
@@ -223,7 +226,7 @@ class Fusible:
                 sources[name] = columns[some, :n_columns, :size].sum(axis=0) @ own
         weights = np.abs(precisions[:, :, PAYLOAD] @ own[PAYLOAD])
         low, high = (weights @ self._tails[some] / weights.sum()).tolist()
-        mean = own @ self._means[some, :size].sum(axis=0)
+        mean = self._about[:size] + own @ self._means[some, :size].sum(axis=0)
         return Posterior(mean, 0.5 * (own + own.T), sources, (low, high))
 
 
