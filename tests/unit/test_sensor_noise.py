@@ -85,8 +85,8 @@ def test_vibration_grows_with_the_road_and_noise_does_not() -> None:
 def test_a_calibration_keeps_the_quietest_and_the_loudest() -> None:
     batches = [noisy(0.0), noisy(DENSITY)]
     floors = np.array([floor_of(batch) for batch in batches])
-    assert usual_floor(batches) == tuple(zip(floors.min(axis=0), floors.max(axis=0), strict=True))
-    assert usual_floor([]) is None
+    assert usual_floor(batches, with_roll=True) == tuple(zip(floors.min(axis=0), floors.max(axis=0), strict=True))
+    assert usual_floor([], with_roll=True) is None
 
 
 def test_the_roll_rates_noise_reaches_a_sensor_that_is_brought_to_the_centre_line() -> None:

@@ -227,5 +227,5 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         least_slack=known[0].whittle.ground.least_slack,
         usual_stroke_mps=reading.usual_stroke_mps,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),
-        floor=usual_floor(b for run in runs for b in run.batches if not b.rejected),
+        floor=usual_floor((b for run in runs for b in run.batches if not b.rejected), with_roll=reading.with_roll),
     )

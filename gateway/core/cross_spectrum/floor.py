@@ -1,7 +1,7 @@
 """How loud the sensors themselves are: what a batch reads above the frequencies at which a vehicle moves.
 
     floor_of(batch)                            power densities of its sensors between 16.5 and 20 Hz
-    usual_floor(batches)                       the quietest and the loudest of a calibration
+    usual_floor(batches, with_roll=...)        the quietest and the loudest of a calibration
     noise_over(floor, expected)                what a sensor adds that has become noisy
 
 Springs, wheels and tyres leave little up there, so that a sensor that has become noisy shows, and by how much.
@@ -54,10 +54,10 @@ def _floor(x: F64, batch: Batch, kept: Bool) -> float:
     return float(np.median(np.abs(transforms) ** 2) / np.log(2.0))
 
 
-def usual_floor(batches: Iterable[Batch]) -> UsualFloor | None:
-    """Of a calibration's batches; None where they do not tell."""
+def usual_floor(batches: Iterable[Batch], *, with_roll: bool) -> UsualFloor | None:
+    """Of a calibration's batches; None where they do not tell. The roll rate is left out where it is not used."""
     floors = [floor_of(batch) for batch in batches]
-    n_sensors = min((len(one) for one in floors), default=0)
+    n_sensors = min((3 if with_roll else 2, *(len(one) for one in floors))) if floors else 0
     by_sensor = np.array([one[:n_sensors] for one in floors]).T
     if not n_sensors or not np.isfinite(by_sensor).any(axis=1).all():
         return None
