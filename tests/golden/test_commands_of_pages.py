@@ -1,6 +1,7 @@
 """Every command that the pages of ways in tell: which test runs it, or that the page says it was not run.
 
-A command that is added to one of these pages needs its line here; options of our own commands must exist.
+A command that is added to one of these pages needs its line here. Of all pages our own commands must exist, with the
+options that are told, and a test must run each.
 """
 
 import re
@@ -39,6 +40,34 @@ RUN_BY = {  # how a command begins: what runs it
     "make test-vm": FEED,
     "systemctl status springscale-feed": FEED,
     "python -m benchmarks.": BY_A_STUDY,
+}
+OWN_RUN_BY = {  # of every page: how a command of ours begins, and what runs it
+    "springscale calibrate": "tests/golden/test_recorded_roll.py",
+    "springscale calibration sprung": "tests/unit/test_axle_weights.py",
+    "springscale calibration tare": "tests/unit/test_known_weights_command.py",
+    "springscale calibration ticket": "tests/unit/test_known_weights_command.py",
+    "springscale calibration": "tests/unit/test_calibration_commands.py",
+    "springscale campaign pack": PACK,
+    "springscale check-config": "tests/unit/test_command_line.py",
+    "springscale commission": "tests/unit/test_commission_command.py",
+    "springscale demo": "tests/e2e/test_cli_demo.py",
+    "springscale estimate": "tests/unit/test_estimate_command.py",
+    "springscale evaluate": "tests/golden/test_recorded_roll.py",
+    "springscale events": "tests/unit/test_events_command.py",
+    "springscale feed": FEED,
+    "springscale fleet-report": "tests/e2e/test_archive_to_report.py",
+    "springscale import": HOW_TO,
+    "springscale line": "tests/unit/test_line_commands.py",
+    "springscale look": "tests/unit/test_look.py",
+    "springscale record bus": "tests/unit/test_record_bus.py",
+    "springscale record": "tests/e2e/test_record_service.py",
+    "springscale replay": "tests/e2e/test_cli_simulate.py",
+    "springscale reprocess": "tests/unit/test_archive_command.py",
+    "springscale reproduce": "tests/e2e/test_reproduce.py",
+    "springscale run": "tests/e2e/test_gateway_service.py",
+    "springscale simulate": "tests/e2e/test_cli_simulate.py",
+    "springscale token": "tests/unit/test_web_token_command.py",
+    "springscale verification": "tests/e2e/test_verification_service.py",
 }
 NOT_RUN = {  # how a command begins: what the page says of it
     "sudo apt install gpsd": "a real Raspberry Pi",
@@ -83,18 +112,32 @@ def test_a_test_runs_it_or_the_page_says_that_none_does(page: str, command: str)
         assert (ROOT / runner).exists()
 
 
-@pytest.mark.parametrize(
-    "command", [one for _, one in COMMANDS if re.match("springscale|python -m benchmarks.accuracy", one)]
-)
-def test_our_own_commands_have_the_options_that_are_told(command: str) -> None:
+OUR_OWN = [
+    (page.stem, command)
+    for page in sorted((ROOT / "docs").glob("*.md"))
+    for command in commands_of(page.stem)
+    if re.match("(springscale|python -m benchmarks.accuracy) [a-z]", command)
+]
+
+
+@pytest.mark.parametrize(("page", "command"), OUR_OWN)
+def test_our_own_commands_have_the_options_that_are_told(page: str, command: str) -> None:
     words = command.removeprefix("python -m benchmarks.accuracy").removeprefix("springscale").split()
     found: click.Command = springscale if command.startswith("springscale") else studies
     while isinstance(found, click.Group) and words:
         known = found.get_command(click.Context(found), words.pop(0))
-        assert known is not None, command
+        assert known is not None, f"{page}: {command}"
         found = known
     options = {name for one in found.params for name in one.opts}
     assert {word for word in words if word.startswith("--")} <= options
+
+
+@pytest.mark.parametrize("command", sorted({one for _, one in OUR_OWN if one.startswith("springscale")}))
+def test_a_test_runs_each_of_our_own_commands(command: str) -> None:
+    runner = next((where for beginning, where in OWN_RUN_BY.items() if command.startswith(beginning)), None)
+    assert runner is not None, command
+    text = (ROOT / runner).read_text(encoding="utf-8")
+    assert all(word in text for word in command.split()[1:2])
 
 
 def test_commands_are_found_in_every_page() -> None:
