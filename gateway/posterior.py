@@ -14,6 +14,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -169,25 +170,39 @@ def fused(parts: Sequence[Posterior]) -> Posterior:
 
 
 class Fusible:
-    """Batches in their order, of which any that follow one another can be fused: own errors average out by their
-    precision, shared ones stay.
-
-    The weights are W_i = (sum P)^-1 P_i with P_i the inverse of own covariance i; a batch that does not know the
-    lateral place has no precision there. Columns of one source stand for the same causes in every part and average
-    with the same weights. What a part adds to each sum is computed once.
-    """
+    """Batches in their order, of which any that follow one another can be fused. One alone is taken as it is."""
 
     def __init__(self, parts: Sequence[Posterior]) -> None:
         self._parts = parts
+
+    def fused(self, first: int, stop: int) -> Posterior:
+        """Parts ``first`` to before ``stop`` together. Raises ValueError where there is none."""
+        if stop <= first:
+            raise ValueError("there is no batch to fuse")
+        return self._parts[first] if stop - first == 1 else self._sums.fused(first, stop)
+
+    @cached_property
+    def _sums(self) -> "_Sums":
+        return _Sums(self._parts)
+
+
+class _Sums:
+    """What each part adds to a fusion: own errors average out by their precision, shared ones stay.
+
+    The weights are W_i = (sum P)^-1 P_i with P_i the inverse of own covariance i; a batch that does not know the
+    lateral place has no precision there. Columns of one source stand for the same causes in every part and average
+    with the same weights.
+    """
+
+    def __init__(self, parts: Sequence[Posterior]) -> None:
         self._sizes = np.array([part.size for part in parts], int)
-        size = int(self._sizes.max(initial=0))
+        size = int(self._sizes.max())
         self._precisions = np.zeros((len(parts), size, size))
         for known in set(self._sizes.tolist()):
             alike = np.flatnonzero(self._sizes == known).tolist()
             self._precisions[alike, :known, :known] = np.linalg.inv(np.array([parts[i].own for i in alike]))
         self._about = np.zeros(size)  # what is equal everywhere stays so to the last bit
-        if parts:
-            self._about[: parts[0].size] = parts[0].mean
+        self._about[: parts[0].size] = parts[0].mean
         self._means = self._weighted([(part.mean - self._about[: part.size])[None] for part in parts])[:, 0]
         self._columns = {
             name: self._weighted([part.sources.get(name, np.zeros((0, size))) for part in parts])
@@ -203,18 +218,14 @@ class Fusible:
     def _weighted(self, rows: Sequence[F64]) -> F64:
         """(n, c, size) rows (c, d) of each part times its precision; 0 where a part has fewer."""
         size = self._precisions.shape[-1]
-        whole = np.zeros((len(rows), max((len(each) for each in rows), default=1), size))
+        whole = np.zeros((len(rows), max(len(each) for each in rows), size))
         for i, each in enumerate(rows):
             whole[i, : len(each), : each.shape[1]] = each
         weighted: F64 = whole @ self._precisions
         return weighted
 
     def fused(self, first: int, stop: int) -> Posterior:
-        """Parts ``first`` to before ``stop`` together. Raises ValueError where there is none."""
-        if stop <= first:
-            raise ValueError("there is no batch to fuse")
-        if stop - first == 1:
-            return self._parts[first]
+        """Parts ``first`` to before ``stop`` together."""
         some = slice(first, stop)
         size = int(self._sizes[some].max())
         precisions = self._precisions[some, :size, :size]

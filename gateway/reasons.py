@@ -151,7 +151,7 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.SENSOR_NOISY: Explanation(
             Cause.SENSORS,
-            "a sensor is more than twice as loud as in calibration, and its noise leaves no load that can be told",
+            "a sensor is more than twice as loud as in calibration, too loud to weigh by",
             "look for a loose mount, a bad supply or a changed filter or range in the device; or replace it",
         ),
         Why.LOAD_CHANGED: Explanation(

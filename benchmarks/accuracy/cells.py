@@ -1,9 +1,15 @@
-"""What stands in a cell of a study's table: a number, a share with its limits, what was refused."""
+"""A study's table in Markdown, and what stands in its cells: a number, a share with its limits, what was refused."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Its lines."""
+    head = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    return [*head, *("| " + " | ".join(cells) + " |" for cells in rows)]
 
 
 def rejected_cell(line: Mapping[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from benchmarks.accuracy.cells import number_cell, rejected_cell, score_cell, share_cell
+from benchmarks.accuracy.cells import number_cell, rejected_cell, score_cell, share_cell, table
 from benchmarks.accuracy.coverage_table import ALL_KINDS, roll_in_words
 from gateway.calibration.judgement.coverage import PROMISED
 
@@ -17,8 +17,6 @@ COLUMNS: Final = (
 
 def coverage_page(found: Mapping[str, Any]) -> str:
     """The page in Markdown, from CoverageTable.to_json."""
-    head = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
-    rows = ["| " + " | ".join(_cells(line)) + " |" for line in found["lines"]]
     refused = [f"- {text}" for text in found["refused"]]
     return "\n".join(
         [
@@ -29,8 +27,7 @@ def coverage_page(found: Mapping[str, Any]) -> str:
             "",
             _protocol(found),
             "",
-            *head,
-            *rows,
+            *table(COLUMNS, map(_cells, found["lines"])),
             "",
             *_verdicts(found),
             "",

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from benchmarks.accuracy.cells import number_cell, score_cell
+from benchmarks.accuracy.cells import number_cell, score_cell, table
 from benchmarks.accuracy.coverage_table import ALL_KINDS
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
 from gateway.records import Why
@@ -38,9 +38,7 @@ def disturbances_page(found: Mapping[str, Any]) -> str:
             "+- is the mean of half the 95 % intervals; the interval score is their width and 40 times what the truth "
             "lies outside, in brackets what it would be for normal errors and intervals of the right width.",
             "",
-            "| " + " | ".join(COLUMNS) + " |",
-            "|" + "---|" * len(COLUMNS),
-            *("| " + " | ".join(_cells(line)) + " |" for line in lines),
+            *table(COLUMNS, map(_cells, lines)),
             "",
             *_verdicts(lines),
             "",

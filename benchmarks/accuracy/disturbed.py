@@ -151,11 +151,15 @@ def _moved(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -> Ca
     return moved
 
 
-def _noisy(times: float) -> Callable[[Sensors], Sensors]:
+def noisier(accel: float = 1.0, gyro: float = 1.0) -> Callable[[Sensors], Sensors]:
+    """White noise of so many times the density."""
+
     def noisy(sensors: Sensors) -> Sensors:
         imu = sensors.imu
-        accel, gyro = (replace(one, noise_density=times * one.noise_density) for one in (imu.accel, imu.gyro))
-        return replace(sensors, imu=replace(imu, accel=accel, gyro=gyro))
+        louder = [
+            replace(one, noise_density=by * one.noise_density) for one, by in ((imu.accel, accel), (imu.gyro, gyro))
+        ]
+        return replace(sensors, imu=replace(imu, accel=louder[0], gyro=louder[1]))
 
     return noisy
 
@@ -196,7 +200,7 @@ DISTURBANCES: Final[Mapping[str, Disturbance]] = MappingProxyType(
             Disturbance("sensor moved 0.2 m back", sensors=_moved(back_m=0.2), reasons=_SENSOR_MOVED),
             Disturbance("sensor turned by 10 degrees", sensors=_moved(yaw_deg=10.0), reasons=_SENSOR_MOVED),
             Disturbance("a trailer is drawn", drawing_a_trailer, reasons=(Why.TRAILER,)),
-            Disturbance("sensor noise x 5", sensors=_noisy(5.0), reasons=(Why.SENSOR_NOISY,)),
+            Disturbance("sensor noise x 5", sensors=noisier(5.0, 5.0), reasons=(Why.SENSOR_NOISY,)),
             Disturbance("sampled at 50 Hz", sensors=_sampled_at(50.0), reasons=(Why.SAMPLE_RATE,)),
             Disturbance("no roll rate", has_roll_rate=False),
             Disturbance("load sideways", is_sideways=True),

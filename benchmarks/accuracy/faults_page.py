@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from benchmarks.accuracy.cells import table
+
 COLUMNS: Final = (
     "Fault", "Strength", "Batches", "Refused, and why", "Held", "Outside",
     "Payload outside by up to", "Share outside by up to",
@@ -34,9 +36,7 @@ def faults_page(found: Mapping[str, Any]) -> str:
             f"{len(wrong)} of {len(lines)} faults and strengths. The first line has no fault: such answers are among "
             "the 5 % that an interval of 95 % leaves out of each quantity.",
             "",
-            "| " + " | ".join(COLUMNS) + " |",
-            "|" + "---|" * len(COLUMNS),
-            *("| " + " | ".join(_cells(line)) + " |" for line in lines),
+            *table(COLUMNS, map(_cells, lines)),
             "",
         ]
     )

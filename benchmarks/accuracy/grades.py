@@ -15,6 +15,7 @@ from typing import Any, Final
 from benchmarks.accuracy.coverage_drives import AS_CALIBRATED, TRIPS, Scope, driven
 from benchmarks.accuracy.coverage_table import JudgedBatch, coverage_table, judged_batches
 from benchmarks.accuracy.disturbances import ESTIMATOR, WITHIN_PARTS, WITHIN_PLACES
+from benchmarks.accuracy.disturbed import noisier
 from benchmarks.accuracy.vans import OnVan, fresh_van, of_each_van
 from gateway.calibration.judgement import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on
@@ -25,23 +26,6 @@ from gateway.sim.vehicle import Load
 SEED: Final = 20_285
 N_VANS: Final = 3  # one of each type
 TIMES: Final = (2.0, 5.0, 10.0, 20.0)  # the reference unit's noise
-
-
-def noisier(accel: float = 1.0, gyro: float = 1.0) -> Callable[[Sensors], Sensors]:
-    """White noise of so many times the density."""
-
-    def other(sensors: Sensors) -> Sensors:
-        imu = sensors.imu
-        return replace(
-            sensors,
-            imu=replace(
-                imu,
-                accel=replace(imu.accel, noise_density=accel * imu.accel.noise_density),
-                gyro=replace(imu.gyro, noise_density=gyro * imu.gyro.noise_density),
-            ),
-        )
-
-    return other
 
 
 def _as_coarse_as_canmod(sensors: Sensors) -> Sensors:

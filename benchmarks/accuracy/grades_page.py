@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from benchmarks.accuracy.cells import number_cell, rejected_cell
+from benchmarks.accuracy.cells import number_cell, rejected_cell, table
 from benchmarks.accuracy.coverage_table import ALL_KINDS
 from benchmarks.accuracy.grades import AS_SIMULATED
 from gateway.units import STANDARD_GRAVITY_MPS2
@@ -48,9 +48,7 @@ def grades_page(found: Mapping[str, Any]) -> str:
             f"in five is refused besides; of either, {100 * HELD:.0f} % of the intervals hold. Half-widths do not rise "
             "step by step: with so few vans, how well one of them could be calibrated shows in the mean.",
             "",
-            "| " + " | ".join(COLUMNS) + " |",
-            "|" + "---|" * len(COLUMNS),
-            *("| " + " | ".join(_cells(found, one)) + " |" for one in found["grades"]),
+            *table(COLUMNS, (_cells(found, one) for one in found["grades"])),
             "",
             *[f"- No calibration: {text}" for text in found["refused"]],
             *([""] if found["refused"] else []),

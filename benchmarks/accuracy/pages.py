@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from benchmarks.accuracy.cells import table
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
 
 RUNG_COLUMNS: Final = (
@@ -89,8 +90,7 @@ def _rung_table(rungs: Sequence[Mapping[str, Any]]) -> list[str]:
         if rung["n_refused"] == rung["n_subsets"]
     ]
     ordered = sorted([*rows, *refused], key=lambda cells: (int(cells[0]), cells[1]))
-    head = ["| " + " | ".join(RUNG_COLUMNS) + " |", "|" + "---|" * len(RUNG_COLUMNS)]
-    return [*head, *("| " + " | ".join(cells) + " |" for cells in ordered)]
+    return table(RUNG_COLUMNS, ordered)
 
 
 def _cells(rung: Mapping[str, Any], where: str, spread: Mapping[str, Any]) -> list[str]:

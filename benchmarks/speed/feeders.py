@@ -54,7 +54,7 @@ class Taken:
     n: int = 0
 
 
-class Metadata(val_pb2_grpc.VALServicer):  # type: ignore[misc]
+class Metadata(val_pb2_grpc.VALServicer):  # type: ignore[misc]  # the stubs carry no types
     """Every path is known; those of the core specification are whole numbers."""
 
     def Get(self, request: Any, context: Any) -> Any:
@@ -69,7 +69,7 @@ class Metadata(val_pb2_grpc.VALServicer):  # type: ignore[misc]
         return val_pb2.GetServerInfoResponse(name="stand-in", version="0.0.0")
 
 
-class Databroker(v2_grpc.VALServicer):  # type: ignore[misc]
+class Databroker(v2_grpc.VALServicer):  # type: ignore[misc]  # the stubs carry no types
     """Every value is taken."""
 
     def __init__(self, taken: Taken) -> None:

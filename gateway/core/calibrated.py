@@ -13,6 +13,12 @@ RANGE_MARGIN = 0.25  # of the span seen in calibration, at either end
 RATE_MARGIN = 0.25  # of a sampling rate: devices of one setting differ by 1 %, settings by a factor of 2; chosen
 
 
+def is_other_rate(rate_hz: float, slowest_hz: float, fastest_hz: float) -> bool:
+    """Whether a device samples otherwise than at the rates from slowest to fastest; NaN tells nothing."""
+    margin = 1.0 + RATE_MARGIN
+    return rate_hz * margin < slowest_hz or rate_hz > fastest_hz * margin
+
+
 @dataclass(frozen=True, slots=True)
 class CalibratedVehicle:
     """One calibration file, ready for use. ``id`` is the hash of its content. ``is_shape_known``: what is weighed has
@@ -55,9 +61,7 @@ class CalibratedVehicle:
         """
         if self.sensor_rate_seen_hz is None:
             return False
-        slowest_hz, fastest_hz = self.sensor_rate_seen_hz
-        margin = 1.0 + RATE_MARGIN
-        return sensor_rate_hz * margin < slowest_hz or sensor_rate_hz > fastest_hz * margin
+        return is_other_rate(sensor_rate_hz, *self.sensor_rate_seen_hz)
 
     def is_out_of_range(self, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]) -> bool:
         """True where a 95 % interval lies wholly outside what calibration saw, plus a quarter of its span.

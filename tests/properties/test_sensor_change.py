@@ -4,27 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.half_car_road import CAR, VAN, batch_over_road, weighed
+from support.half_car_road import CAR, batch_over_road, calibrated_on_known_loads, weighed
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
-from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFTING, MOST_TENSION, tension_of
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.estimate import Estimate
 from gateway.records import Batch, Why
 
-KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
 LOAD = (200.0, 50.0)
 
 
 @pytest.fixture(scope="module")
 def calibration() -> CrossSpectrumCalibration:
-    runs = [
-        KnownRun(i, str(i), *load, tuple(batch_over_road(*load, seed=10 * i + k) for k in range(2)))
-        for i, load in enumerate(KNOWN)
-    ]
-    return calibrate_cross_spectrum(runs, VAN)
+    return calibrated_on_known_loads()
 
 
 def amplified(batch: Batch, gain: float) -> Batch:

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum import by_cross_spectrum
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
@@ -12,6 +14,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.records import F64, Batch
 
+KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))  # payload (kg), front share (%)
 RATE_HZ = 50.0
 VAN = Vehicle(
     name="van",
@@ -109,6 +112,15 @@ def batch_of(acceleration_mps2: F64, pitch_rate_radps: F64, speed_mps: F64) -> B
 
 def _in_time(spectrum: F64, n: int) -> F64:
     return np.fft.irfft(np.r_[0.0, spectrum], n)
+
+
+def calibrated_on_known_loads() -> CrossSpectrumCalibration:
+    """Two batches of each of four loads."""
+    runs = [
+        KnownRun(i, str(i), *load, tuple(batch_over_road(*load, seed=10 * i + k) for k in range(2)))
+        for i, load in enumerate(KNOWN)
+    ]
+    return calibrate_cross_spectrum(runs, VAN)
 
 
 def weighed(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:

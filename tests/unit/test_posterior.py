@@ -172,6 +172,7 @@ def test_fused_errors_against_monte_carlo() -> None:
 def test_fusion_needs_a_batch_and_leaves_one_alone() -> None:
     one = drawn(9)
     assert fused([one]) is one
+    assert fused([exactly(300.0)]) == exactly(300.0)  # whose own errors have no precision
     with pytest.raises(ValueError, match="no batch"):
         fused([])
 

@@ -4,10 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.half_car_road import RATE_HZ, VAN, batch_over_road, weighed
+from support.half_car_road import RATE_HZ, VAN, batch_over_road, calibrated_on_known_loads, weighed
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
-from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.floor import as_read, expected_floor, floor_of, noise_over, usual_floor
 from gateway.core.cross_spectrum.model.mount import Mount
@@ -15,7 +13,6 @@ from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.records import Batch, Why
 from gateway.service.pipeline import noise_fault
 
-KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
 LOAD = (200.0, 50.0)
 DENSITY = 8.7e-4  # rad/s/sqrt(Hz): a gyro of 0.05 deg/s/sqrt(Hz)
 READING = Reading(VAN.wheelbase_m, (1.1, 14.0), 256)
@@ -23,11 +20,7 @@ READING = Reading(VAN.wheelbase_m, (1.1, 14.0), 256)
 
 @pytest.fixture(scope="module")
 def calibration() -> CrossSpectrumCalibration:
-    runs = [
-        KnownRun(i, str(i), *load, tuple(batch_over_road(*load, seed=10 * i + k) for k in range(2)))
-        for i, load in enumerate(KNOWN)
-    ]
-    return calibrate_cross_spectrum(runs, VAN)
+    return calibrated_on_known_loads()
 
 
 def noisy(density: float, seed: int = 60) -> Batch:

@@ -25,9 +25,10 @@ def response_to(found: Weighed, calibration: CrossSpectrumCalibration, day: Mapp
     What is steady in the fit moves the load by minus its own slope; what drifts is fitted but for the part that its
     prior holds back.
     """
-    at = _at(found, calibration)
+    prior = _prior(found, calibration)
+    at = _at(found, calibration, prior)
     steady = at.steady[-2:] @ [day.get(PARAMETERS[i], 0.0) for i in STEADY]
-    drifting = _held_back(at, found, calibration) @ [day.get(PARAMETERS[i], 0.0) for i in DRIFTING]
+    drifting = _held_back(at, prior) @ [day.get(PARAMETERS[i], 0.0) for i in DRIFTING]
     response: F64 = -_OUTWARD @ (steady + drifting)
     return response
 
@@ -37,21 +38,25 @@ def day_covariance(found: Weighed, calibration: CrossSpectrumCalibration) -> F64
     stands in the batch's own covariance.
     """
     is_damper = np.array([name.startswith("damper_") for name in DRIFT_STD], dtype=float)
-    believed = np.linalg.inv(precision_of(found.spectra, calibration)) * np.outer(is_damper, is_damper)
-    held = _OUTWARD @ _held_back(_at(found, calibration), found, calibration)
+    prior = _prior(found, calibration)
+    believed = np.linalg.inv(prior.precision) * np.outer(is_damper, is_damper)
+    held = _OUTWARD @ _held_back(_at(found, calibration, prior), prior)
     columns = found.posterior.sources[Source.DAY]
     covariance: F64 = columns.T @ columns + held @ believed @ held.T
     return covariance
 
 
-def _at(found: Weighed, calibration: CrossSpectrumCalibration) -> Answer:
+def _prior(found: Weighed, calibration: CrossSpectrumCalibration) -> Packing:
+    return Packing(calibration.parameters[DRIFTING], precision_of(found.spectra, calibration))
+
+
+def _at(found: Weighed, calibration: CrossSpectrumCalibration, prior: Packing) -> Answer:
     point, ground = found.located.point, calibration.ground
     spectra = with_strokes(found.spectra.without_roll, calibration.parameters, point.load, ground)
-    prior = Packing(calibration.parameters[DRIFTING], precision_of(found.spectra, calibration))
     return answer_at(Whittle(spectra, ground), point, calibration, prior, EVIDENCE, is_shape_known=False)
 
 
-def _held_back(at: Answer, found: Weighed, calibration: CrossSpectrumCalibration) -> F64:
+def _held_back(at: Answer, prior: Packing) -> F64:
     """(2, k) of the load by the parameters that drift."""
-    held: F64 = at.covariance[-2:, : len(DRIFTING)] @ precision_of(found.spectra, calibration)
+    held: F64 = at.covariance[-2:, : len(DRIFTING)] @ prior.precision
     return held

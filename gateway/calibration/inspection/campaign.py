@@ -13,7 +13,7 @@ from gateway.calibration.inspection.log import SplitRun, same_drive_findings
 from gateway.calibration.inspection.roll_sign import RollSign, roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
-from gateway.core.calibrated import RATE_MARGIN
+from gateway.core.calibrated import is_other_rate
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 
@@ -141,7 +141,7 @@ def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Findin
     rates_hz = [float(np.median([b.sensor_rate_hz for b in batches])) for _, batches in runs]
     usual_mps, usual_mps2, usual_hz = (float(np.median(of_runs)) for of_runs in (speeds_mps, shaking_mps2, rates_hz))
     for (number, _), speed_mps, shakes_mps2, rate_hz in zip(runs, speeds_mps, shaking_mps2, rates_hz, strict=True):
-        if abs(np.log(rate_hz / usual_hz)) > np.log1p(RATE_MARGIN):
+        if is_other_rate(rate_hz, usual_hz, usual_hz):
             text = f"the sensors send {rate_hz:.3g} times a second, in the median run {usual_hz:.3g} times"
             yield number, finding_of(Kind.RATE_DIFFERS, Severity.FAULT, text)
         if abs(speed_mps / usual_mps - 1.0) > SPEED_DIFFERS_BY:

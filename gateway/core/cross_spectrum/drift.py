@@ -14,7 +14,7 @@ from scipy.special import gammaincinv
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
 
-HELD_STD: Final = 1e-3  # of what does not drift
+HELD_STD: Final = 1e-3  # of a parameter that the search holds fixed
 NOISE_STD: Final = 1.0
 """Of the logarithm of each sensor's own noise, where it is free: known loads are driven on roads too alike to tell it
 from slack, and on a smoother road the one stays while the other falls with the road (benchmarks/accuracy/trials.md).

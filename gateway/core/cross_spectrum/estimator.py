@@ -92,13 +92,13 @@ def weigh(batch: Batch, calibration: CrossSpectrumCalibration, prior: ShapePrior
     """The most probable load of a batch, however badly it fits, or why nothing could be held against the model."""
     spectra = cross_spectra_of([batch], calibration.reading)
     why = _unfit(batch, spectra, calibration) or _off_its_speeds(batch, calibration) or _unlike(batch, calibration)
-    if spectra is None:
+    if spectra is None or (why is not None and why not in _BY_NOISE):
         return why or Why.TOO_SHORT
     floor, expected = floor_of(batch), _expected_floor(spectra, calibration)
     noise = noise_over(floor, expected)
     is_noisy = bool(noise.any())
     if why is not None:
-        return Why.SENSOR_NOISY if is_noisy and why in _BY_NOISE else why
+        return Why.SENSOR_NOISY if is_noisy else why
     spectra = _with_noise(spectra, noise)
     unseen = _unseen(batch.mean_speed_mps, spectra.acceleration_rms_mps2, calibration)
     taken_out_s = float(calibration.parameters[INDEX["gyro_lag_s"]])
