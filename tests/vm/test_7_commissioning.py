@@ -1,6 +1,7 @@
 """Commissioned on the machine that weighs, inside its unit's walls, the plug pulled in the middle; frames recorded."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ ANSWERS = {
     "sensor_offset_left_m": 0.15,
 }
 WINDOW_S = 20.0
+TRIES = 3
 
 
 class Fitter:
@@ -48,6 +50,17 @@ def state(vehicle: Vehicle) -> dict[str, Any]:
     return vehicle.get(PATH)
 
 
+def drive_a_batch(vehicle: Vehicle, log: str) -> None:
+    """Drive one window until it counts: a stall of a busy host is a gap, which is rightly refused."""
+    n_wanted = state(vehicle)["underway"]["n_batches"] + 1
+    for _ in range(TRIES):
+        vehicle.play(log)
+        with suppress(TimeoutError):
+            vehicle.wait_for(lambda: state(vehicle)["underway"]["n_batches"] == n_wanted, timeout_s=60.0)
+            return
+    raise TimeoutError(f"{TRIES} drives made no batch: {state(vehicle)}")
+
+
 @pytest.fixture
 def fitter(vehicle: Vehicle) -> Fitter:
     """Of a service without a calibration that records."""
@@ -66,8 +79,7 @@ def test_commissioned_through_a_power_cut_it_weighs_by_what_it_made(
     fitter.say("/empty", {"is_empty": True})
     empty = vehicle.put_log(log_of(empty_drive(WINDOW_S + 4.0, 11), tmp_path / "empty.log"))
     vehicle.run("sync")
-    vehicle.play(empty)
-    vehicle.wait_for(lambda: state(vehicle)["underway"]["n_batches"] == 1)
+    drive_a_batch(vehicle, empty)
 
     vehicle.machine.cut_power()
     vehicle.machine.boot()
@@ -75,8 +87,7 @@ def test_commissioned_through_a_power_cut_it_weighs_by_what_it_made(
     kept = state(vehicle)["underway"]
     assert (kept["step"], kept["n_batches"], kept["note"]) == ("drive", 1, "in the yard")
 
-    vehicle.play(empty)
-    vehicle.wait_for(lambda: state(vehicle)["underway"]["n_batches"] == 2)
+    drive_a_batch(vehicle, empty)
     vehicle.wait_for(lambda: not state(vehicle)["underway"]["is_fitting"])
     fitter.say("/fit", {})
     fitted_s = vehicle.wait_for(lambda: state(vehicle)["active"] is not None)
