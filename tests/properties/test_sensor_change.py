@@ -8,7 +8,9 @@ from support.half_car_road import CAR, batch_over_road, calibrated_on_known_load
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFTING, MOST_TENSION, tension_of
+from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.model.parameters import INDEX
+from gateway.core.cross_spectrum.sensor_change import is_gyro_turned
 from gateway.estimate import Estimate
 from gateway.records import Batch, Why
 
@@ -73,6 +75,19 @@ def test_what_does_not_come_through_the_springs_is_told_as_noise(calibration: Cr
     estimate = weighed(mixed, calibration)
     assert estimate.rejected == (Why.SENSOR_CHANGED,)
     assert estimate.diagnostics["sensor_noise_score"] > calibration.most_noise_score
+
+
+def test_noise_that_ends_where_the_vehicles_motion_does_is_roll_in_a_turned_gyro(
+    calibration: CrossSpectrumCalibration,
+) -> None:
+    theta = calibration.parameters.copy()
+    theta[INDEX["noise_pitch_rate_rad2ps"]] += np.log(4.0)
+    noisy, as_calibrated = Point(theta, 200.0, 0.5), Point(calibration.parameters, 200.0, 0.5)
+    quiet, gyro_loud, accelerometer_loud = np.ones(2), np.array([1.0, 2.0]), np.array([2.0, 1.0])
+    assert is_gyro_turned(noisy, calibration, quiet)
+    assert is_gyro_turned(noisy, calibration, accelerometer_loud)
+    assert not is_gyro_turned(noisy, calibration, gyro_loud)
+    assert not is_gyro_turned(as_calibrated, calibration, quiet)
 
 
 def test_gravity_that_reads_otherwise_is_told(calibration: CrossSpectrumCalibration) -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.sideways_drives import VEHICLE, driven, known_drives
+from support.sideways_drives import SENSORS, VEHICLE, driven, known_drives
 
 from benchmarks.accuracy.coverage_drives import without_roll_rate
 from gateway.calibration.half_car import calibrate_cross_spectrum
@@ -126,3 +126,29 @@ def test_a_roll_rate_that_is_lost_for_a_moment_is_still_used(
     found = weighed(briefly, rolling)
     assert holds(found.payload, SIDES[0][0])
     assert holds(found.cg_left, cg_left_m(VEHICLE, SIDES[0][0], SIDES[0][2]))
+
+
+@pytest.mark.parametrize("turned_deg", [-10.0, 10.0])
+def test_roll_that_leaks_into_a_turned_gyro_is_no_noise(
+    turned_deg: float, sideways: dict[tuple[float, float, float], KnownRun], rolling: CrossSpectrumCalibration
+) -> None:
+    """The noise of a batch is free: without a watch on it, it would hide the roll."""
+    batch, by = sideways[SIDES[0]].batches[0], np.deg2rad(turned_deg)
+    assert batch.roll_rate_radps is not None
+    turned = replace(
+        batch,
+        pitch_rate_radps=np.cos(by) * batch.pitch_rate_radps - np.sin(by) * batch.roll_rate_radps,
+        roll_rate_radps=np.cos(by) * batch.roll_rate_radps + np.sin(by) * batch.pitch_rate_radps,
+    )
+    assert weighed(turned, rolling).rejected == (Why.SENSOR_CHANGED,)
+
+
+def test_a_gyro_that_is_noisy_is_not_taken_for_a_turned_one(
+    sideways: dict[tuple[float, float, float], KnownRun], rolling: CrossSpectrumCalibration
+) -> None:
+    batch = sideways[SIDES[0]].batches[0]
+    noise = 5.0 * SENSORS.imu.gyro.noise_density * (batch.rate_hz / 2.0) ** 0.5
+    rng = np.random.default_rng(7)
+    noisy = replace(batch, pitch_rate_radps=batch.pitch_rate_radps + rng.normal(0.0, noise, len(batch.speed_mps)))
+    found = weighed(noisy, rolling)
+    assert found.rejected in ((), (Why.SENSOR_NOISY,))

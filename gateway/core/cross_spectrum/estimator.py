@@ -24,7 +24,7 @@ from gateway.core.cross_spectrum.located import Located, locate
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.core.cross_spectrum.reach import beyond
-from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_of
+from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_of, is_gyro_turned
 from gateway.estimate import Estimate
 from gateway.posterior import PAYLOAD, Posterior, Source
 from gateway.records import F64, Batch, Why
@@ -266,7 +266,9 @@ def _disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why |
         return Why.WRONG_SIGN
     if not located.misfit <= calibration.misfit_limit:
         return Why.MODEL_MISFIT
-    is_moved = located.sideways is not None and located.sideways.is_mount_changed
+    is_moved = located.sideways is not None and (
+        located.sideways.is_mount_changed or is_gyro_turned(located.point, calibration, found.loudness)
+    )
     if is_moved or located.scores.is_changed(calibration):
         as_known = beyond(located.as_known, calibration.known_loads, calibration.empty_mass_kg)
         return Why.SENSOR_CHANGED if is_moved or min(found.reach, as_known) == 0.0 else Why.MODEL_MISFIT

@@ -38,6 +38,15 @@ OFFSET_PER_K_MPS2: Final = 0.01  # 1 mg (likewise)
 GAIN_STD: Final = TEMPERATURE_STD_K * GAIN_PER_K * 2.0**0.5
 """Of the logarithm of the ratio of both sensors' gains."""
 
+MOST_GYRO_NOISE: Final = float(np.log(3.0))
+"""By how much the pitch rate's own noise may lie above the calibrated (logarithm of its power) where the floor above
+the vehicle's frequencies is as quiet as ever. Recorded drives of four vans stay below 0.8; a gyro turned by 6 degrees
+shows 1.0 to 2.8, for the roll that leaks into it ends where the vehicle's motion does. Chosen.
+"""
+QUIET: Final = (
+    2.0**0.5
+)  # amplitude over what is expected at most, from which a floor shows that the gyro itself has become noisier
+
 STEP: Final = 1e-3
 
 
@@ -51,6 +60,16 @@ class SensorScores:
     def is_changed(self, calibration: CrossSpectrumCalibration) -> bool:
         """True where chance, and the errors that the half-car showed in calibration, do not explain them."""
         return abs(self.position) > calibration.most_position_score or self.noise > calibration.most_noise_score
+
+
+def is_gyro_turned(point: Point, calibration: CrossSpectrumCalibration, loudness: F64) -> bool:
+    """True where the pitch rate holds noise within the vehicle's frequencies alone: roll must leak into it.
+
+    ``point`` is the answer, ``loudness`` (p,) how loud each sensor is above these frequencies. Without a roll rate the
+    noise is held where calibration has it, and this is never so.
+    """
+    found = (point.theta - calibration.parameters)[INDEX["noise_pitch_rate_rad2ps"]]
+    return bool(found > MOST_GYRO_NOISE) and not np.any(loudness[1:2] > QUIET)
 
 
 def scores_of(
