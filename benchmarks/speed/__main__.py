@@ -44,6 +44,7 @@ QUICK: Final = {
     "web": "3",
     "archive": "2",
 }
+MOST_LOAD: Final = 1.0  # load average over the last minute
 PACKAGES: Final = ("numpy", "python-can", "cantools", "hilspy", "asammdf", "can_decoder", "polars", "isal")
 
 
@@ -104,6 +105,11 @@ def main() -> None:
     chosen = options.only.split(",")
     if unknown := set(chosen) - set(PARTS):
         parser.error(f"--only {','.join(unknown)}: there are {', '.join(PARTS)}")
+    if options.output and (load := os.getloadavg()[0]) > MOST_LOAD:
+        raise SystemExit(
+            f"nothing is written: the load average is {load:.1f}, and figures of a busy machine say little. Wait until "
+            f"it is below {MOST_LOAD:g}, or leave --output out."
+        )
     before = json.loads(options.output.read_text()) if options.output and options.output.is_file() else {}
     found: dict[str, Any] = {}
     for found in measure(chosen, quick=options.quick):  # kept as far as it has come: a part may fail
