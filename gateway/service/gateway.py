@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from gateway.bus.live import OpenReceiver, around_of
+from gateway.bus.live import OpenReceiver, SourceState, around_of
 from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
@@ -53,6 +53,8 @@ from gateway.web import (
 
 SUPERVISE_S = 0.25  # how soon a dead part is seen
 LOOK_S = 1.0  # how often the whole status is looked at
+ASLEEP_SUPERVISE_S = 2.0  # likewise while the bus is silent: a parked vehicle's battery pays for every look
+ASLEEP_LOOK_S = 5.0
 BUS_WITHIN_S = 2.0  # of a stop
 PIPELINE_WITHIN_S = 10.0  # a full inbox holds several windows
 FLUSH_WITHIN_S = 8.0  # likewise the disk
@@ -245,7 +247,7 @@ class Gateway:
         except Exception as failure:  # noqa: BLE001 - whatever ends the watching, what was accepted reaches the disk
             self._failure = f"the supervisor died: {failure!r}"
         await in_own_thread(self._stop_parts)
-        self._server.should_exit = True
+        self._server.end()
         await serving
         self._notifier.close()
 
@@ -281,12 +283,13 @@ class Gateway:
             if self.pipeline.progress != seen:
                 seen = self.pipeline.progress
                 self._notifier.send(WATCHDOG="1")
-            look.go_on()
+            is_asleep = is_ready and self.source.state is SourceState.BUS_SILENT
+            look.go_on(ASLEEP_LOOK_S if is_asleep else LOOK_S)
             if self.commissioning.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
                 self.is_to_start_anew = True
                 self.request_stop()
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._stopping.wait(), SUPERVISE_S)
+                await asyncio.wait_for(self._stopping.wait(), ASLEEP_SUPERVISE_S if is_asleep else SUPERVISE_S)
 
     def look(self, log_state: StateLog) -> None:
         """What is to be done with the service as it is now; in a thread, for it may wait for a lock or a disk."""
@@ -335,21 +338,21 @@ class Gateway:
 
 
 class Look:
-    """Looks at the service again and again, in a thread; the next look waits for the one before and a second."""
+    """Looks at the service again and again, in a thread; the next look waits for the one before, and a while."""
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
         self._log_state = StateLog(gateway.board)
         self._task: asyncio.Task[None] | None = None
-        self._begun_s = -LOOK_S
+        self._begun_s = -ASLEEP_LOOK_S
 
-    def go_on(self) -> None:
-        """Begin the next look where it is due. Raises what the last one raised."""
+    def go_on(self, every_s: float) -> None:
+        """Begin the next look where ``every_s`` are over. Raises what the last one raised."""
         if self._task is not None and self._task.done():
             task, self._task = self._task, None
             task.result()
         now_s = time.monotonic()
-        if self._task is None and now_s - self._begun_s >= LOOK_S:
+        if self._task is None and now_s - self._begun_s >= every_s:
             self._begun_s = now_s
             self._task = asyncio.create_task(in_own_thread(lambda: self._gateway.look(self._log_state)))
 

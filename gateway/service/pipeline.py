@@ -23,7 +23,8 @@ from gateway.service.watching import SignalWatch, StandingWatch
 from gateway.store import Store
 from gateway.web import Board, boot_clock_s
 
-DRAIN_S = 0.5  # longest wait for frames: the inbox wakes the pipeline as soon as there are any
+DRAIN_S = 0.5  # longest wait for frames, which end it at once: how soon a drive's end is seen
+ASLEEP_DRAIN_S = 2.0  # likewise while no drive is under way
 ROLL_RATE_KNOWN_SHARE: Final = 0.9  # of a batch's usable samples; with fewer the sensor is at fault
 ROLL_RATE_LOST: Final = (
     "the roll rate is known in only {:.0%} of the last batch (silent, stuck, at the end of its range or too slow): "
@@ -101,7 +102,7 @@ class Pipeline:
         _name_this_thread("pipeline")
         try:
             while not self._stop.is_set():
-                self._turn(DRAIN_S)
+                self._turn(ASLEEP_DRAIN_S if self.flow.scheduler.drive_start_ns is None else DRAIN_S)
             while self._turn(0.0):
                 pass
             self._hand_over(self.flow.flush())

@@ -71,8 +71,24 @@ def test_a_connection_and_its_cycle_have_what_is_looked_at() -> None:
 def test_the_server_and_its_settings_have_what_is_looked_at() -> None:
     assert hasattr(uvicorn.Server, "capture_signals")
     assert WebServer.capture_signals is not uvicorn.Server.capture_signals
+    assert list(inspect.signature(uvicorn.Server.on_tick).parameters) == ["self", "counter"]
+    assert "self.on_tick(" in inspect.getsource(uvicorn.Server.main_loop)
     assert {"is_ssl", "get_loop_factory"} <= set(dir(uvicorn.Config))
     assert "self.ssl" in inspect.getsource(uvicorn.Config.load)
     assert TlsConfig.load is not uvicorn.Config.load
     server = uvicorn.Server(uvicorn.Config(lambda: None))  # type: ignore[arg-type,return-value]
     assert (server.started, server.should_exit) == (False, False)
+
+
+def test_a_server_that_sleeps_ends_as_soon_as_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.service.web_server.TICK_S", 3600.0)
+
+    async def serve() -> None:
+        server = WebServer(uvicorn.Config(lambda: None))  # type: ignore[arg-type,return-value]
+        looping = asyncio.create_task(server.main_loop())
+        await asyncio.sleep(0)
+        assert not looping.done()
+        server.end()
+        await asyncio.wait_for(looping, 60.0)
+
+    asyncio.run(serve())

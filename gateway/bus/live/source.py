@@ -25,6 +25,7 @@ from gateway.bus.signals import SignalMap
 from gateway.log import Event, log_event
 
 POLL_S: Final = 0.3  # longest wait inside a receiver: how soon a stop is heeded
+ASLEEP_POLL_S: Final = 1.0  # likewise while the bus is silent; a frame ends the wait at once
 FIRST_PAUSE_S: Final = 0.25
 LONGEST_PAUSE_S: Final = 5.0
 START_WAIT_S: Final = 2.0
@@ -194,7 +195,7 @@ class LiveSource:
         is_bus_off = False
         try:
             while not self._stopping.is_set():
-                burst = receiver.receive(POLL_S)
+                burst = receiver.receive(ASLEEP_POLL_S if self._state is SourceState.BUS_SILENT else POLL_S)
                 self._count(burst)
                 is_bus_off = not len(burst.frames) and (is_bus_off or bool(burst.error_classes.get(BUS_OFF)))
                 if len(burst.frames):
