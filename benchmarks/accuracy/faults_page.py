@@ -1,6 +1,6 @@
 """The page of the sensor faults: what `python -m benchmarks.accuracy faults` found, from its numbers alone."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from benchmarks.accuracy.cells import table
@@ -9,6 +9,7 @@ COLUMNS: Final = (
     "Fault", "Strength", "Batches", "Refused, and why", "Held", "Outside",
     "Payload outside by up to", "Share outside by up to",
 )  # fmt: skip
+LEAST_SAFE: Final = 0.9
 
 
 def faults_page(found: Mapping[str, Any]) -> str:
@@ -16,6 +17,7 @@ def faults_page(found: Mapping[str, Any]) -> str:
     lines = found["lines"]
     total = {name: sum(line[name] for line in lines) for name in ("n_batches", "n_refused", "n_held")}
     wrong = [line for line in lines if _n_outside(line)]
+    unsafe = [line for line in lines if _n_outside(line) > (1.0 - LEAST_SAFE) * line["n_batches"]]
     return "\n".join(
         [
             "# Sensor faults",
@@ -35,11 +37,16 @@ def faults_page(found: Mapping[str, Any]) -> str:
             f"- Answered outside an interval: {total['n_batches'] - total['n_refused'] - total['n_held']}, under "
             f"{len(wrong)} of {len(lines)} faults and strengths. The first line has no fault: such answers are among "
             "the 5 % that an interval of 95 % leaves out of each quantity.",
+            f"- Refused or held in at least {LEAST_SAFE:.0%} of the batches: all but {_named(unsafe) or 'none'}.",
             "",
             *table(COLUMNS, map(_cells, lines)),
             "",
         ]
     )
+
+
+def _named(lines: Sequence[Mapping[str, Any]]) -> str:
+    return ", ".join(f"{line['fault']} {line['strength']}".strip() for line in lines)
 
 
 def _n_outside(line: Mapping[str, Any]) -> int:

@@ -202,7 +202,7 @@ def test_a_lag_without_a_fixed_point_refuses_the_batch(
     rolling: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert rolled(rolling).counted
-    monkeypatch.setattr(cross_spectrum, "MOST_LAG_CHANGE_S", -1.0)  # no change is small enough
+    monkeypatch.setattr(cross_spectrum, "MOST_LAG_LEFT_S", -1.0)  # no change is small enough
     assert rolled(rolling).rejected == (Why.NO_SOLUTION,)
 
 

@@ -118,6 +118,11 @@ def test_a_lag_between_the_sensors_costs_nothing(calibration: CrossSpectrumCalib
     assert lagging.front_share.number == pytest.approx(LOAD[1], abs=0.4)
 
 
+def test_a_gyro_that_is_far_too_late_is_told(calibration: CrossSpectrumCalibration) -> None:
+    late = weighed(batch_over_road(*LOAD, seed=66, car=replace(CAR, gyro_lag_s=0.05)), calibration)
+    assert late.rejected == (Why.SENSOR_CHANGED,)
+
+
 def test_tension_counts_the_vehicle_and_not_the_lag() -> None:
     off = np.zeros(len(DRIFTING))
     off[DRIFTING.index(INDEX["gyro_lag_s"])] = 0.02

@@ -24,7 +24,7 @@ from gateway.core.cross_spectrum.located import Located, locate
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.core.cross_spectrum.reach import beyond
-from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_of, is_gyro_turned
+from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_of, is_gyro_late, is_gyro_turned
 from gateway.estimate import Estimate
 from gateway.posterior import PAYLOAD, Posterior, Source
 from gateway.records import F64, Batch, Why
@@ -36,7 +36,7 @@ MOST_PAYLOAD_STD_SHARE: Final = 0.15  # of the empty mass; wider is no answer
 # chosen, both; `benchmarks.accuracy sensitivity` tells what hangs on them
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
 UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
-MOST_LAG_CHANGE_S: Final = 0.002  # beyond it, roll is taken out again, at the lag that was found
+MOST_LAG_LEFT_S: Final = 0.002  # beyond it, roll is taken out again, at the lag that was found
 MOST_LAGS: Final = 4  # tried; a lag that still moves has no fixed point
 _BY_NOISE: Final = (
     Why.SENSOR_DISAGREEMENT,
@@ -105,7 +105,7 @@ def weigh(batch: Batch, calibration: CrossSpectrumCalibration, prior: ShapePrior
     for _ in range(MOST_LAGS):
         located = locate(spectra, calibration, prior)
         lag_s = float(located.point.theta[INDEX["gyro_lag_s"]])
-        is_settled = located.sideways is None or abs(lag_s - taken_out_s) <= MOST_LAG_CHANGE_S
+        is_settled = located.sideways is None or abs(lag_s - taken_out_s) <= MOST_LAG_LEFT_S
         if is_settled:
             break
         again = cross_spectra_of([batch], calibration.reading.with_gyro_late_by(lag_s))
@@ -266,8 +266,10 @@ def _disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why |
         return Why.WRONG_SIGN
     if not located.misfit <= calibration.misfit_limit:
         return Why.MODEL_MISFIT
-    is_moved = located.sideways is not None and (
-        located.sideways.is_mount_changed or is_gyro_turned(located.point, calibration, found.loudness)
+    is_moved = (
+        (located.sideways is not None and located.sideways.is_mount_changed)
+        or is_gyro_turned(located.point, calibration, found.loudness)
+        or is_gyro_late(located.point, calibration)
     )
     if is_moved or located.scores.is_changed(calibration):
         as_known = beyond(located.as_known, calibration.known_loads, calibration.empty_mass_kg)

@@ -47,6 +47,11 @@ QUIET: Final = (
     2.0**0.5
 )  # amplitude over what is expected at most, from which a floor shows that the gyro itself has become noisier
 
+MOST_LAG_CHANGE_S: Final = 0.03
+"""By how much the gyro may come later or earlier than it was calibrated. A sensor that is 50 ms late can still be
+fitted, at the price of a noise that hides the load. Chosen.
+"""
+
 STEP: Final = 1e-3
 
 
@@ -70,6 +75,11 @@ def is_gyro_turned(point: Point, calibration: CrossSpectrumCalibration, loudness
     """
     found = (point.theta - calibration.parameters)[INDEX["noise_pitch_rate_rad2ps"]]
     return bool(found > MOST_GYRO_NOISE) and not np.any(loudness[1:2] > QUIET)
+
+
+def is_gyro_late(point: Point, calibration: CrossSpectrumCalibration) -> bool:
+    """True where the gyro lags, or leads, by more than a change of its filter explains. ``point`` is the answer."""
+    return bool(abs((point.theta - calibration.parameters)[INDEX["gyro_lag_s"]]) > MOST_LAG_CHANGE_S)
 
 
 def scores_of(
