@@ -23,7 +23,7 @@ from gateway.core.cross_spectrum.model.driven import Driven, SpectralModel
 from gateway.core.cross_spectrum.model.expected import expected_of_driven, tapered, with_noise, without_noise
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix, Whitener
 from gateway.core.cross_spectrum.model.parameters import Ground, has_roll
-from gateway.core.cross_spectrum.model.slopes import solved_at, spectral_slopes
+from gateway.core.cross_spectrum.model.slopes import is_of_vehicle, solved_at, spectral_slopes
 from gateway.core.vehicle import Load
 from gateway.records import F64
 
@@ -83,11 +83,12 @@ class Curvature:
         return float(self.gradient[entry] - along @ pull), float(information)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Whitened:
     """The model solved at a point, and L^-1 S L^-H for its M = L L^H, with what whitens other matrices alike.
 
-    The trace is (b, m); noiseless is M as sensors without noise would show it.
+    The trace is (b, m); noiseless is M as sensors without noise would show it. rows (b m p^2, k) are the slopes of the
+    residuals by the ``known`` entries, as far as they have been asked for.
     """
 
     point: Point
@@ -96,6 +97,8 @@ class _Whitened:
     noiseless: SpectralMatrix
     by: Whitener
     seen: SpectralMatrix
+    known: list[int]
+    rows: F64
 
     @property
     def trace(self) -> F64:
@@ -160,21 +163,34 @@ class Whittle:
 
     def _curvature(self, point: Point, free: Sequence[int]) -> Curvature:
         z = self._whitened(point)
-        solved = z.model, z.driven, z.noiseless
-        slopes = spectral_slopes(point.theta, point.loaded, self.ground, self.spectra, free, solved)
-        d = self._by_part(z) @ slopes
+        self._know(z, free)
         level, root_w, x = _centred(np.log(z.trace / self._p)), np.sqrt(self._level_weight), self._slope
         along, stiffness = np.sum(root_w**2 * x * level), np.sum(root_w**2 * x * x) + ROAD_SLOPE_STD**-2
-        d[:, :, -1] -= d[:, :, -1].mean(axis=1, keepdims=True)
-        d[:, :, -1] *= root_w[:, None]
-        d_along = np.tensordot(root_w * x, d[:, :, -1], 2)
         shape = _traceless(z.seen) * (-self._p / z.trace * np.sqrt(self._n))
         residual = np.stack([*shape, root_w * level], axis=-1)
-        rows = d.reshape(-1, len(free))
-        return Curvature(
-            gradient=residual.ravel() @ rows - along / stiffness * d_along,
-            information=rows.T @ rows - np.outer(d_along, d_along) / stiffness,
-        )
+        sloping = np.zeros_like(residual)
+        sloping[..., -1] = root_w * x
+        pull, d_along = np.stack([residual.ravel(), sloping.ravel()]) @ z.rows
+        information = z.rows.T @ z.rows - np.outer(d_along, d_along) / stiffness
+        asked = [z.known.index(entry) for entry in free]
+        return Curvature((pull - along / stiffness * d_along)[asked], information[np.ix_(asked, asked)])
+
+    def _know(self, z: _Whitened, free: Sequence[int]) -> None:
+        """Works out the rows of entries that nobody asked for here: an answer asks for every parameter where its search
+        asked for some.
+        """
+        n = len(z.point.theta)
+        missing = sorted(set(free).difference(z.known), key=lambda entry: (not is_of_vehicle(entry, n), entry))
+        if not missing:
+            return
+        solved = z.model, z.driven, z.noiseless
+        slopes = spectral_slopes(z.point.theta, z.point.loaded, self.ground, self.spectra, missing, solved)
+        d = self._by_part(z) @ slopes
+        d[:, :, -1] -= d[:, :, -1].mean(axis=1, keepdims=True)
+        d[:, :, -1] *= np.sqrt(self._level_weight)[:, None]
+        rows = d.reshape(-1, len(missing))
+        z.rows = np.concatenate([z.rows, rows], axis=1) if z.known else rows
+        z.known = z.known + missing
 
     def _by_part(self, z: _Whitened) -> F64:
         """(b, m, p^2, p^2) by how much the whitened matrix, its shape first and then minus the logarithm of its level,
@@ -192,7 +208,7 @@ class Whittle:
             model, driven = solved_at(point.theta, point.loaded, self.ground, self.spectra)
             noiseless = tapered(without_noise(driven, model), self.spectra)
             by = Whitener.of(with_noise(noiseless, model, self.spectra))
-            self._last = _Whitened(point, model, driven, noiseless, by, by(self._seen))
+            self._last = _Whitened(point, model, driven, noiseless, by, by(self._seen), [], np.empty((0, 0)))
         return self._last
 
     def _cost(self, by: Whitener, trace: F64) -> F64:

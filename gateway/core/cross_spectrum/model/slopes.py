@@ -1,7 +1,6 @@
 """How the expected spectral matrix changes with each parameter of the vehicle and with its load."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -46,7 +45,7 @@ def spectral_slopes(
     solved: tuple[SpectralModel, Driven, SpectralMatrix],
 ) -> F64:
     """Derivatives (b, m, p^2, k) of the expected spectra, as SpectralMatrix.parts has them, for the ``free`` entries of
-    theta (n,) and of the load.
+    theta (n,) and of the load: first those that are in the equations of motion (is_of_vehicle), then rising.
 
     ``load`` is payload in kg, front share (0..1) and, for a vehicle that rolls, the lateral place: entries n, n + 1 and
     n + 2. The chain rule goes from parameters to the numbers in the equations of motion by central differences, on to
@@ -55,26 +54,22 @@ def spectral_slopes(
     """
     model, by, noiseless = solved
     slopes = np.zeros((*by.phase.shape, spectra.n_sensors**2, len(free)))
-    rows = [row for row, entry in enumerate(free) if entry in VEHICLE_PARAMETERS or entry >= len(theta)]
-    if rows:
-        by_level = _by_level(theta, load, ground, [free[row] for row in rows], model.motion)
+    of_vehicle = [entry for entry in free if is_of_vehicle(entry, len(theta))]
+    if of_vehicle:
+        by_level = _by_level(theta, load, ground, of_vehicle, model.motion)
         moved = level_weights(spectra.log_movement) @ by_level
-        changed = _by_response(by, model) @ moved.reshape(*by.phase.shape, -1, len(rows))
-        for into, part in _runs(rows):
-            slopes[..., into] = changed[..., part]
+        moved = moved.reshape(*by.phase.shape, -1, len(of_vehicle))
+        np.matmul(_by_response(by, model), moved, out=slopes[..., : len(of_vehicle)])
     _fill_in_slack(slopes, free, by, model, spectra)
-    for row, entry in enumerate(free):
-        if entry in _OF_ROAD:
-            slopes[..., row] = _by_road(entry, by, model, spectra).parts
+    _fill_in_road(slopes, free, by, model, spectra)
     slopes = tapered_parts(slopes, spectra)
     _add_noise(slopes, noiseless, model, spectra, free)
     return slopes
 
 
-def _runs(rows: Sequence[int]) -> list[tuple[slice, slice]]:
-    """Unbroken stretches of rising ``rows``, and where these stand among them: numpy copies slices far faster."""
-    breaks = [0, *(i for i in range(1, len(rows)) if rows[i] != rows[i - 1] + 1), len(rows)]
-    return [(slice(rows[start], rows[end - 1] + 1), slice(start, end)) for start, end in pairwise(breaks)]
+def is_of_vehicle(entry: int, n: int) -> bool:
+    """Whether an entry of theta (n,) or, from n on, of the load is in the equations of motion."""
+    return entry in VEHICLE_PARAMETERS or entry >= n
 
 
 def solved_at(
@@ -147,15 +142,26 @@ def _fill_in_slack(slopes: F64, free: Sequence[int], by: Driven, model: Spectral
             own = own + by.twist * (power(by.paths[2][sensor]) + power(by.paths[3][sensor]))
         shares = slack_weights(spectra.freq_hz)[[free[row] - knots.start for row in rows]]
         changed = ((model.slack[sensor] - model.least_slack) * own)[..., None] * shares.T
-        for into, part in _runs(rows):
-            slopes[:, :, sensor, into] = changed[..., part]
+        slopes[:, :, sensor, rows[0] : rows[-1] + 1] = changed
 
 
-def _by_road(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
-    """Change of the matrix (p, b, m) with a parameter of how axles and tracks meet the road."""
-    if entry in (INDEX["tracks_apart_m"], INDEX["twist_level"]):
-        return _by_twist(entry, by, model, spectra)
-    return _by_phase(_phase_slope(entry, by, model, spectra), by)
+def _fill_in_road(slopes: F64, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra) -> None:
+    """By how axles and tracks meet the road.
+
+    Delays turn the rear axle's phase and tracks that lie apart shrink it, each entry by a real factor of its own.
+    """
+    rows = {entry: row for row, entry in enumerate(free) if entry in _OF_ROAD}
+    turns = {INDEX["delay_scale"]: spectra.delay_s, INDEX["rear_lag_s"]: np.ones(1)}
+    if not rows.keys().isdisjoint(turns):
+        turned = _by_phase(-2j * np.pi * spectra.freq_hz * by.phase, by).parts
+        for entry, delay_s in turns.items():
+            if entry in rows:
+                np.multiply(turned, delay_s[..., None], out=slopes[..., rows[entry]])
+    if INDEX["track_offset_m"] in rows:
+        x = along(model.track_offset_m, model, spectra)
+        slopes[..., rows[INDEX["track_offset_m"]]] = _by_phase(by.phase * (-x * k0(x) / k1(x)), by).parts
+    for entry in rows.keys() & {INDEX["tracks_apart_m"], INDEX["twist_level"]}:
+        slopes[..., rows[entry]] = _by_twist(entry, by, model, spectra).parts
 
 
 def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
@@ -170,16 +176,6 @@ def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectr
         x = along(model.tracks_apart_m, model, spectra)
         d_twist = model.twist_level[..., None, :] * 2.0 * x**2 * k0(x) / (1.0 + x * k1(x)) ** 2
     return SpectralMatrix(d_twist * against.auto, d_twist * against.cross)
-
-
-def _phase_slope(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> C128:
-    turn = -2j * np.pi * spectra.freq_hz * by.phase
-    if entry == INDEX["delay_scale"]:
-        return np.asarray(turn * spectra.delay_s, np.complex128)
-    if entry == INDEX["rear_lag_s"]:
-        return np.asarray(turn, np.complex128)
-    x = along(model.track_offset_m, model, spectra)
-    return np.asarray(by.phase * (-x * k0(x) / k1(x)), np.complex128)
 
 
 def _by_phase(d_phase: C128, by: Driven) -> SpectralMatrix:
