@@ -13,7 +13,7 @@ road is smooth: log s is a line in log f, known to within ROAD_RIPPLE, and nothi
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -97,8 +97,9 @@ class _Whitened:
     noiseless: SpectralMatrix
     by: Whitener
     seen: SpectralMatrix
-    known: list[int]
-    rows: F64
+    by_part: F64 | None = None
+    known: list[int] = field(default_factory=list)
+    rows: F64 | None = None
 
     @property
     def trace(self) -> F64:
@@ -117,7 +118,9 @@ class Whittle:
         self._n = spectra.n_segments * (EFFECTIVE_SHARE * weight)
         freq_hz = spectra.freq_hz[1:-1]
         self._level_weight = self._n / (1.0 / self._p + ROAD_RIPPLE**2 * float(np.sum(self._n)))
+        self._root_level_weight = np.sqrt(self._level_weight)
         self._slope = _centred(np.log(freq_hz))
+        self._level_stiffness = float(np.sum(self._level_weight * self._slope**2)) + ROAD_SLOPE_STD**-2
         self._last: _Whitened | None = None
         self._curvatures: dict[tuple[bytes, tuple[float, ...], tuple[int, ...]], Curvature] = {}
 
@@ -163,34 +166,35 @@ class Whittle:
 
     def _curvature(self, point: Point, free: Sequence[int]) -> Curvature:
         z = self._whitened(point)
-        self._know(z, free)
-        level, root_w, x = _centred(np.log(z.trace / self._p)), np.sqrt(self._level_weight), self._slope
-        along, stiffness = np.sum(root_w**2 * x * level), np.sum(root_w**2 * x * x) + ROAD_SLOPE_STD**-2
+        rows = self._rows(z, free)
+        level, x = self._root_level_weight * _centred(np.log(z.trace / self._p)), self._root_level_weight * self._slope
         shape = _traceless(z.seen) * (-self._p / z.trace * np.sqrt(self._n))
-        residual = np.stack([*shape, root_w * level], axis=-1)
-        sloping = np.zeros_like(residual)
-        sloping[..., -1] = root_w * x
-        pull, d_along = np.stack([residual.ravel(), sloping.ravel()]) @ z.rows
-        information = z.rows.T @ z.rows - np.outer(d_along, d_along) / stiffness
+        residual = np.stack([*shape, level], axis=-1)
+        along = float(np.sum(x * level)) / self._level_stiffness
+        residual[..., -1] -= along * x
+        d_along = np.tensordot(x, rows.reshape(*residual.shape, -1)[:, :, -1], 2)
+        information = rows.T @ rows - np.outer(d_along, d_along) / self._level_stiffness
         asked = [z.known.index(entry) for entry in free]
-        return Curvature((pull - along / stiffness * d_along)[asked], information[np.ix_(asked, asked)])
+        return Curvature((residual.ravel() @ rows)[asked], information[np.ix_(asked, asked)])
 
-    def _know(self, z: _Whitened, free: Sequence[int]) -> None:
-        """Works out the rows of entries that nobody asked for here: an answer asks for every parameter where its search
-        asked for some.
+    def _rows(self, z: _Whitened, free: Sequence[int]) -> F64:
+        """(b m p^2, k) of all that is known at a point, with those of ``free``: an answer asks for every parameter
+        where its search asked for some.
         """
         n = len(z.point.theta)
         missing = sorted(set(free).difference(z.known), key=lambda entry: (not is_of_vehicle(entry, n), entry))
-        if not missing:
-            return
-        solved = z.model, z.driven, z.noiseless
-        slopes = spectral_slopes(z.point.theta, z.point.loaded, self.ground, self.spectra, missing, solved)
-        d = self._by_part(z) @ slopes
-        d[:, :, -1] -= d[:, :, -1].mean(axis=1, keepdims=True)
-        d[:, :, -1] *= np.sqrt(self._level_weight)[:, None]
-        rows = d.reshape(-1, len(missing))
-        z.rows = np.concatenate([z.rows, rows], axis=1) if z.known else rows
-        z.known = z.known + missing
+        if missing:
+            z.by_part = self._by_part(z) if z.by_part is None else z.by_part
+            solved = z.model, z.driven, z.noiseless
+            slopes = spectral_slopes(z.point.theta, z.point.loaded, self.ground, self.spectra, missing, solved)
+            d = z.by_part @ slopes
+            d[:, :, -1] -= d[:, :, -1].mean(axis=1, keepdims=True)
+            d[:, :, -1] *= self._root_level_weight[:, None]
+            rows = d.reshape(-1, len(missing))
+            z.rows = rows if z.rows is None else np.concatenate([z.rows, rows], axis=1)
+            z.known += missing
+        assert z.rows is not None
+        return z.rows
 
     def _by_part(self, z: _Whitened) -> F64:
         """(b, m, p^2, p^2) by how much the whitened matrix, its shape first and then minus the logarithm of its level,
@@ -208,16 +212,16 @@ class Whittle:
             model, driven = solved_at(point.theta, point.loaded, self.ground, self.spectra)
             noiseless = tapered(without_noise(driven, model), self.spectra)
             by = Whitener.of(with_noise(noiseless, model, self.spectra))
-            self._last = _Whitened(point, model, driven, noiseless, by, by(self._seen), [], np.empty((0, 0)))
+            self._last = _Whitened(point, model, driven, noiseless, by, by(self._seen))
         return self._last
 
     def _cost(self, by: Whitener, trace: F64) -> F64:
         """(...) of whitened spectra of that trace (..., b, m): of their shape, and of the road's level."""
         shape = self._p * np.log(trace) + 2.0 * _sum(np.log(by.roots))
         level = _centred(np.log(trace / self._p))
-        w, x = self._level_weight, self._slope
-        along, stiffness = _over_all(w * x * level), np.sum(w * x * x) + ROAD_SLOPE_STD**-2
-        of_level = 0.5 * (_over_all(w * level**2) - along**2 / stiffness)
+        w = self._level_weight
+        along = _over_all(w * self._slope * level)
+        of_level = 0.5 * (_over_all(w * level**2) - along**2 / self._level_stiffness)
         return np.asarray(_over_all(self._n * shape) + of_level, np.float64)
 
 

@@ -61,7 +61,8 @@ def spectral_slopes(
         moved = moved.reshape(*by.phase.shape, -1, len(of_vehicle))
         np.matmul(_by_response(by, model), moved, out=slopes[..., : len(of_vehicle)])
     _fill_in_slack(slopes, free, by, model, spectra)
-    _fill_in_road(slopes, free, by, model, spectra)
+    if not _OF_ROAD.isdisjoint(free):
+        _fill_in_road(slopes, free, by, model, spectra)
     slopes = tapered_parts(slopes, spectra)
     _add_noise(slopes, noiseless, model, spectra, free)
     return slopes
@@ -151,17 +152,33 @@ def _fill_in_road(slopes: F64, free: Sequence[int], by: Driven, model: SpectralM
     Delays turn the rear axle's phase and tracks that lie apart shrink it, each entry by a real factor of its own.
     """
     rows = {entry: row for row, entry in enumerate(free) if entry in _OF_ROAD}
+    late = _late(by)
     turns = {INDEX["delay_scale"]: spectra.delay_s, INDEX["rear_lag_s"]: np.ones(1)}
     if not rows.keys().isdisjoint(turns):
-        turned = _by_phase(-2j * np.pi * spectra.freq_hz * by.phase, by).parts
+        turned = _with_conjugate(-2j * np.pi * spectra.freq_hz * late).parts
         for entry, delay_s in turns.items():
             if entry in rows:
-                np.multiply(turned, delay_s[..., None], out=slopes[..., rows[entry]])
+                slopes[..., rows[entry]] = turned * delay_s[..., None]
     if INDEX["track_offset_m"] in rows:
         x = along(model.track_offset_m, model, spectra)
-        slopes[..., rows[INDEX["track_offset_m"]]] = _by_phase(by.phase * (-x * k0(x) / k1(x)), by).parts
+        slopes[..., rows[INDEX["track_offset_m"]]] = _with_conjugate((-x * k0(x) / k1(x)) * late).parts
     for entry in rows.keys() & {INDEX["tracks_apart_m"], INDEX["twist_level"]}:
         slopes[..., rows[entry]] = _by_twist(entry, by, model, spectra).parts
+
+
+def _late(by: Driven) -> C128:
+    """(p, p, b, m) what the rear axle makes one sensor read, times the conjugate of what the front makes another."""
+    late: C128 = by.paths[1][:, None] * np.conj(by.paths[0])
+    if by.twist is not None:
+        late = late + by.twist * (by.paths[3][:, None] * np.conj(by.paths[2]))
+    return np.asarray(by.phase * late, np.complex128)
+
+
+def _with_conjugate(x: C128) -> SpectralMatrix:
+    """x (p, p, b, m) and its conjugate transpose together."""
+    p = len(x)
+    auto = 2.0 * np.real(x[range(p), range(p)])
+    return SpectralMatrix(auto, np.stack([x[i, j] + np.conj(x[j, i]) for i, j in PAIRS[: p * (p - 1) // 2]]))
 
 
 def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
@@ -178,23 +195,13 @@ def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectr
     return SpectralMatrix(d_twist * against.auto, d_twist * against.cross)
 
 
-def _by_phase(d_phase: C128, by: Driven) -> SpectralMatrix:
-    changed = SpectralMatrix.zeros(len(by.paths[0]), d_phase.shape)
-    shares: tuple[float | F64, ...] = (1.0,) if by.twist is None else (1.0, by.twist)
-    for front, rear, share in zip(by.paths[::2], by.paths[1::2], shares, strict=True):
-        changed.auto[:] += share * (2.0 * np.real(d_phase * rear * np.conj(front)))
-        for row, (i, j) in enumerate(changed.pairs):
-            turned = front[i] * np.conj(d_phase * rear[j]) + d_phase * rear[i] * np.conj(front[j])
-            changed.cross[row] += share * turned
-    return changed
-
-
 def _add_noise(
     slopes: F64, matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra, free: Sequence[int]
 ) -> None:
     """That of ``matrix`` (expected.noise) grows with the power of acceleration and of pitch rate."""
     sensed, scale = noise(model, matrix, spectra), noise_scale(matrix, spectra)
-    grown = 0.5 * sum(slopes[:, :, i].mean(axis=1) / matrix.auto[i].mean(axis=-1)[:, None] for i in (0, 1))
+    levels = matrix.auto[:2].mean(axis=-1).T
+    grown = 0.5 * (slopes[:, :, :2].mean(axis=1) / levels[..., None]).sum(axis=1)
     for sensor, one in enumerate(sensed):
         slopes[:, :, sensor] += one[:, :, None] * grown[:, None]
         for row, entry in enumerate(free):
