@@ -55,6 +55,20 @@ def test_the_gradient_is_the_slope_of_the_cost(usually: float, is_noisy: bool, s
     assert gradient[-1] == pytest.approx(by_share, rel=1e-3)
 
 
+def test_what_is_asked_in_two_steps_is_what_is_asked_at_once(spectra: CrossSpectra) -> None:
+    """A search asks for some parameters in its own order, and the answer at its end for all."""
+    point = Point(prior_of(VAN).mean, 150.0, 0.49)
+    n = len(PARAMETERS)
+    some, every = [n + 1, *range(20, 40, 3), 2, n], range(n + 2)
+    stepwise = Whittle(spectra, GROUND)
+    first, then = stepwise.curvature(point, some), stepwise.curvature(point, every)
+    at_once = Whittle(spectra, GROUND).curvature(point, every)
+    np.testing.assert_allclose(then.gradient, at_once.gradient, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(then.information, at_once.information, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(first.gradient, at_once.gradient[some], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(first.information, at_once.information[np.ix_(some, some)], rtol=1e-9, atol=1e-9)
+
+
 @settings(max_examples=20)
 @given(gain=st.floats(1e-3, 1e3))
 def test_the_roads_level_does_not_matter(gain: float, spectra: CrossSpectra) -> None:

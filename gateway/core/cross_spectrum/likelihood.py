@@ -19,11 +19,10 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.measured import CrossSpectra
-from gateway.core.cross_spectrum.model.driven import Driven, SpectralModel
-from gateway.core.cross_spectrum.model.expected import expected_of_driven, tapered, with_noise, without_noise
+from gateway.core.cross_spectrum.model.expected import expected_of_driven, with_noise
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix, Whitener
 from gateway.core.cross_spectrum.model.parameters import Ground, has_roll
-from gateway.core.cross_spectrum.model.slopes import is_of_vehicle, solved_at, spectral_slopes
+from gateway.core.cross_spectrum.model.slopes import Solved, solved_at, spectral_slopes
 from gateway.core.vehicle import Load
 from gateway.records import F64
 
@@ -87,14 +86,12 @@ class Curvature:
 class _Whitened:
     """The model solved at a point, and L^-1 S L^-H for its M = L L^H, with what whitens other matrices alike.
 
-    The trace is (b, m); noiseless is M as sensors without noise would show it. rows (b m p^2, k) are the slopes of the
+    The trace is (b, m). rows (b m p^2, k) are the slopes of the
     residuals by the ``known`` entries, as far as they have been asked for.
     """
 
     point: Point
-    model: SpectralModel
-    driven: Driven
-    noiseless: SpectralMatrix
+    solved: Solved
     by: Whitener
     seen: SpectralMatrix
     by_part: F64 | None = None
@@ -181,13 +178,10 @@ class Whittle:
         """(b m p^2, k) of all that is known at a point, with those of ``free``: an answer asks for every parameter
         where its search asked for some.
         """
-        n = len(z.point.theta)
-        missing = sorted(set(free).difference(z.known), key=lambda entry: (not is_of_vehicle(entry, n), entry))
+        missing = sorted(set(free).difference(z.known), key=lambda entry: (entry not in z.solved.moving, entry))
         if missing:
             z.by_part = self._by_part(z) if z.by_part is None else z.by_part
-            solved = z.model, z.driven, z.noiseless
-            slopes = spectral_slopes(z.point.theta, z.point.loaded, self.ground, self.spectra, missing, solved)
-            d = z.by_part @ slopes
+            d = z.by_part @ spectral_slopes(z.solved, self.spectra, missing)
             d[:, :, -1] -= d[:, :, -1].mean(axis=1, keepdims=True)
             d[:, :, -1] *= self._root_level_weight[:, None]
             rows = d.reshape(-1, len(missing))
@@ -209,10 +203,9 @@ class Whittle:
     def _whitened(self, point: Point) -> _Whitened:
         """Solved once for a point: a search asks for the cost and then for the slopes."""
         if self._last is None or not self._last.point.is_at(point):
-            model, driven = solved_at(point.theta, point.loaded, self.ground, self.spectra)
-            noiseless = tapered(without_noise(driven, model), self.spectra)
-            by = Whitener.of(with_noise(noiseless, model, self.spectra))
-            self._last = _Whitened(point, model, driven, noiseless, by, by(self._seen))
+            solved = Solved.at(point.theta, point.loaded, self.ground, self.spectra)
+            by = Whitener.of(with_noise(solved.noiseless, solved.model, self.spectra))
+            self._last = _Whitened(point, solved, by, by(self._seen))
         return self._last
 
     def _cost(self, by: Whitener, trace: F64) -> F64:

@@ -9,6 +9,7 @@ Three things make groups differ that carry the same load:
 """
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from scipy.special import k1
@@ -19,7 +20,9 @@ from gateway.core.cross_spectrum.model.half_car import half_car_numbers
 from gateway.core.cross_spectrum.model.motion import Frame, Motion, Numbers
 from gateway.core.cross_spectrum.model.parameters import (
     NOISES,
+    PARAMETERS,
     SLACK_KNOTS,
+    VEHICLE_PARAMETERS,
     Ground,
     half_car,
     has_roll,
@@ -32,6 +35,8 @@ from gateway.records import C128, F64
 
 Paths = tuple[C128, ...]
 """Responses (p, ..., m) of p sensors by front and rear axle, both tracks alike; then one against the other."""
+
+IMAGINARY_STEP: Final = 1e-30  # its square is nothing beside any number here
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,16 +78,17 @@ def spectral_model(
     ground: Ground,
     freq_hz: F64,
     n_sensors: int = 2,
+    numbers: Numbers | None = None,
 ) -> SpectralModel:
     """Solve for parameter vectors theta (..., n) and loads at freq_hz (m,), for the first ``n_sensors`` sensors.
 
     ``load`` is payload in kg, front share (0..1) and, for a vehicle that rolls, the centre of gravity's place left of
-    the centre line in m, each (...,).
+    the centre line in m, each (...,). ``numbers`` is what numbers_of makes of them, where it is known already.
     """
     with_roll = has_roll(theta)
     frame = Frame(ground.wheelbase_m, ground.half_track_m if with_roll else None)
     return SpectralModel(
-        motion=Motion(numbers_of(theta, load, ground), frame, freq_hz, n_sensors),
+        motion=Motion(numbers_of(theta, load, ground) if numbers is None else numbers, frame, freq_hz, n_sensors),
         slack=ground.least_slack + np.stack([_slack(theta, knots, freq_hz) for knots in SLACK_KNOTS[:n_sensors]]),
         least_slack=ground.least_slack,
         noise=np.stack([value_of(theta, name) for name in NOISES[:n_sensors]]),
@@ -104,6 +110,28 @@ def numbers_of(theta: F64, load: tuple[F64 | float, ...], ground: Ground) -> Num
     car = rolling_car(still, ground)
     acting = replace(car, half_car=at_levels(car.half_car, theta))
     return rolling_numbers(acting, SidewaysLoad(payload_kg, front_share, cg_left_m[0]))
+
+
+def entries_in_motion(n: int) -> list[int]:
+    """Which entries of theta (n,) are in the equations of motion, and from n on those of the load."""
+    n_load = 3 if n > len(PARAMETERS) else 2
+    return [*(entry for entry in range(n) if entry in VEHICLE_PARAMETERS), *range(n, n + n_load)]
+
+
+def numbers_about(theta: F64, load: tuple[float, ...], ground: Ground) -> tuple[Numbers, F64]:
+    """numbers_of one vehicle theta (n,) with its load, and by how much they move (5, q, k) with each entry that is in
+    the equations of motion.
+
+    A small step along the imaginary axis moves the imaginary part by the step times the slope and leaves the real part
+    as it was (W. Squire, G. Trapp, SIAM Rev. 40, 1998): one evaluation gives both, and no difference is taken.
+    """
+    n = len(theta)
+    entries = entries_in_motion(n)
+    stepped = np.repeat(np.r_[theta, load][None].astype(complex), len(entries), axis=0)
+    stepped[range(len(entries)), entries] += 1j * IMAGINARY_STEP
+    numbers = numbers_of(stepped[:, :n], tuple(stepped[:, n:].T), ground).all[..., 0]
+    slopes = np.imag(numbers) / IMAGINARY_STEP
+    return Numbers(np.real(numbers[:, 0, :, None])), np.ascontiguousarray(slopes.transpose(2, 0, 1))
 
 
 def driven(model: SpectralModel, spectra: CrossSpectra) -> Driven:

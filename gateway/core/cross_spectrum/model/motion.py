@@ -51,7 +51,8 @@ class Numbers:
         Each a number or (..., 1); they broadcast.
         """
         flat = [one for group in groups for one in group]
-        every = np.empty((len(flat), *(np.broadcast_shapes(*{np.shape(one) for one in flat}) or (1,))))
+        shape = np.broadcast_shapes(*{np.shape(one) for one in flat}) or (1,)
+        every = np.empty((len(flat), *shape), np.result_type(*flat))
         for row, one in zip(every, flat, strict=True):
             row[...] = one
         return cls(every)

@@ -1,6 +1,7 @@
 """How the expected spectral matrix changes with each parameter of the vehicle and with its load."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -12,10 +13,11 @@ from gateway.core.cross_spectrum.model.driven import (
     SpectralModel,
     along,
     driven,
-    numbers_of,
+    entries_in_motion,
+    numbers_about,
     spectral_model,
 )
-from gateway.core.cross_spectrum.model.expected import noise, noise_scale, power, tapered_parts, without_noise
+from gateway.core.cross_spectrum.model.expected import noise, noise_scale, power, tapered, tapered_parts, without_noise
 from gateway.core.cross_spectrum.model.friction import level_weights
 from gateway.core.cross_spectrum.model.matrix import PAIRS, SpectralMatrix
 from gateway.core.cross_spectrum.model.motion import Motion
@@ -23,40 +25,53 @@ from gateway.core.cross_spectrum.model.parameters import (
     INDEX,
     NOISES,
     SLACK_KNOTS,
-    VEHICLE_PARAMETERS,
     Ground,
     slack_weights,
 )
 from gateway.records import C128, F64
 
-STEP: Final = 1e-5
 _OF_ROAD: Final = frozenset(
     INDEX[name] for name in ("delay_scale", "rear_lag_s", "track_offset_m", "tracks_apart_m", "twist_level")
 )
-LOAD_STEPS: Final = (0.1, STEP, STEP)  # payload in kg, front share, lateral place of the centre of gravity in m
 
 
-def spectral_slopes(
-    theta: F64,
-    load: tuple[float, ...],
-    ground: Ground,
-    spectra: CrossSpectra,
-    free: Sequence[int],
-    solved: tuple[SpectralModel, Driven, SpectralMatrix],
-) -> F64:
-    """Derivatives (b, m, p^2, k) of the expected spectra, as SpectralMatrix.parts has them, for the ``free`` entries of
-    theta (n,) and of the load: first those that are in the equations of motion (is_of_vehicle), then rising.
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """A vehicle with its load, theta (n,): its model, how spectra's groups drive it, and what sensors without noise
+    would show of it.
 
-    ``load`` is payload in kg, front share (0..1) and, for a vehicle that rolls, the lateral place: entries n, n + 1 and
-    n + 2. The chain rule goes from parameters to the numbers in the equations of motion by central differences, on to
-    the responses and to the spectra by closed forms; the others are closed forms throughout. All of it is real matrix
-    products. ``solved`` is the model at this very point, and what sensors without noise would show of it.
+    by_entry (5, q, k) is by how much the numbers in its equations of motion move with each of the ``moving`` entries.
     """
-    model, by, noiseless = solved
+
+    model: SpectralModel
+    driven: Driven
+    noiseless: SpectralMatrix
+    by_entry: F64
+    moving: list[int]
+
+    @classmethod
+    def at(cls, theta: F64, load: tuple[float, ...], ground: Ground, spectra: CrossSpectra) -> "Solved":
+        """``load`` is payload in kg, front share (0..1) and, for a vehicle that rolls, the lateral place: entries n,
+        n + 1 and n + 2.
+        """
+        numbers, by_entry = numbers_about(theta, load, ground)
+        model = spectral_model(theta, load, ground, spectra.freq_hz, spectra.n_sensors, numbers)
+        by = driven(model, spectra)
+        return cls(model, by, tapered(without_noise(by, model), spectra), by_entry, entries_in_motion(len(theta)))
+
+
+def spectral_slopes(solved: Solved, spectra: CrossSpectra, free: Sequence[int]) -> F64:
+    """Derivatives (b, m, p^2, k) of the expected spectra, as SpectralMatrix.parts has them, for the ``free`` entries of
+    theta (n,) and of the load: first those that are in the equations of motion, then rising.
+
+    The chain rule goes from parameters to the numbers in the equations of motion, on to the responses and to the
+    spectra, by closed forms. All of it is real matrix products.
+    """
+    model, by = solved.model, solved.driven
     slopes = np.zeros((*by.phase.shape, spectra.n_sensors**2, len(free)))
-    of_vehicle = [entry for entry in free if is_of_vehicle(entry, len(theta))]
+    of_vehicle = [solved.moving.index(entry) for entry in free if entry in solved.moving]
     if of_vehicle:
-        by_level = _by_level(theta, load, ground, of_vehicle, model.motion)
+        by_level = _by_level(solved.by_entry[..., of_vehicle], model.motion)
         moved = level_weights(spectra.log_movement) @ by_level
         moved = moved.reshape(*by.phase.shape, -1, len(of_vehicle))
         np.matmul(_by_response(by, model), moved, out=slopes[..., : len(of_vehicle)])
@@ -64,13 +79,8 @@ def spectral_slopes(
     if not _OF_ROAD.isdisjoint(free):
         _fill_in_road(slopes, free, by, model, spectra)
     slopes = tapered_parts(slopes, spectra)
-    _add_noise(slopes, noiseless, model, spectra, free)
+    _add_noise(slopes, solved.noiseless, model, spectra, free)
     return slopes
-
-
-def is_of_vehicle(entry: int, n: int) -> bool:
-    """Whether an entry of theta (n,) or, from n on, of the load is in the equations of motion."""
-    return entry in VEHICLE_PARAMETERS or entry >= n
 
 
 def solved_at(
@@ -81,30 +91,14 @@ def solved_at(
     return model, driven(model, spectra)
 
 
-def _by_level(theta: F64, load: tuple[float, ...], ground: Ground, free: Sequence[int], motion: Motion) -> F64:
-    """Changes (5, m 2 p s k) of the responses at each of friction.levels() with ``free`` entries of the vehicle and its
-    load: by frequency, sensor, way, real or imaginary part, entry.
-
-    Central differences say how these move the numbers in the equations of motion, closed forms how the numbers move
-    the responses.
+def _by_level(by_entry: F64, motion: Motion) -> F64:
+    """Changes (5, m 2 p s k) of the responses at each of friction.levels(): by frequency, sensor, way, real or
+    imaginary part, entry. ``by_entry`` (5, q, k) is by how much entries move the numbers in the equations of motion.
     """
-    k = len(free)
-    thetas = np.repeat(theta[None], 2 * k, axis=0)
-    loads = [np.full(2 * k, one, float) for one in load]
-    step = np.full(k, STEP)
-    for row, entry in enumerate(free):
-        if entry < len(theta):
-            thetas[2 * row : 2 * row + 2, entry] += (STEP, -STEP)
-        else:
-            step[row] = LOAD_STEPS[entry - len(theta)]
-            loads[entry - len(theta)][2 * row : 2 * row + 2] += (step[row], -step[row])
-    numbers = numbers_of(thetas, tuple(loads), ground).all[..., 0]
-    by_entry = (numbers[:, ::2] - numbers[:, 1::2]) * (0.5 / step[:, None])
-    moving = np.flatnonzero(by_entry.any(axis=(1, 2)))
-    by_entry = np.ascontiguousarray(by_entry[moving].transpose(2, 0, 1))  # or BLAS cannot multiply it
+    moving = np.flatnonzero(by_entry.any(axis=(0, 2)))
     slopes = np.ascontiguousarray(motion.slopes(moving.tolist()).transpose(0, 1, 4, 2, 3))
     by_number = slopes.view(float).reshape(len(slopes), len(moving), -1)
-    by_level: F64 = by_number.transpose(0, 2, 1) @ by_entry
+    by_level: F64 = by_number.transpose(0, 2, 1) @ by_entry[:, moving]
     return by_level.reshape(len(slopes), -1)
 
 
