@@ -46,6 +46,8 @@ MEANINGS: Final = {
     Signal.SPEED: "needed; over ground, from GNSS",
     Signal.ROLL_RATE: "about x, positive **left side up**; tells where the load lies sideways, never refuses a batch",
     Signal.LONGITUDINAL_ACCELERATION: "x forward; inspection names swapped axes with it",
+    Signal.LATERAL_ACCELERATION: "y left; with `yaw_rate` and `roll_rate` it watches the gyro's gain in bends",
+    Signal.YAW_RATE: "about z, positive **nose left**; likewise",
     Signal.WHEEL_SPEED: "stands in for `speed` where that is missing",
     Signal.IGNITION: "of the journey; 1 while it is on",
     Signal.AMBIENT_TEMPERATURE: "decoded and counted, nothing uses it yet",
@@ -234,6 +236,9 @@ DIAGNOSTICS: Final = {
     "2 on its noise is reckoned with",
     "noise_pitch_rate_ratio": "likewise of the pitch rate",
     "noise_roll_rate_ratio": "likewise of the roll rate",
+    "gyro_gain_ratio": "the gyro's gain over that in calibration, as bends tell it; refused beyond 3.5 standard "
+    "deviations of 1",
+    "gyro_gain_ratio_std": "its standard deviation",
     "payload_gyration_m2": "squared radius of gyration in pitch of the load, as the fit began with it",
     "payload_mode_hz": "frequency at which the payload rings on its floor",
     "payload_damping_ratio": "how much its floor or mount damps that, of critical",

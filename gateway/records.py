@@ -38,6 +38,8 @@ class Signal(StrEnum):
     SPEED = "speed"
     ROLL_RATE = "roll_rate"
     LONGITUDINAL_ACCELERATION = "longitudinal_acceleration"
+    LATERAL_ACCELERATION = "lateral_acceleration"
+    YAW_RATE = "yaw_rate"
     WHEEL_SPEED = "wheel_speed"
     IGNITION = "ignition"
     AMBIENT_TEMPERATURE = "ambient_temperature"
@@ -223,6 +225,8 @@ class Batch:
     left side up) keeps its bias too; it is None where the signal map has none, and neither masks nor rejects.
     ``shares`` tells which part of the window each cause masked. ``rejected`` holds the reasons
     that no estimator can mend. ``sensor_rate_hz`` is how often the slower of accelerometer and gyro sends.
+    ``gyro_gain`` is the gyro's gain over the accelerometer's as bends tell it, and its standard deviation; None where
+    nothing tells it.
     """
 
     t_start_ns: int
@@ -241,6 +245,7 @@ class Batch:
     is_provisional: bool = False
     roll_rate_radps: F64 | None = None
     sensor_rate_hz: float = math.nan
+    gyro_gain: tuple[float, float] | None = None
 
     @property
     def duration_s(self) -> float:

@@ -35,6 +35,8 @@ DIAGNOSTICS: Final = (
     "noise_acceleration_ratio",
     "noise_pitch_rate_ratio",
     "noise_roll_rate_ratio",
+    "gyro_gain_ratio",
+    "gyro_gain_ratio_std",
     "payload_gyration_m2",
     "payload_mode_hz",
     "payload_damping_ratio",

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gateway.core.bends import Bends, gyro_gain_of
 from gateway.core.sample_clock import retimed
 from gateway.core.settings import BatchSettings
 from gateway.core.timeline import in_order_of_time, onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
@@ -47,6 +48,7 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
     for masked in causes.values():
         usable &= ~masked
     gravity = _mean(acceleration.on_grid, usable)
+    roll_radps = _known(roll_rate, settings) if Signal.ROLL_RATE in rows.signals else None
     shares = {why: float(np.mean(masked)) for why, masked in causes.items() if masked.any()}
     return Batch(
         t_start_ns=window.t_start_ns,
@@ -63,8 +65,9 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
         longest_stop_s=_longest_run(speed < settings.standstill_speed_mps) / settings.rate_hz,
         rejected=_reasons((acceleration, pitch_rate), window, n, usable, gravity, shares, settings),
         is_provisional=window.is_provisional,
-        roll_rate_radps=_known(roll_rate, settings) if Signal.ROLL_RATE in rows.signals else None,
+        roll_rate_radps=roll_radps,
         sensor_rate_hz=_slower_hz(acceleration, pitch_rate),
+        gyro_gain=_gyro_gain(rows, window, roll_radps, speed, usable, settings, traits),
     )
 
 
@@ -107,6 +110,25 @@ def _sensed(rows: Motion, signal: Signal, window: Window, n: int, settings: Batc
     stuck = _spans_onto_grid(_constant_runs(t_ns, x, stuck_ns), window, n, settings.rate_hz)
     saturated = _spans_onto_grid(_saturated_spans(t_ns, x, trait), window, n, settings.rate_hz)
     return _Sensed(on_grid, (missing, untimed, stuck, saturated), sample_rate_hz(t_ns[is_believed]))
+
+
+def _gyro_gain(
+    rows: Motion,
+    window: Window,
+    roll_radps: F64 | None,
+    speed: F64,
+    usable: Bool,
+    settings: BatchSettings,
+    traits: Traits,
+) -> tuple[float, float] | None:
+    """As bends tell it, where the signal map has all that it takes."""
+    if roll_radps is None or not {Signal.LATERAL_ACCELERATION, Signal.YAW_RATE} <= set(rows.signals):
+        return None
+    pushed, turned = (
+        _known(_sensed(rows, signal, window, len(speed), settings, traits), settings)
+        for signal in (Signal.LATERAL_ACCELERATION, Signal.YAW_RATE)
+    )
+    return gyro_gain_of(Bends(pushed, turned, roll_radps, speed), usable, settings.rate_hz)
 
 
 def _slower_hz(*sensors: _Sensed) -> float:

@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway.core.bends import joined_gains
 from gateway.core.change import Rules
 from gateway.core.journey import LEAST_STOP_S
 from gateway.core.loads import Halt, Link, Weighing, halts_of, loads_of
@@ -175,6 +176,7 @@ def spanned(parts: Sequence[Part], begin_ns: int, end_ns: int) -> Batch:
         is_provisional=last.is_provisional,
         roll_rate_radps=_roll_rate(cuts),
         sensor_rate_hz=min(cut.sensor_rate_hz for cut in cuts),
+        gyro_gain=joined_gains([cut.gyro_gain for cut in cuts]),
     )
 
 

@@ -14,6 +14,8 @@ TYPICAL = {
     Signal.ROLL_RATE: (0.0, 0.1),
     Signal.SPEED: (15.0, 1.0),
     Signal.LONGITUDINAL_ACCELERATION: (0.0, 1.0),
+    Signal.LATERAL_ACCELERATION: (0.0, 1.0),
+    Signal.YAW_RATE: (0.0, 0.1),
     Signal.WHEEL_SPEED: (15.0, 1.0),
     Signal.IGNITION: (1.0, 0.0),
     Signal.LATITUDE: (47.0, 0.1),
@@ -87,7 +89,7 @@ def test_signals_of_one_message_travel_together():
 def test_messages_are_merged_in_order_of_time():
     signal_map = load_signal_map("springscale:reference")
     t_ns, samples = samples_of(signal_map, 50)
-    for rate in (Signal.PITCH_RATE, Signal.ROLL_RATE):
+    for rate in (Signal.PITCH_RATE, Signal.ROLL_RATE, Signal.YAW_RATE):
         t_ns[rate] = t_ns[rate] + 3_000_000
     frames = encode_signals(signal_map, t_ns, samples)
     assert (np.diff(frames.t_ns) >= 0).all()

@@ -11,13 +11,15 @@ from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import EXTENDED_ID, Frames, Signal
 
 RAD = math.pi / 180
-A, P, R, V, W, X, LAT, LON, ODO, ON, DOOR, AIR = (
+A, P, R, V, W, X, Y, TURN, LAT, LON, ODO, ON, DOOR, AIR = (
     Signal.VERTICAL_ACCELERATION,
     Signal.PITCH_RATE,
     Signal.ROLL_RATE,
     Signal.SPEED,
     Signal.WHEEL_SPEED,
     Signal.LONGITUDINAL_ACCELERATION,
+    Signal.LATERAL_ACCELERATION,
+    Signal.YAW_RATE,
     Signal.LATITUDE,
     Signal.LONGITUDE,
     Signal.ODOMETER,
@@ -56,8 +58,8 @@ J1939_RATES = (0x18F02A45 | EXTENDED_ID, struct.pack("<HHHH", 32256, 31360, 0xFF
 
 FRAMES = {
     "reference": [
-        (0x120, struct.pack("<hhhBB", -1500, 20, 9810, 7, 1), {A: 9.81, X: -1.5}),
-        (0x121, struct.pack("<hhhBB", 10, -400, 30, 7, 1), {P: -2.0 * RAD, R: 0.05 * RAD}),
+        (0x120, struct.pack("<hhhBB", -1500, 20, 9810, 7, 1), {A: 9.81, X: -1.5, Y: 0.02}),
+        (0x121, struct.pack("<hhhBB", 10, -400, 30, 7, 1), {P: -2.0 * RAD, R: 0.05 * RAD, TURN: 0.15 * RAD}),
         (0x130, struct.pack("<HBB", 10_000, 12, 3), {V: 20.0}),
         (0x131, struct.pack("<ii", 455_000_000, -1_222_500_000), {LAT: 45.5, LON: -122.25}),
         (0x131, struct.pack("<ii", -(2**31), -(2**31)), {}),  # no fix
@@ -65,11 +67,12 @@ FRAMES = {
         (0x140, struct.pack("<IBBBB", 5, 0b1111, 0, 0, 0), {ODO: 5.0}),
     ],
     "canmod_gps": [
-        # z: (9.75 + 64) / 0.125 = 590; x rate: (-1.25 + 256) / 0.25 = 1019; y rate: (3.5 + 256) / 0.25 = 1038
+        # z: (9.75 + 64) / 0.125 = 590; y: (-0.5 + 64) / 0.125 = 508
+        # x rate: (-1.25 + 256) / 0.25 = 1019; y rate: (3.5 + 256) / 0.25 = 1038; z rate: (2 + 256) / 0.25 = 1032
         (
             0x009,
-            bits((0, 1), (1, 512), (11, 512), (21, 590), (31, 1019), (42, 1038)),
-            {A: 9.75, P: 3.5 * RAD, R: -1.25 * RAD},
+            bits((0, 1), (1, 512), (11, 508), (21, 590), (31, 1019), (42, 1038), (53, 1032)),
+            {A: 9.75, Y: -0.5, P: 3.5 * RAD, R: -1.25 * RAD, TURN: 2.0 * RAD},
         ),
         (0x007, bits((0, 1), (1, 12_345), (21, 99), length=5), {V: 12.345}),
         # (45.5 + 90) x 1e6 and (-122.25 + 180) x 1e6
@@ -85,10 +88,10 @@ FRAMES = {
         (0x621, struct.pack("<ff", 123.0, 36.0), {V: 10.0}),
     ],
     "phone": [
-        # 20 bits each: -1500 x 0.0005 as 2**20 - 1500, 19620 x 0.0005
-        (0x150, bits((0, 2**20 - 1500), (40, 19_620)), {A: 9.81, X: -0.75}),
-        # 500 x 0.002 and -1000 x 0.002
-        (0x151, bits((0, 500), (20, 2**20 - 1000)), {R: 1.0 * RAD, P: -2.0 * RAD}),
+        # 20 bits each: -1500 x 0.0005 as 2**20 - 1500, 800 x 0.0005, 19620 x 0.0005
+        (0x150, bits((0, 2**20 - 1500), (20, 800), (40, 19_620)), {A: 9.81, X: -0.75, Y: 0.4}),
+        # 500 x 0.002, -1000 x 0.002 and 1500 x 0.002
+        (0x151, bits((0, 500), (20, 2**20 - 1000), (40, 1500)), {R: 1.0 * RAD, P: -2.0 * RAD, TURN: 3.0 * RAD}),
         (0x152, bits((0, 13_890), length=4), {V: 13.89}),
         (0x153, struct.pack("<ii", 455_000_000, -1_222_500_000), {LAT: 45.5, LON: -122.25}),
     ],
@@ -98,8 +101,8 @@ FRAMES = {
         (0x09567C22 | EXTENDED_ID, bits((16, 250_000)), {V: 25.0}),
     ],
     "xsens_mti": [
-        (0x34, struct.pack(">hhh", 0, 0, 2511), {A: 2511 / 256}),
-        (0x32, struct.pack(">hhh", 32, -64, 0), {P: -0.125, R: 0.0625}),
+        (0x34, struct.pack(">hhh", 0, -128, 2511), {A: 2511 / 256, Y: -0.5}),
+        (0x32, struct.pack(">hhh", 32, -64, 16), {P: -0.125, R: 0.0625, TURN: 0.03125}),
         # 8.24 and 9.23 bits, fixed point
         (0x71, struct.pack(">ii", round(45.5 * 2**24), round(-122.25 * 2**23)), {LAT: 45.5, LON: -122.25}),
     ],

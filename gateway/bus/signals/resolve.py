@@ -17,6 +17,8 @@ QUANTITIES: Final[Mapping[Signal, str]] = {
     Signal.SPEED: "speed",
     Signal.ROLL_RATE: "angular_rate",
     Signal.LONGITUDINAL_ACCELERATION: "acceleration",
+    Signal.LATERAL_ACCELERATION: "acceleration",
+    Signal.YAW_RATE: "angular_rate",
     Signal.WHEEL_SPEED: "speed",
     Signal.IGNITION: "state",
     Signal.AMBIENT_TEMPERATURE: "temperature",

@@ -22,6 +22,7 @@ from gateway.calibration.half_car.left_out import MISFIT_MARGIN, LeftOut, left_o
 from gateway.calibration.half_car.most_probable_vehicle import fit_vehicle, seen_by
 from gateway.calibration.half_car.prior import Inherited, Prior, can_roll, prior_of
 from gateway.calibration.known_run import KnownRun
+from gateway.core.bends import joined_gains
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import moves_of, weigh
 from gateway.core.cross_spectrum.floor import usual_floor
@@ -228,4 +229,5 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         usual_stroke_mps=reading.usual_stroke_mps,
         gravity_mps2=fmean(b.gravity_mps2 for run in runs for b in run.batches if not b.rejected),
         floor=usual_floor((b for run in runs for b in run.batches if not b.rejected), with_roll=reading.with_roll),
+        gyro_gain=joined_gains([b.gyro_gain for run in runs for b in run.batches if not b.rejected]),
     )

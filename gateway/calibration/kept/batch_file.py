@@ -21,7 +21,7 @@ from gateway.errors import KeptBatchError
 from gateway.records import F64, Batch, Motion, Signal, Why
 
 FORMAT: Final = "springscale-batch"
-VERSION: Final = 2
+VERSION: Final = 3
 MOST_SAMPLES: Final = 1_000_000  # an hour at 200 Hz has 720 000
 _FLOATS: Final = ("vertical_acceleration_mps2", "pitch_rate_radps", "speed_mps")
 _DIGEST_BYTES: Final = 32
@@ -69,6 +69,7 @@ def packed(kept: KeptBatch) -> bytes:
             "rejected": [str(why) for why in batch.rejected],
             "is_provisional": batch.is_provisional,
             "sensor_rate_hz": _known(batch.sensor_rate_hz),
+            "gyro_gain": batch.gyro_gain,
         },
         "facts": {
             "duration_s": kept.facts.duration_s,
@@ -118,6 +119,7 @@ def _batch(header: Mapping[str, Any], arrays: list[F64], usable: np.typing.NDArr
         told[name] = _nan_if_none(told[name])
     told["shares"] = {Why(why): share for why, share in told["shares"].items()}
     told["rejected"] = tuple(map(Why, told["rejected"]))
+    told["gyro_gain"] = None if told["gyro_gain"] is None else tuple(told["gyro_gain"])
     told |= zip((*_FLOATS, "roll_rate_radps"), arrays, strict=False)
     return Batch(usable=usable, **told)
 

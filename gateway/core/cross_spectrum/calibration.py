@@ -36,7 +36,8 @@ class CrossSpectrumCalibration:
     stated, the sensor sits sensor_left_m left of the centre line. least_slack: see parameters.Ground.
     usual_stroke_mps: see model.reading; None too where no roll rate was read. floor is how loud each sensor was in
     the quietest and in the loudest batch, above what is weighed (cross_spectrum.floor), in the square of its unit per
-    hertz; None: not known.
+    hertz; None: not known. gyro_gain is the gyro's gain over the accelerometer's as the drives' bends told it, and its
+    standard deviation; None where nothing did.
     """
 
     __pydantic_config__ = STRICT
@@ -70,6 +71,7 @@ class CrossSpectrumCalibration:
     least_slack: float = field(default=LEAST_SLACK, metadata=_POSITIVE)
     usual_stroke_mps: tuple[Positive, Positive] | None = None
     floor: tuple[tuple[Positive, Positive], ...] | None = None
+    gyro_gain: tuple[Positive, Positive] | None = None
 
     @property
     def ground(self) -> Ground:

@@ -24,7 +24,14 @@ from gateway.core.cross_spectrum.located import Located, locate
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.core.cross_spectrum.reach import beyond
-from gateway.core.cross_spectrum.sensor_change import MOST_GRAVITY_CHANGE_MPS2, gain_of, is_gyro_late, is_gyro_turned
+from gateway.core.cross_spectrum.sensor_change import (
+    MOST_GRAVITY_CHANGE_MPS2,
+    gain_of,
+    gyro_gain_ratio,
+    is_gyro_gain_changed,
+    is_gyro_late,
+    is_gyro_turned,
+)
 from gateway.estimate import Estimate
 from gateway.posterior import PAYLOAD, Posterior, Source
 from gateway.records import F64, Batch, Why
@@ -76,10 +83,11 @@ def by_cross_spectrum(
 
     ``prior`` is what is believed of a load's shape; None: it is that of the known loads.
     """
+    watched = replace(blank, diagnostics=_watched(batch, calibration))
     found = weigh(batch, calibration, prior)
     if isinstance(found, Why):
-        return replace(blank, rejected=(found,))
-    diagnosed = replace(blank, diagnostics=_diagnostics(found, calibration))
+        return replace(watched, rejected=(found,))
+    diagnosed = replace(watched, diagnostics={**_diagnostics(found, calibration), **watched.diagnostics})
     why = disbelieved(found, calibration)
     if why is not None:
         return replace(diagnosed, rejected=(why,))
@@ -164,11 +172,11 @@ def _off_its_speeds(batch: Batch, calibration: CrossSpectrumCalibration) -> Why 
 
 
 def _unlike(batch: Batch, calibration: CrossSpectrumCalibration) -> Why | None:
-    """Gravity shows a gain that changed, or an axis that was tilted."""
+    """Gravity shows an accelerometer's gain that changed, or an axis that was tilted; bends show a gyro's gain."""
     usual_mps2 = calibration.gravity_mps2
-    if usual_mps2 is None or abs(batch.gravity_mps2 - usual_mps2) <= MOST_GRAVITY_CHANGE_MPS2:
-        return None
-    return Why.SENSOR_CHANGED
+    is_heavier = usual_mps2 is not None and abs(batch.gravity_mps2 - usual_mps2) > MOST_GRAVITY_CHANGE_MPS2
+    is_turned_more = is_gyro_gain_changed(gyro_gain_ratio(batch.gyro_gain, calibration.gyro_gain))
+    return Why.SENSOR_CHANGED if is_heavier or is_turned_more else None
 
 
 def posterior_of(
@@ -229,6 +237,12 @@ def _root(covariance: F64) -> F64:
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
     root: F64 = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     return root
+
+
+def _watched(batch: Batch, calibration: CrossSpectrumCalibration) -> dict[str, float]:
+    """What is known of the sensors without weighing."""
+    ratio = gyro_gain_ratio(batch.gyro_gain, calibration.gyro_gain)
+    return {} if ratio is None else {"gyro_gain_ratio": ratio[0], "gyro_gain_ratio_std": ratio[1]}
 
 
 def _diagnostics(found: Weighed, calibration: CrossSpectrumCalibration) -> dict[str, float]:

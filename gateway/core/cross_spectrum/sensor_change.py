@@ -2,6 +2,7 @@
 
     scores_of(...)      how strongly the batch pulls at what a calibration takes as fixed, in standard deviations
     gain_moves(...)     by how much the answer moves with the gain of the accelerometer
+    gyro_gain_ratio(..) the gyro's gain over that in calibration, by bends
 
 A sensor that was moved along the vehicle, or whose gain changed, makes the half-car want another sensor position;
 one that was moved sideways or turned mixes roll into what it reads, which the half-car can only take for noise. A
@@ -31,6 +32,9 @@ def weighed(point: Point) -> list[int]:
 
 MOST_GRAVITY_CHANGE_MPS2: Final = 0.35
 """Offsets of such sensors move by 0.1 m/s2 (standard deviation) from day to day; so much is a gain off by 3.6 %."""
+
+MOST_GYRO_GAIN_SCORE: Final = 3.5
+"""Standard deviations; chance exceeds it once in two thousand batches."""
 
 TEMPERATURE_STD_K: Final = 15.0  # of the sensor between its calibration and any other day of the year; chosen
 GAIN_PER_K: Final = 2e-4  # of each sensor (data sheets of MPU-6050, BMI160)
@@ -110,6 +114,21 @@ def gain_moves(whole: Curvature, whittle: Whittle, point: Point, covariance: F64
     there = stronger.curvature(point, weighed(point)).gradient
     moves: F64 = -covariance @ (there - whole.gradient[FITTED]) / np.log1p(STEP)
     return moves
+
+
+def gyro_gain_ratio(
+    gain: tuple[float, float] | None, calibrated: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """The gyro's gain over that in calibration, and its standard deviation; None where bends did not tell both."""
+    if gain is None or calibrated is None:
+        return None
+    ratio = gain[0] / calibrated[0]
+    return ratio, float(np.hypot(gain[1], calibrated[1] * ratio)) / calibrated[0]
+
+
+def is_gyro_gain_changed(ratio: tuple[float, float] | None) -> bool:
+    """True where neither chance nor temperature explains it."""
+    return ratio is not None and abs(ratio[0] - 1.0) > MOST_GYRO_GAIN_SCORE * float(np.hypot(ratio[1], GAIN_STD))
 
 
 def gain_of(gravity_mps2: float, calibrated_mps2: float | None) -> tuple[float, float]:

@@ -201,6 +201,8 @@ export const DASHBOARD = {
   "signal.vertical_acceleration": ["vertical acceleration", "Vertikalbeschleunigung"],
   "signal.longitudinal_acceleration": ["longitudinal acceleration", "Längsbeschleunigung"],
   "signal.lateral_acceleration": ["lateral acceleration", "Querbeschleunigung"],
+  "signal.yaw_rate": ["yaw rate", "Gierrate"],
+  "signal.lateral_acceleration": ["lateral acceleration", "Querbeschleunigung"],
   "signal.pitch_rate": ["pitch rate", "Nickrate"],
   "signal.roll_rate": ["roll rate", "Wankrate"],
   "signal.yaw_rate": ["yaw rate", "Gierrate"],
