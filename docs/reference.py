@@ -228,6 +228,8 @@ DIAGNOSTICS: Final = {
     "amplitude_ratio": "how much the vehicle moved, over the usual in calibration",
     "damper_front_ratio": "front dampers' rate over the calibrated",
     "damper_rear_ratio": "rear dampers' rate over the calibrated",
+    "damper_front_freed_ratio": "the same, without what the search believes of dampers where it strained at that",
+    "damper_rear_freed_ratio": "likewise of the rear dampers",
     "delay_scale": "by which share the rear axle came later than wheelbase and speed say",
     "tension": "how far the vehicle lies off its calibration: chi-squared of five; refused above 25.7",
     "sensor_position_score": "pull to another place or gain of the sensor, in standard deviations; refused beyond 6",

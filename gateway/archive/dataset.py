@@ -28,6 +28,8 @@ DIAGNOSTICS: Final = (
     "amplitude_ratio",
     "damper_front_ratio",
     "damper_rear_ratio",
+    "damper_front_freed_ratio",
+    "damper_rear_freed_ratio",
     "delay_scale",
     "tension",
     "sensor_position_score",

@@ -1,14 +1,15 @@
-"""How a vehicle's own parameters drift over months: what its batches found of them, week by week, and a robust slope.
+"""What of a vehicle and its gyro is no longer as calibrated: what batches found of it, week by week.
 
-Each batch finds its dampers and the scale of its delay beside the load (core.cross_spectrum.drift), held near the
-calibration by what the search believes: a real change is larger than what is found of it. Springs are not found
-batch by batch; what they change moves the zero, which each
-"it is empty now" shows.
+Each batch finds its dampers and the scale of its delay beside the load (core.cross_spectrum.drift), and bends tell the
+gyro's gain (core.bends). A trend is a robust slope over months. A level is where the newest batches stand, which shows
+what changed at once. The delay is held near the calibration by what the search believes: a real change is larger than
+what is found of it. Springs are not found batch by batch; what they change moves the zero, which each "it is empty now"
+shows.
 """
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from statistics import NormalDist
 from typing import Final, Literal
@@ -27,26 +28,65 @@ LEAST_POINTS: Final = {"week": 8, "zero": 5}
 CONFIDENCE: Final = 0.99  # of a change's interval
 DAMPER_CHANGE_PCT: Final = 5.0  # chosen: the search's own belief lets a damper go 3 % (core.cross_spectrum.drift)
 DELAY_CHANGE_PCT: Final = 1.0  # likewise; it believes in 0.3 %
+GYRO_GAIN_CHANGE_PCT: Final = 2.0  # likewise; temperature alone moves it by 0.4 %
+DAMPER_LEVEL_PCT: Final = 20.0  # chosen: friction on rough roads hides as much of them in single batches
+LEAST_BATCHES: Final = 24  # of a level: two hours, which one load or road seldom fills; chosen
+ALIKE_BATCHES: Final = 6  # of one load and road err alike; chosen
 ZERO_CHANGE_SHARE: Final = 0.01  # of the empty mass; likewise
 
-_RATIOS: Final = {"damper_front_ratio": "damper_front", "damper_rear_ratio": "damper_rear"}  # of the calibrated: 1
+_RATIOS: Final = {  # of the calibrated: 1
+    "damper_front_freed_ratio": "damper_front",
+    "damper_rear_freed_ratio": "damper_rear",
+    "gyro_gain_ratio": "gyro_gain",
+}
 _SHARES: Final = {"delay_scale": "delay"}  # by which it is off: 0
+_LEAST_CHANGE_PCT: Final = {
+    "damper_front": DAMPER_CHANGE_PCT,
+    "damper_rear": DAMPER_CHANGE_PCT,
+    "delay": DELAY_CHANGE_PCT,
+    "gyro_gain": GYRO_GAIN_CHANGE_PCT,
+}
+_LEAST_LEVEL_PCT: Final = {
+    "damper_front": DAMPER_LEVEL_PCT,
+    "damper_rear": DAMPER_LEVEL_PCT,
+    "gyro_gain": GYRO_GAIN_CHANGE_PCT,
+}
+_OFF: Final = {  # below and above the calibration
+    "damper_front": ("the front dampers are {:.0f} % weaker", "the front dampers are {:.0f} % stiffer"),
+    "damper_rear": ("the rear dampers are {:.0f} % weaker", "the rear dampers are {:.0f} % stiffer"),
+    "gyro_gain": ("the gyro's gain is {:.1f} % smaller", "the gyro's gain is {:.1f} % larger"),
+}
+
+
+class Sums(Part):
+    """Of what so many batches found of one parameter, in percent off the calibration."""
+
+    n: int = Field(ge=1)
+    sum_pct: float
+    square_pct2: float
+
+    def plus(self, other: "Sums") -> "Sums":
+        """Of both."""
+        return Sums(
+            n=self.n + other.n,
+            sum_pct=self.sum_pct + other.sum_pct,
+            square_pct2=self.square_pct2 + other.square_pct2,
+        )
 
 
 class Week(Part):
-    """The sums of what the batches of one week found, in percent off the calibration."""
+    """What the batches of one week found, by parameter."""
 
     monday: str
     calibration_id: str
-    n: int
-    sums_pct: dict[str, float]
+    found: dict[str, Sums]
 
 
 class TrendHistory(Part):
     """Everything up to ``cursor`` in the store's history, oldest week first."""
 
     format: Literal["springscale-trend"] = "springscale-trend"
-    version: Literal[1] = 1
+    version: Literal[2] = 2
     cursor: str | None = None
     weeks: tuple[Week, ...] = Field((), max_length=MOST_WEEKS)
 
@@ -57,9 +97,10 @@ class TrendHistory(Part):
             if (found := found_pct(estimate)) is None or estimate.calibration_id is None:
                 continue
             key = (monday_of(estimate.t_end_ns), estimate.calibration_id)
-            before = weeks.get(key, Week(monday=key[0], calibration_id=key[1], n=0, sums_pct={}))
-            sums = {name: before.sums_pct.get(name, 0.0) + pct for name, pct in found.items()}
-            weeks[key] = before.model_copy(update={"n": before.n + 1, "sums_pct": sums})
+            before = weeks.get(key, Week(monday=key[0], calibration_id=key[1], found={})).found
+            now = {name: Sums(n=1, sum_pct=pct, square_pct2=pct**2) for name, pct in found.items()}
+            summed = {name: one.plus(before[name]) if name in before else one for name, one in now.items()}
+            weeks[key] = Week(monday=key[0], calibration_id=key[1], found={**before, **summed})
         kept = tuple(weeks[key] for key in sorted(weeks))[-MOST_WEEKS:]
         return self.model_copy(update={"cursor": cursor, "weeks": kept})
 
@@ -77,7 +118,9 @@ class Point:
 class Trend:
     """A parameter's course and its change from the first point to the last; None where there are too few points.
 
-    ``interval99`` is of the change; it drifts where this excludes 0 and the change is not small.
+    ``interval99`` is of the change; it drifts where this excludes 0 and the change is not small. ``level`` is where the
+    newest batches stand off the calibration, ``level99`` its interval; it is off where this excludes 0 and the level is
+    not small.
     """
 
     name: str
@@ -86,9 +129,16 @@ class Trend:
     change: float | None = None
     interval99: tuple[float, float] | None = None
     is_drifting: bool = False
+    level: float | None = None
+    level99: tuple[float, float] | None = None
+    is_off: bool = False
 
     def sentence(self) -> str | None:
-        """The warning of one that drifts."""
+        """The warning of one that is off or drifts."""
+        if self.is_off and self.level is not None and self.level99 is not None:
+            low, high = sorted(abs(end) for end in self.level99)
+            said = _OFF[self.name][self.level > 0.0].format(abs(self.level))
+            return f"{said} than at calibration ({low:.1f} to {high:.1f} %, 99 %): look at them, and calibrate again"
         if not self.is_drifting or self.change is None or self.interval99 is None:
             return None
         low, high = self.interval99
@@ -99,19 +149,21 @@ class Trend:
 
 
 def found_pct(estimate: Estimate) -> dict[str, float] | None:
-    """What a batch found of the vehicle, in percent off its calibration; None where it found nothing.
+    """What a batch found of vehicle and gyro, in percent off its calibration; None where it found nothing.
 
-    A vehicle that drifts far is refused as a misfit: what such a batch found counts too.
+    A vehicle that drifts far is refused as a misfit, a gyro's gain as a sensor that changed: what such a batch found
+    counts too, of the gyro alone where the sensor changed.
     """
-    is_heard = estimate.counted or estimate.rejected == (Why.MODEL_MISFIT,)
-    ratios = {name: estimate.diagnostics.get(key, math.nan) for key, name in _RATIOS.items()}
-    shares = {name: estimate.diagnostics.get(key, math.nan) for key, name in _SHARES.items()}
-    is_known = all(map(math.isfinite, (*ratios.values(), *shares.values())))
-    if not is_heard or not is_known or not all(ratio > 0.0 for ratio in ratios.values()):
+    if estimate.rejected == (Why.SENSOR_CHANGED,):
+        heard = {"gyro_gain_ratio"}
+    elif estimate.counted or estimate.rejected == (Why.MODEL_MISFIT,):
+        heard = {*_RATIOS, *_SHARES}
+    else:
         return None
-    return {name: 100.0 * math.log(ratio) for name, ratio in ratios.items()} | {
-        name: 100.0 * share for name, share in shares.items()
-    }
+    told = {key: number for key, number in estimate.diagnostics.items() if key in heard and math.isfinite(number)}
+    found = {name: 100.0 * math.log(told[key]) for key, name in _RATIOS.items() if told.get(key, 0.0) > 0.0}
+    found |= {name: 100.0 * told[key] for key, name in _SHARES.items() if key in told}
+    return found or None
 
 
 def monday_of(t_ns: int) -> str:
@@ -124,20 +176,33 @@ def trends_of(
     weeks: Sequence[Week], zeros: Sequence[tuple[str, float]], calibration_id: str | None, empty_mass_kg: float
 ) -> tuple[Trend, ...]:
     """Of the calibration in use; ``zeros`` say when the vehicle was empty and what the calibration alone read (kg)."""
-    own = [week for week in weeks if week.calibration_id == calibration_id and week.n]
-    least = {"damper_front": DAMPER_CHANGE_PCT, "damper_rear": DAMPER_CHANGE_PCT, "delay": DELAY_CHANGE_PCT}
-    found = [
-        trend_of(
-            name,
-            "%",
-            tuple(Point(week.monday, week.sums_pct[name] / week.n, week.n) for week in own if name in week.sums_pct),
-            LEAST_POINTS["week"],
-            least_change,
-        )
-        for name, least_change in least.items()
-    ]
+    own = [week for week in weeks if week.calibration_id == calibration_id]
+    found = []
+    for name, least_change in _LEAST_CHANGE_PCT.items():
+        sums = [(week.monday, week.found[name]) for week in own if name in week.found]
+        points = tuple(Point(monday, one.sum_pct / one.n, one.n) for monday, one in sums)
+        trend = trend_of(name, "%", points, LEAST_POINTS["week"], least_change)
+        found.append(_with_level(trend, [one for _, one in sums]))
     empty = tuple(Point(at, payload_kg, 1) for at, payload_kg in zeros)
     return (*found, trend_of("zero", "kg", empty, LEAST_POINTS["zero"], ZERO_CHANGE_SHARE * empty_mass_kg))
+
+
+def _with_level(trend: Trend, weeks: Sequence[Sums]) -> Trend:
+    """Where the newest batches stand, as a share of the calibrated; ``weeks`` are the trend's, oldest first."""
+    newest: Sums | None = None
+    for week in reversed(weeks):
+        newest = week if newest is None else newest.plus(week)
+        if newest.n >= LEAST_BATCHES:
+            break
+    least_pct = _LEAST_LEVEL_PCT.get(trend.name)
+    if newest is None or newest.n < LEAST_BATCHES or least_pct is None:
+        return trend
+    mean = newest.sum_pct / newest.n
+    variance = max(newest.square_pct2 / newest.n - mean**2, 0.0)
+    reach = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2.0) * math.sqrt(variance * ALIKE_BATCHES / newest.n)
+    level, low, high = (100.0 * math.expm1(pct / 100.0) for pct in (mean, mean - reach, mean + reach))
+    is_clear = low > 0.0 or high < 0.0
+    return replace(trend, level=level, level99=(low, high), is_off=is_clear and abs(level) >= least_pct)
 
 
 def trend_of(name: str, unit: str, points: tuple[Point, ...], least_points: int, least_change: float) -> Trend:

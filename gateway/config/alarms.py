@@ -13,7 +13,7 @@ CAUSE_NAMES: Final = (  # those of core.alarms, which loads too much for this
     *("overload.gross", "overload.front_axle", "overload.rear_axle"),
     *("overload.front_left", "overload.front_right", "overload.rear_left", "overload.rear_right"),
     *("imbalance.left_right", "imbalance.front_rear", "sensor_fault.silent", "sensor_fault.refused"),
-    *("drift.damper_front", "drift.damper_rear", "drift.delay", "drift.zero"),
+    *("drift.damper_front", "drift.damper_rear", "drift.delay", "drift.gyro_gain", "drift.zero"),
 )
 
 

@@ -15,7 +15,7 @@ from support.epochs import drive_of, stored
 from support.log import names
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.calibration.trend import TrendHistory, Week, found_pct, monday_of, theil_sen, trends_of
+from gateway.calibration.trend import Sums, TrendHistory, Week, found_pct, monday_of, theil_sen, trends_of
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.history import Page
@@ -38,7 +38,7 @@ def batch(t_end_ns: int, front: float = 1.0, rear: float = 1.0, *rejected: Why, 
         estimator="cross_spectrum",
         calibration_id=calibration_id,
         rejected=rejected,
-        diagnostics={"damper_front_ratio": front, "damper_rear_ratio": rear, "delay_scale": 0.0},
+        diagnostics={"damper_front_freed_ratio": front, "damper_rear_freed_ratio": rear, "delay_scale": 0.0},
     )
 
 
@@ -48,8 +48,10 @@ def weeks(rear_pct: "np.ndarray", calibration_id: str = "a") -> list[Week]:
         Week(
             monday=monday_of(MONDAY_NS + n * WEEK_NS),
             calibration_id=calibration_id,
-            n=10,
-            sums_pct={"damper_front": 0.0, "damper_rear": 10.0 * float(pct), "delay": 0.0},
+            found={
+                name: Sums(n=10, sum_pct=10.0 * each, square_pct2=10.0 * each**2)
+                for name, each in (("damper_front", 0.0), ("damper_rear", float(pct)), ("delay", 0.0))
+            },
         )
         for n, pct in enumerate(rear_pct)
     ]
@@ -86,8 +88,44 @@ def test_a_few_odd_weeks_are_no_drift_and_hide_none() -> None:
 
 
 @pytest.mark.parametrize("n_weeks", [0, 1, 7])
-def test_too_few_weeks_tell_nothing(n_weeks: int) -> None:
+def test_too_few_weeks_tell_no_drift(n_weeks: int) -> None:
     assert rear_of(-3.0 * np.arange(n_weeks)) == (False, None)
+
+
+def level_of(pct: "np.ndarray", name: str = "damper_rear") -> tuple[bool, str | None]:
+    """Of batches of one week; the gyro's gain comes with batches that were refused for it."""
+    key = {"damper_rear": "damper_rear_freed_ratio", "gyro_gain": "gyro_gain_ratio"}[name]
+    why = (Why.SENSOR_CHANGED,) if name == "gyro_gain" else ()
+    batches = [
+        replace(batch(MONDAY_NS, 1.0, 1.0, *why), diagnostics={"delay_scale": 0.0, key: math.exp(one / 100.0)})
+        for one in pct
+    ]
+    trends = {one.name: one for one in trends_of(TrendHistory().with_batches(batches, "c").weeks, [], "a", 1240.0)}
+    return trends[name].is_off, trends[name].sentence()
+
+
+def test_dampers_that_are_worn_are_told_after_two_hours() -> None:
+    worn = -43.0 + np.random.default_rng(1).normal(0.0, 7.0, 24)
+    is_off, sentence = level_of(worn)
+    assert is_off
+    assert sentence is not None
+    assert sentence.startswith("the rear dampers are 3")
+    assert "% weaker than at calibration (" in sentence
+    assert level_of(worn[:23]) == (False, None)
+    assert level_of(-worn)[1] is not None
+    assert "stiffer" in str(level_of(-worn)[1])
+
+
+def test_a_level_below_a_fifth_and_one_that_scatters_as_much_are_none() -> None:
+    assert level_of(np.full(40, -20.0)) == (False, None)  # 18 %
+    assert level_of(np.tile([-140.0, 90.0], 20)) == (False, None)
+
+
+def test_a_gyro_s_gain_is_told_of_batches_that_were_refused_for_it() -> None:
+    is_off, sentence = level_of(3.0 + np.random.default_rng(2).normal(0.0, 0.8, 24), "gyro_gain")
+    assert is_off
+    assert str(sentence).startswith("the gyro's gain is 3.")
+    assert level_of(np.full(24, 1.5), "gyro_gain") == (False, None)
 
 
 def test_a_sure_but_small_change_is_no_warning() -> None:
@@ -130,16 +168,20 @@ def test_batches_are_gathered_by_week_in_whatever_pieces_they_come() -> None:
     pieces = TrendHistory()
     for one in batches[::-1]:
         pieces = pieces.with_batches([one], "c")
-    assert [(week.monday, week.n) for week in whole.weeks] == [(week.monday, week.n) for week in pieces.weeks]
-    assert sum(week.n for week in whole.weeks) == 12
-    assert sum(week.sums_pct["damper_rear"] for week in whole.weeks) == pytest.approx(66.0)
+    rear = [week.found["damper_rear"] for week in whole.weeks]
+    assert [(week.monday, week.found["damper_rear"].n) for week in pieces.weeks] == [
+        (week.monday, one.n) for week, one in zip(whole.weeks, rear, strict=True)
+    ]
+    assert sum(one.n for one in rear) == 12
+    assert sum(one.sum_pct for one in rear) == pytest.approx(66.0)
+    assert sum(one.square_pct2 for one in rear) == pytest.approx(sum(n**2 for n in range(12)))
     assert whole.cursor == "c"
 
 
 def test_what_found_nothing_is_passed_over() -> None:
     assert found_pct(batch(0, 1.1, 1.0, Why.GAP)) is None
     assert found_pct(replace(batch(0), diagnostics={})) is None
-    assert found_pct(batch(0, float("nan"))) is None
+    assert found_pct(batch(0, float("nan"))) == {"damper_rear": 0.0, "delay": 0.0}
     misfit = found_pct(batch(0, 1.1, 1.0, Why.MODEL_MISFIT))  # a vehicle that drifted far is refused so
     assert misfit is not None
     assert misfit["damper_front"] == pytest.approx(100.0 * math.log(1.1))

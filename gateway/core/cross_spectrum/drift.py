@@ -64,6 +64,9 @@ NATURE_TOGETHER_STD: Final[Mapping[str, float]] = MappingProxyType(
 DAMPERS_TOGETHER_STD: Final = 0.03
 """What both axles' dampers have in common beside it: their oil is as warm or cold in front as at the rear."""
 
+WORN_STD: Final = 0.3
+"""Of the logarithm of each axle's dampers where they may have worn, or been replaced; chosen."""
+
 DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
 STEADY: Final = [i for i in range(len(PARAMETERS)) if i not in DRIFTING]
 
@@ -89,22 +92,45 @@ def drift_precision(*, is_noise_free: bool = False) -> F64:
     return np.where(np.diag(_OF_NOISE), NOISE_STD**-2, _PRECISION) if is_noise_free else _PRECISION
 
 
+_DAMPERS: Final = [i for i, name in enumerate(DRIFT_STD) if name.startswith("damper_")]
+_DAMPERS_BELIEVED: Final = np.linalg.inv(_BELIEVED[np.ix_(_DAMPERS, _DAMPERS)])
+
+
+def with_worn_dampers(precision: F64) -> F64:
+    """(k, k) what is believed of drifting parameters where dampers may have worn, ``precision`` where they have not."""
+    covariance = np.linalg.inv(precision)
+    covariance[np.ix_(_DAMPERS, _DAMPERS)] = np.eye(len(_DAMPERS)) * WORN_STD**2
+    return np.asarray(np.linalg.inv(covariance), float)
+
+
+def dampers_of(drifting: F64) -> F64:
+    """(2,) front and rear dampers among the drifting parameters (k,)."""
+    return drifting[_DAMPERS]
+
+
+def strain_of(off: F64) -> float:
+    """Chi-squared of two: by how much the search's belief is strained by dampers among what lies ``off`` (k,)."""
+    dampers = dampers_of(off)
+    return float(dampers @ _DAMPERS_BELIEVED @ dampers)
+
+
 _OF_THE_VEHICLE: Final = np.array([not name.startswith(("gyro_lag", "noise")) for name in DRIFT_STD], dtype=float)
-_NATURAL_PRECISION: Final = np.linalg.inv(_NATURE_OF_DRIFTING)
+_NATURAL_PRECISION: Final = np.asarray(np.linalg.inv(_NATURE_OF_DRIFTING), float)
+_WORN_PRECISION: Final = with_worn_dampers(_NATURAL_PRECISION)
 MOST_TENSION: Final = float(2.0 * gammaincinv(int(_OF_THE_VEHICLE.sum()) / 2.0, 1.0 - 1e-4))  # chi-squared quantile
 """A vehicle that drifts as vehicles do exceeds this once in ten thousand batches."""
 
 
-def tension_of(off: F64) -> float:
+def tension_of(off: F64, *, is_worn: bool = False) -> float:
     """How far the drifting parameters lie ``off`` (k,) their calibration: those of the vehicle, squared, chi-squared.
 
     A load unlike any that calibration saw, or a vehicle that is no longer the same, is fitted at the price of
     parameters that no drift explains. The measure is what is natural (NATURE_STD), not what the search believes:
     dampers that another day changed by 5 % are no reason to refuse. The search holds them near the calibration, so that
-    they lie nearer by right.
+    they lie nearer by right. ``is_worn``: of dampers that may have worn.
     """
     off = off * _OF_THE_VEHICLE
-    return float(off @ _NATURAL_PRECISION @ off)
+    return float(off @ (_WORN_PRECISION if is_worn else _NATURAL_PRECISION) @ off)
 
 
 def _factor(covariance: F64) -> F64:

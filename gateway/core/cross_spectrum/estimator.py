@@ -54,6 +54,7 @@ _BY_NOISE: Final = (
     Why.NO_SOLUTION,
 )
 """What a sensor that has become noisy looks like."""
+FREED: Final = ("damper_front_freed_ratio", "damper_rear_freed_ratio")
 ZERO_POINT_SPEED_MARGIN: Final = 0.1  # how far beyond its own speeds a calibration from one load is believed
 
 
@@ -254,6 +255,7 @@ def _diagnostics(found: Weighed, calibration: CrossSpectrumCalibration) -> dict[
         "amplitude_ratio": math.exp(spectra.log_amplitude_mean),
         "damper_front_ratio": _ratio(located, calibration, "damper_front_nspm"),
         "damper_rear_ratio": _ratio(located, calibration, "damper_rear_nspm"),
+        **dict(zip(FREED, np.exp(located.freed).tolist(), strict=True)),
         "delay_scale": float(theta[INDEX["delay_scale"]]),
         "tension": located.tension,
         "sensor_position_score": located.scores.position,

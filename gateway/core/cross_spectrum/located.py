@@ -12,9 +12,11 @@ from gateway.core.cross_spectrum.drift import (
     DRIFTING,
     NATURE_OF_STEADY,
     STEADY,
+    dampers_of,
     day_columns,
     drift_precision,
     packing_columns,
+    strain_of,
     tension_of,
 )
 from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ, Sideways, sought_sideways, told_sideways
@@ -23,7 +25,7 @@ from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Curvature, P
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll, level
 from gateway.core.cross_spectrum.model.strokes import with_strokes
-from gateway.core.cross_spectrum.packing import Packing, packings
+from gateway.core.cross_spectrum.packing import LEAST_STRAIN, Packing, packings, worn
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
 from gateway.core.cross_spectrum.shape import EVIDENCE, EVIDENCE_WITHOUT_ROLL, Node, Shaped, Waypoint, shaped
@@ -58,7 +60,8 @@ class Located:
     causes of each source, gain_moves (2,) with the logarithm of the accelerometer's gain. rival_covariance is what
     peaks add that compete. tails are those of the error from the load's shape. tension is how far what drifts lies off
     its calibration (drift.tension_of). is_converged is false where a search that the answer rests on did not settle.
-    sideways is None without a roll rate.
+    freed (2,) is by how much the dampers of front and rear axle lie off their calibration, as logarithms; without what
+    the search believes of them where it strained at that. sideways is None without a roll rate.
     """
 
     point: Point
@@ -74,6 +77,7 @@ class Located:
     is_reversed: bool
     is_ambiguous: bool
     is_converged: bool
+    freed: F64
     as_known: Load  # what it would be, had it the shape of the known loads
     sideways: Sideways | None = None
 
@@ -85,6 +89,7 @@ class _Peak:
     found: Found
     packing: Packing
     rivals: F64 = field(default_factory=lambda: np.zeros((2, 2)))  # what others add to its covariance
+    freed: F64 | None = None  # drifting parameters, where dampers were sought that may have worn
 
 
 def locate(
@@ -316,8 +321,10 @@ def _located(
         rival_covariance=peak.rivals,
         misfit=misfit,
         tension=min(
-            tension_of(likeliest[1][:-2] - one.drifting) for one in packings(calibration.parameters, prior.precision)
+            tension_of(likeliest[1][:-2] - one.drifting, is_worn=prior.is_worn)
+            for one in packings(calibration.parameters, prior.precision)
         ),
+        freed=dampers_of((x[:-2] if peak.freed is None else peak.freed) - prior.drifting),
         scores=scores_of(judged, at_peak, found, replace(fitted, parameters=parameters), prior.precision),
         is_reversed=_is_reversed(whittle, at_peak, misfit, fitted),
         as_known=_point(peak.found.x, calibration, cg_left_m).load,
@@ -374,10 +381,21 @@ def _best(spectra: CrossSpectra, calibration: CrossSpectrumCalibration, precisio
         costs = whittle.costs([_point(x, calibration, 0.0) for x in starts])
         tried = [starts[i] for i in np.argsort(costs, kind="stable")[:n].tolist()]
         peaks += [_Peak(_sought(whittle, one, packing, calibration, 0.0, COARSE), packing) for one in tried]
-    best = min(peaks, key=lambda peak: peak.found.cost + peak.packing.decisive)
+    best = min(peaks, key=_rank)
+    freed = None
+    if strain_of(best.found.x[:-2] - best.packing.drifting) > LEAST_STRAIN:
+        packing = worn(best.packing)
+        peaks.append(_Peak(_sought(whittle, best.found.x, packing, calibration, 0.0, COARSE), packing))
+        freed = peaks[-1].found.x[:-2]
+        best = min(peaks, key=_rank)
     whittle = Whittle(_moving(spectra, best.found.x, calibration), calibration.ground)
     found = _sought(whittle, best.found.x, best.packing, calibration, 0.0)
-    return whittle, _Peak(found, best.packing, _rivalry(found, peaks))
+    return whittle, _Peak(found, best.packing, _rivalry(found, peaks), freed)
+
+
+def _rank(peak: _Peak) -> float:
+    """Its cost as it competes to be the answer."""
+    return peak.found.cost + peak.packing.decisive
 
 
 def _rivalry(found: Found, peaks: Sequence[_Peak]) -> F64:

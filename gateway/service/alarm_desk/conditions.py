@@ -54,7 +54,8 @@ def drift_says(trends: Sequence[Trend]) -> Iterator[Says]:
     for cause in DRIFTING:
         trend = by_name.get(cause.where or "")
         told = None if trend is None else trend.sentence()
-        if trend is None or told is None or trend.change is None:
+        number = None if trend is None else trend.level if trend.is_off else trend.change
+        if trend is None or told is None or number is None:
             yield Says(cause, Verdict.CLEAR)
         else:
-            yield Says(cause, Verdict.FINAL, Figure(trend.change, unit=trend.unit, detail=told))
+            yield Says(cause, Verdict.FINAL, Figure(number, unit=trend.unit, detail=told))

@@ -50,7 +50,7 @@ class TrendKeeper:
 
     @property
     def fault(self) -> str | None:
-        """What drifts, for people."""
+        """What drifts or is off, for people."""
         said = [sentence for trend in self._trends if (sentence := trend.sentence()) is not None]
         return "; ".join(said) or self._file.fault
 

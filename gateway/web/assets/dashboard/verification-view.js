@@ -21,9 +21,11 @@ function due({ due_at, is_due }) {
   return is_due ? phrase("due_now") : phrase("due_at", { time: clock(due_at) });
 }
 
-function trendText({ name, unit, change, interval99, is_drifting }) {
+function trendText({ name, unit, change, interval99, is_drifting, level, level99, is_off }) {
+  const what = capital(phrase.named("trend", name));
+  if (is_off) return phrase("trend_off", { name: what, level: signed(level, 1, unit), low: signed(level99[0], 1, unit), high: signed(level99[1], 1, unit) });
   const course = change === null ? phrase("trend_short") : phrase("trend_course", { change: signed(change, 1, unit), low: signed(interval99[0], 1, unit), high: signed(interval99[1], 1, unit) });
-  return phrase(is_drifting ? "trend_drifts" : "trend_line", { name: capital(phrase.named("trend", name)), course });
+  return phrase(is_drifting ? "trend_drifts" : "trend_line", { name: what, course });
 }
 
 /** A link cannot carry the token; a question can. The page opens on its own, to be printed. */
@@ -56,7 +58,7 @@ show(({ verifications }) => {
 
 show(({ trend }) => {
   if (trend === null) return;
-  element("drift").replaceChildren(...trend.parameters.map((one) => made("li", trendText(one), one.is_drifting ? "warning" : "")));
+  element("drift").replaceChildren(...trend.parameters.map((one) => made("li", trendText(one), one.is_drifting || one.is_off ? "warning" : "")));
 }, "trend");
 
 /** What a known load can be good for: how the dialog says it, and how the gateway is told. */

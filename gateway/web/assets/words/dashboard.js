@@ -350,6 +350,8 @@ export const DASHBOARD = {
   trend_drifts: ["{name}: {course}, it drifts", "{name}: {course}, driftet"],
   "trend.damper_front": ["damper front", "Dämpfer vorn"],
   "trend.damper_rear": ["damper rear", "Dämpfer hinten"],
+  trend_off: ["{name}: {level} off the calibration ({low} to {high})", "{name}: {level} gegenüber der Kalibrierung ({low} bis {high})"],
+  "trend.gyro_gain": ["gyro's gain", "Verstärkung des Kreisels"],
   "trend.delay": ["delay", "Verzögerung"],
   "trend.zero": ["zero", "Nullpunkt"],
   known_question: ["What is known of the load?", "Was ist von der Ladung bekannt?"],

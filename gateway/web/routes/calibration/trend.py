@@ -1,4 +1,4 @@
-"""/api/v1/calibration/trend: how the vehicle's own parameters have changed since it was calibrated."""
+"""/api/v1/calibration/trend: how the vehicle's own parameters have changed since it was calibrated, and the gyro."""
 
 from typing import Final, Literal, Protocol
 
@@ -36,6 +36,11 @@ class ParameterTrend(BaseModel):
     change: float | None = Field(description="from the first point to the last; null: too few points")
     interval99: tuple[float, float] | None = Field(description="of the change")
     is_drifting: bool
+    level: float | None = Field(description="where the newest batches stand off the calibration; null: too few of them")
+    level99: tuple[float, float] | None = Field(description="of the level")
+    is_off: bool = Field(
+        description="whether the level is neither chance nor small: dampers from 20 %, a gain from 2 %"
+    )
 
 
 class TrendState(BaseModel):
@@ -51,7 +56,7 @@ def trend_router(desk: TrendDesk) -> APIRouter:
 
     @router.get(TREND_PATH, response_model=TrendState)
     async def parameter_trend(request: Request) -> Response:
-        """Dampers, the delay's scale and the zero over the months, and whether they drift."""
+        """Dampers, the delay's scale, the gyro's gain and the zero over the months: whether they drift or are off."""
         return await answered(request, desk.told)
 
     return router
