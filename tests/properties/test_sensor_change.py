@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.half_car_road import CAR, batch_over_road, calibrated_on_known_loads, weighed
 
+from gateway.core.cross_spectrum import located
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFTING, MOST_TENSION, tension_of
 from gateway.core.cross_spectrum.likelihood import Point
@@ -15,6 +16,7 @@ from gateway.estimate import Estimate
 from gateway.records import Batch, Why
 
 LOAD = (200.0, 50.0)
+WITH_OTHER_DAMPERS = replace(CAR, rear=replace(CAR.rear, damper_nspm=1.74 * CAR.rear.damper_nspm))
 
 
 @pytest.fixture(scope="module")
@@ -131,9 +133,19 @@ def test_tension_counts_the_vehicle_and_not_the_lag() -> None:
     assert tension_of(off) > MOST_TENSION
 
 
-def test_a_vehicle_that_no_drift_explains_is_refused(calibration: CrossSpectrumCalibration) -> None:
-    worn = replace(CAR, rear=replace(CAR.rear, damper_nspm=1.74 * CAR.rear.damper_nspm))
-    estimate = weighed(batch_over_road(*LOAD, seed=67, car=worn), calibration)
+def test_other_dampers_are_found_and_weighed_by(calibration: CrossSpectrumCalibration) -> None:
+    found = answered(batch_over_road(*LOAD, seed=67, car=WITH_OTHER_DAMPERS), calibration)
+    assert found.payload.interval95[0] <= LOAD[0] <= found.payload.interval95[1]
+    assert found.front_share.interval95[0] <= LOAD[1] <= found.front_share.interval95[1]
+    assert found.diagnostics["damper_rear_freed_ratio"] == pytest.approx(1.74, rel=0.1)
+    assert found.diagnostics["tension"] < MOST_TENSION
+
+
+def test_a_vehicle_that_no_drift_explains_is_refused(
+    calibration: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(located, "LEAST_STRAIN", np.inf)  # no other dampers are thought of
+    estimate = weighed(batch_over_road(*LOAD, seed=67, car=WITH_OTHER_DAMPERS), calibration)
     assert not estimate.counted
     assert estimate.diagnostics["tension"] > MOST_TENSION
 
