@@ -97,6 +97,18 @@ def test_gravity_that_reads_otherwise_is_told(calibration: CrossSpectrumCalibrat
     assert weighed(amplified(batch_over_road(*LOAD, seed=63), 1.05), calibration).rejected == (Why.SENSOR_CHANGED,)
 
 
+@pytest.mark.parametrize(("gain", "is_refused"), [(1.01, False), (1.05, True), (0.95, True), (None, False)])
+def test_a_gyro_s_gain_that_bends_tell_otherwise_is_told(
+    calibration: CrossSpectrumCalibration, gain: float | None, is_refused: bool
+) -> None:
+    with_bends = replace(calibration, gyro_gain=(1.0, 0.002))
+    batch = replace(batch_over_road(*LOAD, seed=63), gyro_gain=None if gain is None else (gain, 0.008))
+    found = weighed(batch, with_bends)
+    assert found.rejected == ((Why.SENSOR_CHANGED,) if is_refused else ())
+    assert found.diagnostics.get("gyro_gain_ratio") == gain
+    assert weighed(batch, calibration).counted  # which knows of no gain
+
+
 def test_a_little_more_gain_is_within_the_interval(calibration: CrossSpectrumCalibration) -> None:
     batch = batch_over_road(*LOAD, seed=64)
     as_it_was, stronger = answered(batch, calibration), answered(amplified(batch, 1.01), calibration)
