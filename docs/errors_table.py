@@ -39,7 +39,7 @@ roll rate mapped where a row says so; "another day" changes their dampers, tyres
 
 """
 HEAD: Final = (
-    "| mean error, payload / front share | ratio index | cross spectrum | its 95 % intervals held "
+    "| mean error, payload / front share | ratio index | cross spectrum | its 95 % intervals contain the truth "
     "| half as wide as | score (ideal) | refused |\n|---|---|---|---|---|---|---|"
 )
 

@@ -63,7 +63,7 @@ def _sideways(judgement: Judgement) -> Iterator[str]:
         yield (
             f"To the side, {PART_NAMES[part]}: the centre of gravity's place beside the centre line errs by "
             f"{1000.0 * found.mean_abs_m:.0f} mm on average over {counted(n_told, 'answer')} to a load whose place was "
-            f"noted, and its 95 % intervals held in {percent(found.coverage95)}"
+            f"noted, and its 95 % intervals contain the truth in {percent(found.coverage95)}"
             + ("." if of_wheels is None else f"; a wheel's load errs by {of_wheels:.1f} % of the gross weight.")
         )
 
