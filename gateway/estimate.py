@@ -1,4 +1,5 @@
-"""What a batch taught: payload, front share and where the load lies sideways, with how sure they are, or why nothing.
+"""The estimate of one batch: payload, front share and lateral position with their uncertainty, or the reason why there
+is none.
 
 Inside, a share is in percent wherever it is a :class:`Quantity`, as everybody outside reads it.
 """
@@ -18,7 +19,7 @@ from gateway.records import Spectra, Why
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """What the batches since the load last changed show together (core.fusion)."""
+    """The fused estimate of the batches since the load last changed (core.fusion)."""
 
     payload: Quantity
     front_share: Quantity
@@ -28,7 +29,7 @@ class Epoch:
 
 
 class Lack(StrEnum):
-    """What a weight would need to be known."""
+    """Facts that are missing for a weight."""
 
     CALIBRATION = "calibration"  # nobody says what the vehicle weighs empty
     ESTIMATE = "estimate"  # the batch was rejected; of axles and wheels: or it does not tell the front share
@@ -39,9 +40,9 @@ class Lack(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Weight:
-    """A weight on the road, its standard deviation and what it may be (None: nobody said); NaN where unknown.
+    """A weight on the road, its standard deviation and its limit (None: no limit stated); NaN if unknown.
 
-    ``is_unsprung_estimated`` where calibration found the unsprung mass in it, since nobody stated one.
+    ``is_unsprung_estimated``: calibration found the unsprung mass, since nobody stated one.
     """
 
     kg: float = math.nan
@@ -83,7 +84,7 @@ PLACES: Final = tuple(place.name for place in fields(Weights))
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where, in degrees of WGS 84, rounded as the settings say; NaN where nobody knows or nobody may know."""
+    """A position in degrees of WGS 84, rounded as the settings say; NaN if unknown or not kept."""
 
     latitude_deg: float = math.nan
     longitude_deg: float = math.nan
@@ -98,7 +99,7 @@ NOWHERE: Final = Place()
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What door and ignition did meanwhile: None where neither was heard of."""
+    """Door and ignition during that time: None if neither was received."""
 
     door_opened: bool | None = None
     ignition_off: bool | None = None
@@ -113,7 +114,7 @@ UNWATCHED: Final = Watched()
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """A standstill within a batch, from and to; it may go on in the next one."""
+    """A standstill within a batch, from and to; it may continue in the next one."""
 
     t_start_ns: int
     t_end_ns: int
@@ -123,11 +124,11 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """The way of one batch. ``distance_m`` is of the ``known_s`` in which the speed was known.
+    """The distance and standstills of one batch. ``distance_m`` covers the ``known_s`` in which the speed was known.
 
-    Odometer readings are the first and the last within the batch. ``before`` is what was seen between the drive before
-    and this one, in the first batch of a drive alone. ``since_ns`` is where the way begins, if later than the batch:
-    what was pooled from windows before has its way with their records.
+    Odometer readings are the first and the last within the batch. ``before`` is the standstill between this drive and
+    the one before, in the first batch of a drive alone. ``since_ns`` is the start of the way if later than that of the
+    batch: windows pooled from before have their way in their own records.
     """
 
     distance_m: float = math.nan
@@ -144,14 +145,15 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What a batch taught: payload (kg) and front share (%), or why nothing. Unknown is NaN (null in JSON).
+    """The estimate of one batch: payload (kg) and front share (%), or the reasons why there is none. Unknown is NaN
+    (null in JSON).
 
-    With a roll rate also ``cg_left``, where the sprung mass has its centre of gravity (m left of the centre line),
+    With a roll rate also ``cg_left``, the centre of gravity of the sprung mass (m left of the centre line),
     ``left_share``, its share on the left wheels (%), and ``roll_share_front``, the part of a sideways load's moment
-    that the front axle's springs and bar take (0 to 1). ``posterior`` carries all of these errors by their sources;
-    ``measured`` is what it was before known weights were taken into account (None: there were none), and
-    ``known_weights_id`` names these. A remainder is neither an answer nor a refusal: a window, or a piece of one, with
-    too little driving in it to be a batch, kept for its way; ``rejected`` says what it lacks.
+    that the front axle's springs and bar carry (0 to 1). ``posterior`` contains all of these errors by source;
+    ``measured`` is the estimate before known weights were applied (None: there were none), and ``known_weights_id``
+    names these. A remainder is neither an answer nor a refusal: a window, or a piece of one, with too little driving
+    for a batch, kept for its way; ``rejected`` says what it lacks.
     """
 
     t_start_ns: int
@@ -189,11 +191,11 @@ class Estimate:
 
     @property
     def counted(self) -> bool:
-        """True where the batch gave an answer."""
+        """True if the batch gave an estimate."""
         return not self.rejected
 
     def refused(self, *whys: Why) -> "Estimate":
-        """The same batch without its answer, and why there is none."""
+        """The same batch without its estimate, with the reasons."""
         return replace(
             self,
             payload=UNKNOWN,
@@ -211,7 +213,7 @@ class Estimate:
         )
 
     def answered(self, posterior: Posterior) -> "Estimate":
-        """The same batch with this answer; what follows from it with the vehicle's figures is still to come."""
+        """The same batch with this answer; weights still have to be computed with the vehicle's figures."""
         return replace(
             self,
             posterior=posterior,
@@ -222,33 +224,33 @@ class Estimate:
 
     @property
     def way_start_ns(self) -> int:
-        """Where its way begins; those of one drive touch."""
+        """Start of its way; the ways of one drive adjoin."""
         since_ns = None if self.way is None else self.way.since_ns
         return self.t_start_ns if since_ns is None else since_ns
 
     @property
     def raw_payload(self) -> Quantity | None:
-        """As measured, where known weights changed it."""
+        """The estimate before known weights changed it."""
         return None if self.measured is None else self.measured.quantity(PAYLOAD)
 
     @property
     def raw_front_share(self) -> Quantity | None:
-        """As measured, where known weights changed it."""
+        """The estimate before known weights changed it."""
         return None if self.measured is None else self.measured.quantity(FRONT_SHARE)
 
     @property
     def payload_front_share_correlation(self) -> float:
-        """Of both errors, -1 to 1."""
+        """Correlation of both errors, -1 to 1."""
         return self._correlation(PAYLOAD, FRONT_SHARE)
 
     @property
     def payload_cg_left_correlation(self) -> float:
-        """Of both errors, -1 to 1."""
+        """Correlation of both errors, -1 to 1."""
         return self._correlation(PAYLOAD, CG_LEFT)
 
     @property
     def front_share_cg_left_correlation(self) -> float:
-        """Of both errors, -1 to 1."""
+        """Correlation of both errors, -1 to 1."""
         return self._correlation(FRONT_SHARE, CG_LEFT)
 
     def _correlation(self, one: int, other: int) -> float:
@@ -256,14 +258,14 @@ class Estimate:
 
     @property
     def as_measured(self) -> Posterior | None:
-        """What the batch and the calibration alone say: known weights come and go, and no load changes with them."""
+        """The estimate of the batch and the calibration alone: known weights come and go without a change of the
+        load.
+        """
         return self.posterior if self.measured is None else self.measured
 
     @property
     def id(self) -> str:
-        """The same batch, vehicle, estimator, calibration and known weights have the same id, whenever it is
-        computed.
-        """
+        """The same batch, vehicle, estimator, calibration and known weights always have the same id."""
         parts: tuple[object, ...] = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator)
         parts += (self.calibration_id, *((self.known_weights_id,) if self.known_weights_id else ()))
         digest = hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()

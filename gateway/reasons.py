@@ -1,6 +1,6 @@
-"""Why a batch gave no estimate, or an uncertain one, in words for people: what happened, and what to do about it.
+"""Reasons in words for people: why a batch gave no estimate, or an uncertain one, and what to do about it.
 
-docs/reasons.md and the dashboard say this. Names in backquotes are settings of ``[batch]`` unless the
+docs/reasons.md and the dashboard show these texts. Names in backquotes are settings of ``[batch]`` unless the
 text gives another place.
 """
 
@@ -16,7 +16,7 @@ from gateway.records import Why
 
 
 class Cause(StrEnum):
-    """Where a reason comes from."""
+    """The part of the program that gives a reason."""
 
     NOTHING_YET = "Nothing to say yet"
     DRIVE = "The drive"
@@ -26,7 +26,7 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """One reason in words; ``happened`` and ``advice`` are parts of sentences, as a table holds them."""
+    """One reason in words; ``happened`` and ``advice`` are parts of sentences, for use in a table."""
 
     cause: Cause
     happened: str
@@ -57,12 +57,12 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
     {
         Why.NO_ESTIMATE_YET: Explanation(
             Cause.NOTHING_YET,
-            "nothing has been estimated since the store was made",
+            "there has been no estimate since the store was created",
             "drive; the first batch ends after `window_s`",
         ),
         Why.NO_CALIBRATION: Explanation(
             Cause.NOTHING_YET,
-            "no calibration file is given, or it does not hold the chosen estimator",
+            "no calibration file is given, or it does not contain the chosen estimator",
             "`springscale calibrate`, then name the file under `calibration`",
         ),
         Why.TOO_SHORT: Explanation(
@@ -84,12 +84,12 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             Cause.DRIVE,
             "a trailer was drawn for too much of the window (the signal `trailer`): it pushes and pulls at the "
             "vehicle, and its drawbar is no load in it",
-            "nothing; without the trailer the vehicle is weighed again",
+            "nothing; the vehicle is weighed again without the trailer",
         ),
         Why.TOO_SLOW: Explanation(
             Cause.DRIVE,
             "too much of the window below `speed_min_mps`: town, queue, yard",
-            "nothing; the next open road will do",
+            "nothing; an open road is enough",
         ),
         Why.TOO_FAST: Explanation(
             Cause.DRIVE,
@@ -98,9 +98,8 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.SPEED_SPREAD: Explanation(
             Cause.DRIVE,
-            "speed varied more than the ratio index bears, or changed too fast throughout for even stretches to be "
-            "found",
-            "steady driving; `cross_spectrum` bears more than `ratio_index`",
+            "speed varied more than the ratio index tolerates, or changed too fast throughout to find even stretches",
+            "steady driving; `cross_spectrum` tolerates more than `ratio_index`",
         ),
         Why.SPEED_UNCALIBRATED: Explanation(
             Cause.DRIVE,
@@ -108,7 +107,7 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "calibrate with drives at this speed too",
         ),
         Why.NOT_ENOUGH_EXCITATION: Explanation(
-            Cause.DRIVE, "the road was too smooth to tell loads apart", "nothing; an ordinary road will do"
+            Cause.DRIVE, "the road was too smooth to distinguish loads", "nothing; an ordinary road is enough"
         ),
         Why.SPEED_MISSING: Explanation(
             Cause.SENSORS,
@@ -133,20 +132,20 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.TIME_STAMPS: Explanation(
             Cause.SENSORS,
-            "time stamps are so uneven, or so many frames are lost, that nobody can tell when samples were taken",
+            "time stamps are so uneven, or so many frames are lost, that the sampling times are unknown",
             "stamp frames in the kernel (socketcan), lighten the computer's load, or name the message `counter` in the "
             "signal map",
         ),
         Why.SENSOR_RATE_LOW: Explanation(Cause.SENSORS, "the sensor sends too seldom for `rate_hz`", "raise its rate"),
         Why.SAMPLE_RATE: Explanation(
             Cause.SENSORS,
-            "the sensors sample at another rate than in calibration, by more than a quarter: other vibration folds "
-            "into what they send",
+            "the sensors' sampling rate differs from that in calibration by more than a quarter: other vibration "
+            "aliases into their signals",
             "set the device to the rate that it was calibrated at, or calibrate again at this one",
         ),
         Why.SENSOR_CHANGED: Explanation(
             Cause.SENSORS,
-            "the sensor is not where, or not what, it was when it was calibrated: moved, turned, or with another gain",
+            "the sensor differs from calibration: it was moved, turned, replaced, or has another gain",
             "mount it as it was, or calibrate again",
         ),
         Why.SENSOR_NOISY: Explanation(
@@ -162,7 +161,7 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         Why.SENSOR_DISAGREEMENT: Explanation(
             Cause.SENSORS,
             "acceleration and pitch rate do not move together as one body does",
-            "check that both come from the same rigid place and time stamps",
+            "check that both sensors sit in the same rigid place and have consistent time stamps",
         ),
         Why.WRONG_SIGN: Explanation(
             Cause.SENSORS,
@@ -171,9 +170,9 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.OUT_OF_RANGE: Explanation(
             Cause.ANSWER,
-            "the 95 % interval lies wholly outside the loads or shares of the calibration plus a margin; for the ratio "
-            "index, R itself does: its intervals grow as fast as its errors",
-            "calibrate with such loads, or suspect vehicle and sensor",
+            "the 95 % interval lies wholly outside the loads or shares of the calibration plus a margin; for the "
+            "ratio index, R itself does: its intervals grow as fast as its errors",
+            "calibrate with such loads, or check vehicle and sensor",
         ),
         Why.TOO_UNCERTAIN: Explanation(
             Cause.ANSWER,
@@ -183,19 +182,19 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.AMBIGUOUS: Explanation(
             Cause.ANSWER,
-            "two loads far from each other explain these spectra about equally well",
+            "two very different loads explain these spectra about equally well",
             "drive on, on another road or at another speed; calibrate with more loads",
         ),
         Why.MODEL_MISFIT: Explanation(
             Cause.ANSWER,
             "no payload and share explain these spectra as well as calibration leads to expect",
             "make sure that the calibration is this vehicle's; look for a changed tyre, spring or sensor mount; "
-            "calibrate anew",
+            "calibrate again",
         ),
         Why.NO_SOLUTION: Explanation(
             Cause.ANSWER,
             "the search for the load did not settle, or its numbers broke down",
-            "nothing, if it is rare; else look at what the sensors send, and calibrate anew",
+            "nothing, if it is rare; else check the sensors' signals, and calibrate again",
         ),
     }
 )
@@ -204,14 +203,14 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
 SOURCES: Final[Mapping[str, str]] = MappingProxyType(
     {
         OWN: "this drive's own length and road",
-        Source.CALIBRATION: "what the known loads left open of the vehicle",
-        Source.GOODS: "how long and high this vehicle's loads usually are",
-        Source.LOAD_LENGTH: "how long and high this very load is",
+        Source.CALIBRATION: "parameters of the vehicle that the known loads did not determine",
+        Source.GOODS: "the usual length and height of this vehicle's loads",
+        Source.LOAD_LENGTH: "the length and height of this very load",
         Source.DAY: "temperature and wear of springs, tyres and dampers",
         Source.SENSOR: "the sensor's gain",
-        Source.SIDEWAYS: "where the load lies to the side",
+        Source.SIDEWAYS: "the lateral position of the load",
         Source.EMPTY_SHARE: "the empty vehicle's weight on its front axle",
-        Source.MODEL: "what the model of the vehicle leaves out",
+        Source.MODEL: "effects that the model of the vehicle neglects",
     }
 )
 """The sources of an estimate's error, as parts of sentences."""
@@ -219,11 +218,11 @@ SOURCES: Final[Mapping[str, str]] = MappingProxyType(
 REMEDIES: Final[Mapping[Remedy, str]] = MappingProxyType(
     {
         Remedy.DRIVE_ON: "drive another ten minutes with the same load",
-        Remedy.WEIGH_ONCE: "weigh it once, loaded, and state that as a known weight",
-        Remedy.SAY_WHAT_IS_CARRIED: "say in the vehicle's data what it carries, and how long and high that is",
+        Remedy.WEIGH_ONCE: "weigh the vehicle once, loaded, and state that as a known weight",
+        Remedy.SAY_WHAT_IS_CARRIED: "state in the vehicle's data what it carries, with its length and height",
         Remedy.WEIGH_EMPTY: "tell the gateway when the vehicle is empty",
         Remedy.READ_ROLL_RATE: "map the roll rate, if the device sends it",
         Remedy.WEIGH_AXLES_EMPTY: "weigh both axles of the empty vehicle",
     }
 )
-"""What would narrow an error, as parts of sentences."""
+"""Remedies that narrow an error, as parts of sentences."""

@@ -31,7 +31,7 @@ EXTENDED_ID: Final = 0x8000_0000  # CAN_EFF_FLAG of SocketCAN: a 29-bit identifi
 
 
 class Signal(StrEnum):
-    """What we can read from a bus. The first three are needed, the others are welcome."""
+    """The signals that the gateway reads from a bus. The first three are needed, the others are welcome."""
 
     VERTICAL_ACCELERATION = "vertical_acceleration"
     PITCH_RATE = "pitch_rate"
@@ -54,17 +54,19 @@ class Signal(StrEnum):
 
 
 JOURNEY: Final = frozenset({Signal.IGNITION, Signal.LATITUDE, Signal.LONGITUDE, Signal.ODOMETER, Signal.DOOR})
-"""Signals of where the vehicle is and what is done with it: they weigh nothing, and no batch hangs on them."""
+"""Signals of position and use: no estimate depends on them, and no batch waits for them."""
 
 STATIC: Final = frozenset({Signal.AXLE_WEIGHT, Signal.AIR_SPRING_PRESSURE, Signal.RIDE_HEIGHT})
-"""What sensors of the vehicle's own say of its load, standing too: shown beside what we weigh, and never part of it."""
+"""Signals of the vehicle's own load sensors, which also report at a standstill: shown beside the estimates, and never
+part of them.
+"""
 
 ASIDE: Final = JOURNEY | STATIC | {Signal.TRAILER}
-"""Signals on which neither a drive nor a window hangs: they are sent while the vehicle stands, too."""
+"""Signals that neither begin nor extend a drive or a window: vehicles also send them at a standstill."""
 
 
 class Why(StrEnum):
-    """Why a batch gave no estimate. gateway.reasons tells what each asks of a person."""
+    """Why a batch gave no estimate. gateway.reasons says what to do about each."""
 
     NO_ESTIMATE_YET = "no_estimate_yet"
     NO_CALIBRATION = "no_calibration"
@@ -120,11 +122,11 @@ class Frames:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Decoded samples in order of arrival: one row a frame, one column a signal, NaN where it says nothing.
+    """Decoded samples in order of arrival: one row a frame, one column a signal, NaN if the frame does not contain it.
 
-    t_ns (n,); columns (n, len(signals)) in SI and vehicle axes (ISO 8855), gravity still in. counters: the
-    message counter (n,) of the frames that carry a signal, where the signal map names one. aside (n,): rows of messages
-    that carry nothing but signals of ASIDE; None where there is no such message.
+    t_ns (n,); columns (n, len(signals)) in SI and vehicle axes (ISO 8855), gravity included. counters: the message
+    counter (n,) of the frames that carry a signal, if the signal map names one. aside (n,): rows of messages that carry
+    only signals of ASIDE; None if there is no such message.
     """
 
     signals: tuple[Signal, ...]
@@ -137,7 +139,7 @@ class Motion:
         return len(self.t_ns)
 
     def of(self, signal: Signal) -> tuple[I64, F64]:
-        """Times (m,) and finite samples (m,) of one signal; both empty where it is not mapped."""
+        """Times (m,) and finite samples (m,) of one signal; both empty if it is not mapped."""
         if signal not in self.signals:
             return self.t_ns[:0], np.empty(0)
         column = self.columns[:, self.signals.index(signal)]
@@ -145,7 +147,7 @@ class Motion:
         return self.t_ns[known], column[known]
 
     def counter_of(self, signal: Signal) -> I64 | None:
-        """Message counters (m,) of the samples that ``of`` gives; None where not every one has its own."""
+        """Message counters (m,) of the samples that ``of`` gives; None unless every sample has its own."""
         if signal not in self.signals or signal not in self.counters:
             return None
         known = np.isfinite(self.columns[:, self.signals.index(signal)])
@@ -160,7 +162,9 @@ class Motion:
 
     @property
     def weighing(self) -> "Motion":
-        """Without the rows aside but those of a trailer, which weighs nothing and yet decides what can be weighed."""
+        """Without the rows of ASIDE, except those of a trailer: its signal weighs nothing but decides whether the
+        vehicle can be weighed.
+        """
         if self.aside is None:
             return self
         kept = ~self.aside
@@ -187,9 +191,9 @@ def joined(parts: Sequence[Motion]) -> Motion:
 
 @dataclass(frozen=True, slots=True)
 class SensorTraits:
-    """What the signal map and its DBC tell of one signal. SI; NaN where the DBC does not say.
+    """What the signal map and its DBC say about one signal. SI; NaN if the DBC does not say.
 
-    The message counter, where the map names one, counts modulo ``counter_modulus``.
+    If the map names a message counter, it counts modulo ``counter_modulus``.
     """
 
     latency_s: float = 0.0
@@ -218,15 +222,14 @@ class Spectra:
 class Batch:
     """One window of a drive on a uniform grid, ready for any estimator.
 
-    Arrays are (n,) at ``rate_hz`` from ``t_start_ns``; NaN where unknown. ``usable`` marks the
-    samples that every gate lets through; no spectrum segment may cross a sample outside it.
-    vertical_acceleration_mps2 has its mean over the usable samples removed (that mean is
-    ``gravity_mps2``); pitch_rate_radps keeps its bias (segments are detrended). roll_rate_radps (positive
-    left side up) keeps its bias too; it is None where the signal map has none, and neither masks nor rejects.
-    ``shares`` tells which part of the window each cause masked. ``rejected`` holds the reasons
-    that no estimator can mend. ``sensor_rate_hz`` is how often the slower of accelerometer and gyro sends.
-    ``gyro_gain`` is the gyro's gain over the accelerometer's as bends tell it, and its standard deviation; None where
-    nothing tells it.
+    Arrays are (n,) at ``rate_hz`` from ``t_start_ns``; NaN if unknown. ``usable`` marks the samples that every gate
+    accepts; no spectrum segment may cross a sample outside it. vertical_acceleration_mps2 has its mean over the usable
+    samples removed (that mean is ``gravity_mps2``); pitch_rate_radps keeps its bias (segments are detrended).
+    roll_rate_radps (positive left side up) keeps its bias too; it is None if the signal map has none, and neither masks
+    nor rejects. ``shares`` says which part of the window each cause masked. ``rejected`` contains the reasons that
+    apply to every estimator. ``sensor_rate_hz`` is the lower sending rate of accelerometer and gyro.
+    ``gyro_gain`` is the gyro's gain over the accelerometer's as bends show it, and its standard deviation; None if
+    nothing shows it.
     """
 
     t_start_ns: int
@@ -257,7 +260,7 @@ class Batch:
 
     @property
     def roll_usable_share(self) -> float | None:
-        """Share of the usable samples whose roll rate is known: 0 where the sensor failed, None where there is none."""
+        """Share of the usable samples whose roll rate is known: 0 if the sensor failed, None if there is none."""
         if self.roll_rate_radps is None:
             return None
         known = np.isfinite(self.roll_rate_radps[self.usable])
@@ -265,7 +268,7 @@ class Batch:
 
     @property
     def mean_speed_mps(self) -> float:
-        """Mean over the usable samples; where there are none, over what is known; NaN if nothing is."""
+        """Mean over the usable samples; if there are none, over the known samples; NaN if there are none either."""
         speed = self.speed_mps[self.usable] if self.usable.any() else self.speed_mps[np.isfinite(self.speed_mps)]
         return float(np.mean(speed)) if speed.size else math.nan
 

@@ -1,4 +1,4 @@
-"""What the service tells of itself, in types and in words: filled in by its parts, sent as it is by the web."""
+"""The service's status, as types and in words: its parts fill it in, the web sends it unchanged."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -30,7 +30,7 @@ SENTENCES: Final[dict[State, str]] = {
     State.STALE: "No new estimate for a while: the shown one is old.",
     State.READER_FAULT: "The bus cannot be read: see the last fault.",
 }
-OTHERS_ONLY: Final = "The bus is awake (identifiers heard: {}), but none that is mapped."
+OTHERS_ONLY: Final = "The bus is awake (identifiers heard: {}), but none of them is mapped."
 
 
 SILENT_AFTER_S: Final = 5.0
@@ -41,7 +41,7 @@ class _Told(BaseModel):
 
 
 class BusStatus(_Told):
-    """The CAN interface and what came through it since the start."""
+    """The CAN interface and its frames since the start."""
 
     interface: str = ""
     channel: str = ""
@@ -50,16 +50,16 @@ class BusStatus(_Told):
     n_error_frames: int = 0
     n_reconnects: int = 0
     n_inbox_dropped: int = Field(0, description="frames the pipeline did not take in time")
-    n_kernel_dropped: int | None = Field(None, description="frames the kernel dropped; null where it does not tell")
+    n_kernel_dropped: int | None = Field(None, description="frames the kernel dropped; null if it does not say")
     last_frame_age_s: float | None = None
     n_identifiers: int | None = Field(
-        None, description="how many are on the bus, looked for while a sensor is silent; null where nobody looked"
+        None, description="how many are on the bus, counted while a sensor is silent; null if not counted"
     )
     last_fault: str | None = None
 
 
 class DecodeCount(_Told):
-    """How often frames of one signal ended one way; reason ``ok`` counts the samples."""
+    """How often frames of one signal had one outcome; reason ``ok`` counts the samples."""
 
     signal: str
     reason: str
@@ -67,7 +67,7 @@ class DecodeCount(_Told):
 
 
 class SignalHealth(_Told):
-    """How one mapped signal has been doing lately; null is unknown."""
+    """The recent health of one mapped signal; null is unknown."""
 
     signal: str = Field(examples=["vertical_acceleration"])
     rate_hz: float | None = None
@@ -80,12 +80,12 @@ class SignalHealth(_Told):
 
     @property
     def is_silent(self) -> bool:
-        """Not heard, or not for longer than any signal pauses."""
+        """Never received, or not for longer than any signal pauses."""
         return self.last_age_s is None or self.last_age_s > SILENT_AFTER_S
 
 
 class OwnReading(_Told):
-    """What a load sensor of the vehicle's own last said; no part of what is weighed here."""
+    """The last value of one of the vehicle's own load sensors; it is not part of the estimate."""
 
     signal: str = Field(examples=["air_spring_pressure"])
     number: float = Field(examples=[412.0])
@@ -94,25 +94,27 @@ class OwnReading(_Told):
 
 
 class Standing(_Told):
-    """Whether the vehicle stands, and whether the load can have changed since it was last weighed."""
+    """Whether the vehicle stands, and whether the load can have changed since the last weighing."""
 
-    stood_s: float | None = Field(None, description="for how long it has stood; null: it drives")
+    stood_s: float | None = Field(None, description="standstill so far; null: it drives")
     is_load_weighed: bool = Field(
         True, description="false: it has driven on since a stop long enough to load, and that load is not weighed yet"
     )
 
 
 class BatchCounts(_Told):
-    """What became of the batches since the start."""
+    """Batches since the start, by outcome."""
 
     n_estimates: int = 0
     n_rejected: int = 0
     n_provisional: int = 0
     n_remainders: int = Field(
-        0, description="windows with too little driving to be batches, pooled with what follows under the same load"
+        0,
+        description="windows with too little driving for a batch of their own, pooled with later ones under the "
+        "same load",
     )
     missing_s: float | None = Field(
-        None, description="how many seconds of usable driving the next batch still lacks", examples=[42.0]
+        None, description="seconds of usable driving that the next batch still lacks", examples=[42.0]
     )
     rejected_by_reason: dict[str, int] = Field(default_factory=dict)
 
@@ -126,29 +128,29 @@ class StoreState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class StoreStatus:
-    """Whether estimates reach the disk. Degraded: they are kept in memory, and ``reason`` says why."""
+    """Whether estimates reach the disk. Degraded: new records are kept in memory, and ``reason`` says why."""
 
     state: Annotated[str, Field(examples=["ok", "degraded"])] = StoreState.OK
     reason: str | None = None
     n_written: int = 0
     n_held: Annotated[int, Field(description="rows that wait in memory")] = 0
-    n_dropped: Annotated[int, Field(description="rows that had to give way in memory")] = 0
+    n_dropped: Annotated[int, Field(description="rows discarded for lack of memory")] = 0
     n_duplicates: int = 0
     n_pruned: Annotated[int, Field(description="rows removed by age or size")] = 0
     size_bytes: int = 0
     n_bad_records: Annotated[int, Field(description="records that failed their checksum and were set aside")] = 0
-    set_aside: Annotated[str | None, Field(description="damaged database that was renamed out of the way")] = None
+    set_aside: Annotated[str | None, Field(description="damaged database that the service renamed")] = None
 
 
 @dataclass(frozen=True, slots=True)
 class UplinkStatus:
-    """How estimates get to the fleet's broker; counts begin at the start but for those the store keeps."""
+    """How estimates get to the fleet's broker; counts begin at the start, except those that the store keeps."""
 
     broker: Annotated[str, Field(examples=["fleet.example:8883"])]
     is_connected: bool = False
     n_delivered: Annotated[int, Field(description="acknowledged by the broker")] = 0
     n_refused: Annotated[int, Field(description="given up: the broker will never take them")] = 0
-    n_waiting: Annotated[int, Field(description="in the store, still to be delivered; as of a few seconds ago")] = 0
+    n_waiting: Annotated[int, Field(description="stored but not yet delivered; as of a few seconds ago")] = 0
     waiting_age_s: Annotated[
         float | None, Field(description="of the oldest of them, since its receipt; null: none waits")
     ] = None
@@ -160,7 +162,7 @@ class UplinkStatus:
 
 @dataclass(frozen=True, slots=True)
 class DeadLetter:
-    """One that the webhook gave up."""
+    """A message that the webhook gave up."""
 
     id: str
     reason: str
@@ -169,7 +171,9 @@ class DeadLetter:
 
 @dataclass(frozen=True, slots=True)
 class WebhookStatus:
-    """How alarms and events get to the webhook's receiver; counts begin at the start but for those the store keeps."""
+    """How alarms and events get to the webhook's receiver; counts begin at the start, except those that the store
+    keeps.
+    """
 
     receiver: Annotated[str, Field(examples=["https://fleet.example:443"])]
     n_delivered: Annotated[int, Field(description="answered with 2xx")] = 0
@@ -181,12 +185,12 @@ class WebhookStatus:
         float | None, Field(description="of the oldest of them, since its receipt; null: none waits")
     ] = None
     n_pruned: Annotated[int, Field(description="removed by retention before they could be delivered")] = 0
-    last_fault: Annotated[str | None, Field(description="null while letters are taken")] = None
+    last_fault: Annotated[str | None, Field(description="null while the receiver accepts messages")] = None
 
 
 @dataclass(frozen=True, slots=True)
 class RecordStatus:
-    """How the ring log goes; counts begin at the start of the service."""
+    """State of the ring log; counts begin at the start of the service."""
 
     n_frames_written: int = 0
     n_frames_held: Annotated[int, Field(description="frames that wait in memory for the next block")] = 0
@@ -200,7 +204,7 @@ class RecordStatus:
 
 @dataclass(frozen=True, slots=True)
 class VerificationStatus:
-    """Known loads weighed with the present calibration, and when that is due again."""
+    """Known loads weighed with the present calibration, and when the next ones are due."""
 
     n_records: Annotated[int, Field(description="kept in all, those of earlier calibrations among them")] = 0
     last_at: Annotated[str | None, Field(description="of the present calibration; null: never")] = None
@@ -211,10 +215,10 @@ class VerificationStatus:
 
 @dataclass(frozen=True, slots=True)
 class AlarmsStatus:
-    """Who must know now; counts begin at the start of the service."""
+    """Active alarms and their delivery; counts begin at the start of the service."""
 
     standing: Annotated[dict[str, str], Field(description="by name: early or final")] = field(default_factory=dict)
-    n_unacknowledged: Annotated[int, Field(description="that stand, or ended before anybody saw them")] = 0
+    n_unacknowledged: Annotated[int, Field(description="active ones, and ended ones that nobody acknowledged")] = 0
     n_told: Annotated[int, Field(description="early and final words since the start")] = 0
     watched: Annotated[tuple[str, ...], Field(description="names of all that are not switched off")] = ()
 
@@ -225,7 +229,7 @@ class Status(_Told):
     version: str
     state: State
     uptime_s: float
-    state_in_words: str = Field("", description="the state as a sentence; filled in where left empty")
+    state_in_words: str = Field("", description="the state as a sentence; derived if left empty")
     vehicle_id: str | None = None
     vin: str | None = None
     calibration_id: str | None = None
@@ -238,23 +242,21 @@ class Status(_Told):
     standing: Standing = Standing()
     batches: BatchCounts = BatchCounts()
     store: StoreStatus = StoreStatus()
-    uplink: UplinkStatus | None = Field(None, description="null where no broker is configured")
-    webhook: WebhookStatus | None = Field(None, description="null where none is configured")
-    record: RecordStatus | None = Field(None, description="the ring log; null where it is off")
+    uplink: UplinkStatus | None = Field(None, description="null if no broker is configured")
+    webhook: WebhookStatus | None = Field(None, description="null if none is configured")
+    record: RecordStatus | None = Field(None, description="the ring log; null if it is off")
     verification: VerificationStatus = VerificationStatus()
     alarms: AlarmsStatus = AlarmsStatus()
-    is_ready: bool = Field(True, description="whether estimates can come: what /health/ready tells")
+    is_ready: bool = Field(True, description="whether estimates are possible: the answer of /health/ready")
     not_ready_reason: str | None = None
-    warnings: tuple[str, ...] = Field(
-        (), description="what is broken beside the weighing, which goes on, and how to mend it"
-    )
+    warnings: tuple[str, ...] = Field((), description="faults that do not stop the weighing, and how to mend them")
 
     def model_post_init(self, _context: object) -> None:
         if not self.state_in_words:
             object.__setattr__(self, "state_in_words", self.sentence())
 
     def sentence(self) -> str:
-        """The state in words, with what is wrong beside it."""
+        """The state in words, with any faults."""
         is_awake = self.state is State.WAITING_FOR_BUS and self.bus.n_identifiers
         said = [OTHERS_ONLY.format(self.bus.n_identifiers) if is_awake else SENTENCES[self.state]]
         silent = [f"{s.signal.replace('_', ' ')}{self._why_silent(s)}" for s in self.signals if s.is_silent]
@@ -272,7 +274,9 @@ class Status(_Told):
         return " ".join(said)
 
     def _why_silent(self, silent: SignalHealth) -> str:
-        """No frame of its message and what is like it, or frames and never a valid sample; empty: heard before."""
+        """No frame of its message and which message resembles it, or frames without a valid sample; empty: it was
+        received.
+        """
         counts = {row.reason: row.n for row in self.decode if row.signal == silent.signal}
         n_refused = sum(n for reason, n in counts.items() if reason != "ok")
         similar = f"similar on the bus: {'; '.join(silent.similar)}" if silent.similar else ""

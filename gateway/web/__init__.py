@@ -1,7 +1,7 @@
 """The HTTP side: latest estimate, history, stream, status, health, metrics, dashboard.
 
-Estimates come in through the board, the history through a reader, the service's status through a call; answers go out
-to whoever has a token. The application is made by ``create_app``, from the door, the live board and the routes.
+The board supplies estimates, a reader the history, and a call the service's status; the web answers every client with a
+token. The application is made by ``create_app``, from the door, the live board and the routes.
 """
 
 from gateway.store import StoreReader

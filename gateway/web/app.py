@@ -61,7 +61,7 @@ from gateway.web.settings import WebSettings
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
 
-Units stand at the end of each name. Unknown is null. Errors are problem details (RFC 9457)."""
+Names end in the unit. Unknown is null. Errors are problem details (RFC 9457)."""
 
 
 def create_app(
@@ -81,9 +81,9 @@ def create_app(
     *,
     draws_trailers: bool = False,
 ) -> FastAPI:
-    """The application over what the pipeline publishes (``board``), what is stored (``reader``) and how the
-    service is (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the
-    estimates where somebody knows them.
+    """The application over the pipeline's publications (``board``), the store (``reader``) and the service's state
+    (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the estimates if
+    there are any.
 
     Call ``board.close()`` before the server stops: it ends the streams.
     """
@@ -140,7 +140,7 @@ def create_app(
 
 
 class _Application(FastAPI):
-    """FastAPI with layers around all of its own, so that they see every answer, an unforeseen error's too."""
+    """FastAPI inside our own layers, so that they see every answer, also that of an unforeseen error."""
 
     def __init__(self, *, wrap: Callable[[ASGIApp], ASGIApp], **settings: Any) -> None:
         self._wrap = wrap
@@ -161,7 +161,7 @@ def _summarize(schema: dict[str, Any]) -> None:
 
 
 def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
-    """Let the description say that problems come as application/problem+json, and when tokens are needed."""
+    """Declare in the description that problems are application/problem+json, and when tokens are needed."""
     describe = app.openapi
     told: dict[bool, dict[str, Any]] = {}
 

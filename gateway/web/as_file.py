@@ -24,7 +24,7 @@ def json_lines(items: Sequence[str]) -> str:
 
 
 def csv_lines(columns: Iterable[str], cells_of: Callable[[Any], Mapping[str, Any]]) -> Encoder:
-    """An encoder of its own for one file: the first call begins with the head line."""
+    """A new encoder for one file: the first call begins with the head line."""
     pending = io.StringIO()
     writer = csv.DictWriter(pending, tuple(columns), restval="")
     writer.writeheader()
@@ -42,7 +42,7 @@ def csv_lines(columns: Iterable[str], cells_of: Callable[[Any], Mapping[str, Any
 async def sent_as_file(
     page_behind: PageBehind, encode: Encoder, media_type: str, name: str, end: Callable[[], bytes] | None = None
 ) -> Response:
-    """Everything from the first page on, each encoded as it is read; ``end`` is what stands behind the last."""
+    """All records from the first page on, each encoded as it is read; ``end`` follows the last."""
     first = await page_behind(None)  # before the answer begins: what goes wrong here is still a problem
 
     async def pieces() -> AsyncIterator[str | bytes]:
@@ -60,6 +60,6 @@ async def sent_as_file(
 
 
 def file_responses(media_type: str, what: str) -> dict[int | str, dict[str, Any]]:
-    """What the description of a route says of its answers."""
+    """The description of a route's answers."""
     content = {media_type: {"schema": {"type": "string"}}}
     return {200: {"content": content, "description": what}, **problem_responses(422, 503)}

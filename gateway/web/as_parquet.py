@@ -1,6 +1,6 @@
-"""A history as a Parquet file that is sent while it is read: a row group for each page, so that memory stays bounded.
+"""A history as a Parquet file, sent while it is read: a row group for each page, so that memory stays bounded.
 
-Its library is no part of a vehicle's install (extra ``archive``), and is loaded by the first who asks for such a file.
+Its library is not part of a vehicle's install (extra ``archive``), and loads with the first request for such a file.
 """
 
 import io
@@ -12,7 +12,7 @@ from typing import Any, Final
 from starlette.exceptions import HTTPException
 
 PARQUET: Final = "application/vnd.apache.parquet"  # as registered with IANA
-MISSING: Final = "this install writes no Parquet: pip install 'springscale[archive]', or ask for .csv or .jsonl"
+MISSING: Final = "this install writes no Parquet: pip install 'springscale[archive]', or request .csv or .jsonl"
 
 Cells = Callable[[Any], Mapping[str, Any]]
 
@@ -21,10 +21,10 @@ _INSTANTS: Final = ("t_start", "t_end")
 
 
 class ParquetFile:
-    """One file that grows by pages; what is written is drained after each."""
+    """One file that grows by pages; its bytes are drained after each."""
 
     def __init__(self, columns: Iterable[str], cells_of: Cells) -> None:
-        """Raises HTTPException 501 where the library is missing."""
+        """Raises HTTPException 501 if the library is missing."""
         try:
             import pyarrow  # noqa: PLC0415 - an extra, see above
             import pyarrow.parquet  # noqa: PLC0415
@@ -51,7 +51,7 @@ class ParquetFile:
         return self._drained()
 
     def end(self) -> bytes:
-        """The file's end, without which nobody can read it."""
+        """The file's footer, without which it is unreadable."""
         self._writer.close()
         return self._drained()
 
@@ -68,7 +68,7 @@ class ParquetFile:
 
 
 def kind_of(name: str) -> str:
-    """What a column of the table of events or trips holds: text, instant, truth, whole or number."""
+    """The type of a column of the table of events or trips: text, instant, truth, whole or number."""
     if name in _TEXT:
         return "text"
     if name in _INSTANTS:

@@ -21,15 +21,15 @@ _STYLE_ID: Final = re.compile(rb'getElementById\("([0-9a-f]{64})"\)')
 
 @cache
 def style_ids() -> tuple[str, ...]:
-    """Ids of style elements that the library would write into the page on loading, where they are not there yet.
+    """Ids of style elements that the library would write into the page on loading if they were missing.
 
-    They dress maps, of which we draw none; the page's policy forbids them, so the page has stand-ins.
+    They style maps, which we do not draw; the page's policy forbids them, so the page has stand-ins.
     """
     return tuple(sorted({found.decode() for found in _STYLE_ID.findall(LIBRARY.read_bytes())}))
 
 
 async def library_response(request: Request) -> Response:
-    """The library; its address changes with its version, so what a browser holds never grows old."""
+    """The library; its address changes with its version, so a browser's copy never becomes stale."""
     if "gzip" not in request.headers.get("accept-encoding", ""):
         return FileResponse(LIBRARY, media_type=_MEDIA_TYPE, headers=_KEPT)
     packed = await run_in_threadpool(_packed)

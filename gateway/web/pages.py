@@ -17,7 +17,9 @@ SWAGGER_FILES: Final = Path(str(files("fastapi_offline"))) / "static"
 
 
 def install(app: FastAPI, known_loads_path: str = "") -> None:
-    """/, /cab, /docs and the files they load. ``known_loads_path`` is where true loads are told, if they are."""
+    """/, /cab, /docs and the files they load. ``known_loads_path`` is the address of the true loads, if there are
+    any.
+    """
     page = Template((ASSETS / "dashboard.html").read_text(encoding="utf-8")).substitute(
         chart_library=LIBRARY_URL, chart_styles=" ".join(style_ids()), known_loads=known_loads_path
     )

@@ -1,4 +1,4 @@
-"""The shapes of the answers, for the API's description; the bytes themselves come ready from board and store."""
+"""The shapes of the answers, for the API's description; board and store provide the finished bytes."""
 
 import json
 from types import GenericAlias
@@ -29,7 +29,7 @@ class WeightFigure(BaseModel):
     std_kg: float | None = Field(examples=[6.1])
     limit_kg: float | None = Field(description="null: nobody said", examples=[2100.0])
     is_over_limit: bool = Field(examples=[False])
-    lacks: Lack | None = Field(description="what it would need to be known; null: it is", examples=[None])
+    lacks: Lack | None = Field(description="facts that are missing for it; null: it is known", examples=[None])
     is_unsprung_estimated: bool = Field(
         False, description="whether calibration found the unsprung mass in it: nobody stated one", examples=[False]
     )
@@ -65,14 +65,14 @@ def _described(one: EstimateField) -> Any:
 Estimate: Final = create_model(
     "Estimate",
     __config__=ConfigDict(extra="allow"),
-    __doc__="One batch: what it weighed, or why it could not. Unknown is null, never 0.",
+    __doc__="One batch: its estimate, or why there is none. Unknown is null, never 0.",
     **{one.name: _described(one) for one in FIELDS},
 )
 
 Latest: Final = create_model(
     "Latest",
     __base__=Estimate,
-    __doc__="The last good estimate, as old as ``age_s`` says; before any, nulls and ``no_estimate_yet``.",
+    __doc__="The last good estimate, ``age_s`` old; before any, nulls and ``no_estimate_yet``.",
     age_s=(float | None, Field(description="since its receipt, on a clock that never steps", examples=[42.0])),
     is_stale=(bool, Field(description="older than the service's stale_after_s", examples=[False])),
     last_rejection=(Estimate | None, Field(description="the last batch without an answer (spectra left out)")),
@@ -91,7 +91,7 @@ EstimatesPage: Final = create_model(
     ),
     last_cursor=(
         str | None,
-        Field(description="place of the newest item: cursor to wait here for what comes", examples=["3f2a9c1e-7"]),
+        Field(description="place of the newest item: cursor to wait here for new ones", examples=["3f2a9c1e-7"]),
     ),
 )
 
@@ -107,20 +107,20 @@ class Ready(BaseModel):
 
     is_ready: bool = True
     state: str = Field(examples=["estimating"])
-    warnings: list[str] = Field([], description="what is broken beside the weighing")
+    warnings: list[str] = Field([], description="faults that do not stop the weighing")
 
 
 def utf8_only(said: Any) -> Any:
-    """JSON can escape half of a character (a lone surrogate): that is no text, and UTF-8 cannot hold it."""
+    """JSON can escape half of a character (a lone surrogate): that is not text, and UTF-8 cannot encode it."""
     try:
         json.dumps(said, ensure_ascii=False, default=str).encode()
     except UnicodeEncodeError:
-        raise ValueError("holds half a character (a lone surrogate), which is no text") from None
+        raise ValueError("contains half a character (a lone surrogate), which is not text") from None
     return said
 
 
 class Body(BaseModel):
-    """What a request may say in JSON: an unknown key is refused, and so is text that no answer could repeat."""
+    """The JSON of a request: unknown keys are refused, and so is text that no answer could repeat."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -147,7 +147,7 @@ class Problem(BaseModel):
     status: int = Field(examples=[422])
     detail: str = Field(examples=["query.limit: Input should be less than or equal to 1000"])
     instance: str | None = Field(None, examples=["/api/v1/estimates"])
-    reason: str | None = Field(None, description="for programs, where a person could mend it", examples=["stale"])
+    reason: str | None = Field(None, description="for programs, if a person can mend it", examples=["stale"])
     errors: list[Fault] | None = None
 
 

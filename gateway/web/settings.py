@@ -1,4 +1,4 @@
-"""What can be set about the web, apart from the address it listens on."""
+"""The settings of the web, apart from the address it listens on."""
 
 from dataclasses import dataclass
 from typing import Final

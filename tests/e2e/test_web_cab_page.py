@@ -221,9 +221,7 @@ def test_a_gateway_that_is_gone_is_said_loudly_and_comes_back(gateway: Gateway, 
         page.clock.run_for(12_000)
         expect(page.locator("#bar")).to_be_hidden()
         page.clock.run_for(48_000)
-        expect(page.get_by_role("alert")).to_have_text(
-            "The gateway does not answer. What is shown is the last it sent."
-        )
+        expect(page.get_by_role("alert")).to_have_text("The gateway does not answer. These are its last values.")
         expect(page.locator("#bar-how-long")).to_have_text("For 60 s.")
         expect(page.locator("#main")).to_have_attribute("data-is", "old")
         expect(page.locator("#number")).to_have_text("160 kg")
@@ -270,7 +268,7 @@ def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path
         page.goto(f"{server.url}/cab")
         expect(page.locator("#light")).to_have_text("Not weighed yet")
         expect(page.locator("#number")).to_have_text("?")
-        expect(page.locator("#why")).to_have_text("The first weight comes after some minutes of driving.")
+        expect(page.locator("#why")).to_have_text("The first weight comes after a few minutes of driving.")
         gateway.publish(loaded(0, 300.0, 48.0))
         expect(page.locator("#light")).to_have_text("No limit is known")
         expect(page.locator("#number")).to_have_text("300 kg")
@@ -299,7 +297,7 @@ def test_it_keeps_the_screen_on_or_says_that_it_cannot(
         if script == WAKE_LOCK:
             assert page.evaluate("window.asked") == "screen"
             page.evaluate("window.letGo()")
-            expect(page.locator("#awake")).to_contain_text("Touch the page to ask again")
+            expect(page.locator("#awake")).to_contain_text("Touch the page to try again")
             page.locator("#awake").tap()
             expect(page.locator("#awake")).to_have_text("The screen stays on.")
         page.close()

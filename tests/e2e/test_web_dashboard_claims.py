@@ -92,7 +92,7 @@ def test_where_all_was_refused_the_reason_stands_beside_the_missing_number(gatew
         watched.page.goto(server.url)
         note = watched.page.locator("#note")
         expect(note).to_contain_text("No estimate yet. The last batch could not be weighed: too slow.")
-        expect(note).to_contain_text("What to do: nothing; the next open road will do.")
+        expect(note).to_contain_text("What to do: nothing; an open road is enough.")
         gateway.board.close()
 
 

@@ -50,7 +50,7 @@ def news(gateway: Gateway, watched: Watched) -> None:
 def say_what_is_carried(page: Any) -> None:
     page.get_by_label("What it usually carries").select_option("parcels")
     page.get_by_label("How far along the floor").fill("2.4")
-    page.get_by_label("Part of it may lie on the roof").check()
+    page.get_by_label("Part of it may be on the roof").check()
 
 
 def fill(page: Any, *answers: str) -> None:

@@ -77,7 +77,7 @@ def test_a_ticket_that_contradicts_is_shown_with_both_numbers_and_confirmed(
         page.goto(server.url)
         page.get_by_role("button", name="State a known weight").click()
         dialog = page.locator("#known-dialog")
-        expect(dialog).to_contain_text("One that contradicts its estimate waits for a confirmation")
+        expect(dialog).to_contain_text("A known weight that contradicts its estimate waits for a confirmation")
         expect(dialog.get_by_role("button", name="Add another load")).to_be_hidden()
         dialog.get_by_label("It comes from").select_option("delivery_note")
         dialog.get_by_label("Known is").select_option("payload")
@@ -152,7 +152,7 @@ def test_it_wants_a_token_that_may_operate_and_does_not_keep_it(
         page.get_by_role("button", name="It is empty", exact=True).click()
         expect(page.get_by_role("alert")).to_have_text("this needs a token with scope operate")
         assert bench.state()["history"] == []
-        page.get_by_role("dialog").get_by_label("Token that may operate, used this once").fill(operator)
+        page.get_by_role("dialog").get_by_label("Token with scope operate, used once").fill(operator)
         page.get_by_role("button", name="It is empty", exact=True).click()
         expect(page.get_by_role("dialog")).to_be_hidden()
         assert json.loads(bench.service.state())["history"][0]["by"] == "workshop"

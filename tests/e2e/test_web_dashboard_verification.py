@@ -45,7 +45,7 @@ def test_a_known_load_is_judged_after_a_question(gateway: Gateway, desk: Verific
         expect(page.locator("#verified-last")).to_have_text("never")
         expect(page.locator("#verified-due")).to_have_text("now")
         page.get_by_role("button", name="Verify with a known load").click()
-        expect(page.get_by_role("dialog", name="What is known of the load?")).to_be_visible()
+        expect(page.get_by_role("dialog", name="What do you know about the load?")).to_be_visible()
         assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
         dialog.get_by_label("Known is").select_option("payload")
         expect(dialog.get_by_label("Gross weight [kg]")).to_be_hidden()

@@ -106,8 +106,8 @@ def test_the_width_names_its_main_cause_and_what_would_narrow_it() -> None:
     rows = [replace(one, estimate=replace(one.estimate, error_budget=lines)) for one in rows]
     text = next(one.text for one in verdict(rows).reasons if one.rule == "payload_half_width")
     assert text.endswith(
-        "Mostly by how long and high this very load is: say in the vehicle's data what it carries, and how long and "
-        "high that is (then ± 69 kg)."
+        "Mostly by the length and height of this very load: state in the vehicle's data what it carries, with its "
+        "length and height (then ± 69 kg)."
     )
 
 

@@ -1,17 +1,17 @@
-// The reader's language: which one, and how a page says its words in it. Tables are in /assets/words: a row per phrase,
+// The reader's language: which one, and the page's words in it. Tables are in /assets/words: a row per phrase,
 // a column per language.
 
 const LANGUAGES = ["en", "de"];
 const wanted = navigator.languages && navigator.languages.length ? navigator.languages : [navigator.language || "en"];
 const languageOf = (tag) => tag.toLowerCase().split("-")[0];
 
-/** For numbers, dates and times: the first of the browser's languages that the tables have. */
+/** For numbers, dates and times: the first of the browser's languages that the tables contain. */
 export const locale = wanted.find((tag) => LANGUAGES.includes(languageOf(tag))) || "en";
 export const language = languageOf(locale);
 
 /**
- * Says a row of the tables: `{name}` stands for a field; "one|more" is chosen by the field `n`.
- * `phrase.named(kind, name)` says `kind.name`, or the bare name where no row has it.
+ * Gives the text of a row of the tables: `{name}` stands for a field; "one|more" is chosen by the field `n`.
+ * `phrase.named(kind, name)` gives `kind.name`, or the bare name if no row has it.
  */
 export function speaker(...tables) {
   const rows = Object.assign({}, ...tables);

@@ -1,7 +1,7 @@
-"""The door: who may ask, how much, and under which conditions an answer leaves.
+"""The door: who may ask, how much, and which conditions an answer must meet.
 
-Connections and requests come in; those with a good token and of fair size go on to the routes, the others go out as
-problem details. It knows tokens, TLS, limits and headers, and nothing of what is asked.
+Connections and requests come in; those with a valid token and of acceptable size go on to the routes, the others are
+answered with problem details. It handles tokens, TLS, limits and headers, and knows nothing of the requests' content.
 """
 
 from gateway.web.door.guard import Failures, Guard, describe_guard

@@ -1,4 +1,4 @@
-"""A connection that gives nobody more than a fair share of time, memory and places."""
+"""A connection that limits each client to a fair share of time, memory and connections."""
 
 import asyncio
 import logging
@@ -29,12 +29,13 @@ _log.setLevel(logging.ERROR)  # uvicorn warns of each request it cannot read: st
 class GuardedConnection(HttpToolsProtocol):
     """uvicorn's HTTP/1.1 protocol with the limits it leaves out.
 
-    A request that is not complete in time ends its connection (slow loris). A head or body that is too long and
-    what is no HTTP are answered with a problem and end it too; a connection too many is closed before it costs
-    anything. Answers under way, streams among them, may take as long as they like, as long as they are read. Where
-    all places are taken, the oldest that has shown no token and asks or reads nothing gives way.
+    A request that is not complete in time ends its connection (slow loris). A head or body that is too long, and
+    anything that is not HTTP, is answered with a problem and ends the connection; surplus connections are closed before
+    they cost anything. Answers in progress, streams among them, may take as long as they like, as long as the client
+    reads them. If all places are taken, the oldest connection without a token and without a request or answer in
+    progress is closed.
 
-    Under TLS it is made before the handshake, and told of its connection after it (tls.TlsDoor).
+    Under TLS it is created before the handshake, and gets its connection after it (tls.TlsDoor).
     """
 
     def __init__(self, *parts: Any, **named_parts: Any) -> None:
@@ -72,7 +73,7 @@ class GuardedConnection(HttpToolsProtocol):
 
     @property
     def is_idle(self) -> bool:
-        """True where nothing is asked, or nothing read, and no token was shown."""
+        """True if no request is in progress, or the answer is not read, and no token was shown."""
         if self.scope is not None and "token_name" in self.scope.get("state", {}):
             return False
         return self.cycle is None or self.cycle.response_complete or self.flow.write_paused
@@ -118,8 +119,8 @@ class GuardedConnection(HttpToolsProtocol):
             super().on_message_complete()
 
     def send_400_response(self, msg: str) -> None:
-        """uvicorn's answer to what it cannot read."""
-        self._refuse(400, "this is no request that HTTP knows")
+        """uvicorn's answer to a request it cannot parse."""
+        self._refuse(400, "this is not a valid HTTP request")
 
     def _refuse_long_head(self) -> None:
         if self._n_head_bytes > HEAD_BYTES:
@@ -146,7 +147,7 @@ class GuardedConnection(HttpToolsProtocol):
         self._deadline = self.loop.call_later(LINGER_S, self.transport.close)
 
     def _await_reading(self, n_unread: int | None) -> None:
-        """Look again in a while: who has read nothing of ``n_unread`` bytes by then is cut off."""
+        """Check again later: a client that has read nothing of ``n_unread`` bytes by then is cut off."""
         if self._unread is not None:
             self._unread.cancel()
         self._unread = None if n_unread is None else self.loop.call_later(UNREAD_S, self._cut_off_unless_read, n_unread)
@@ -165,7 +166,7 @@ class GuardedConnection(HttpToolsProtocol):
 
 
 class Placed(Protocol):
-    """What takes one of the places: a connection, or one whose handshake is under way."""
+    """What occupies one of the places: a connection, or one whose handshake is under way."""
 
     client: tuple[str, int] | None
     since_s: float
@@ -176,7 +177,7 @@ class Placed(Protocol):
 
 
 def has_place(newcomer: Placed, connections: Set[Any]) -> bool:
-    """Whether a connection that has just joined ``connections`` may stay; another may have to go for it."""
+    """Whether a connection that has just joined ``connections`` may stay; another may be closed for it."""
     mine = newcomer.client and newcomer.client[0]
     if sum(other.client is not None and other.client[0] == mine for other in connections) > CONNECTIONS_PER_ADDRESS:
         return False
@@ -189,7 +190,7 @@ def has_place(newcomer: Placed, connections: Set[Any]) -> bool:
 
 
 def _on_the_wire(status: int, detail: str) -> bytes:
-    """A whole answer for where there is no application: problem details under the headers that all answers carry."""
+    """A whole answer without the application: problem details with the headers that all answers have."""
     problem = problem_response(status, detail)
     head = [*problem.raw_headers, *SECURITY_HEADERS, (b"cache-control", b"no-store"), (b"connection", b"close")]
     lines = [b"HTTP/1.1 %d %s" % (status, HTTPStatus(status).phrase.encode()), *(b": ".join(pair) for pair in head)]

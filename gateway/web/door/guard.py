@@ -1,4 +1,4 @@
-"""Who may ask: with tokens, whoever shows one; without, only this machine."""
+"""Who may ask: with tokens, every client that shows one; without, only this machine."""
 
 import ipaddress
 import time
@@ -13,10 +13,10 @@ from starlette.types import Scope as AsgiScope
 from gateway.web.door.problems import problem_response
 from gateway.web.door.tokens import Scope, TokenFile
 
-# Nothing of the vehicle is in these: the pages' own files, the API's description, and whether the process lives.
+# These contain nothing about the vehicle: the pages' own files, the API's description, and whether the process lives.
 PUBLIC: Final = ("/assets/", "/swagger/")
 PUBLIC_PATHS: Final = frozenset({"/", "/cab", "/docs", "/openapi.json", "/health/live"})
-# Raw frames may hold where the vehicle was: to look at them is more than to read a weight.
+# Raw frames may contain the vehicle's position: reading them needs more than reading a weight.
 RECORD_PATH: Final = "/api/v1/record"
 _SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _FORWARDED: Final = frozenset(
@@ -30,7 +30,7 @@ _ADDRESSES: Final = 1024
 
 
 class Failures:
-    """Wrong tokens by address: after ``n_per_min`` further wrong ones are told to wait. Bounded."""
+    """Wrong tokens by address: after ``n_per_min`` failures further ones have to wait. Bounded."""
 
     def __init__(self, n_per_min: int, clock_s: Callable[[], float] = time.monotonic) -> None:
         self._n_per_min = n_per_min
@@ -100,7 +100,7 @@ def _refuse_strangers(scope: AsgiScope) -> Response | None:
         return _problem(scope, 421, f"without tokens only {', '.join(sorted(_LOCAL_NAMES))} are answered for")
     origin = _header(scope, b"origin")
     if origin is not None and scope["method"] not in _SAFE_METHODS and origin.lower().partition("://")[2] != host:
-        return _problem(scope, 403, "without tokens a page from elsewhere may change nothing")
+        return _problem(scope, 403, "without tokens a page from elsewhere may not change anything")
     return None
 
 
@@ -115,7 +115,7 @@ def is_loopback(host: str) -> bool:
 
 
 def describe_guard(schema: dict[str, Any]) -> None:
-    """Say in the API's description that a bearer token is needed, and where not."""
+    """Declare in the API's description that a bearer token is needed, and where not."""
     problem = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
     schema["components"]["securitySchemes"] = {"bearer": {"type": "http", "scheme": "bearer"}}
     schema["security"] = [{"bearer": []}]

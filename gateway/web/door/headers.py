@@ -1,4 +1,4 @@
-"""Headers every answer carries, a count of the answers, and answers of headers alone."""
+"""Headers of every answer, a count of the answers, and answers of headers alone."""
 
 import asyncio
 from collections import Counter
@@ -8,7 +8,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 def content_security_policy(*more_styles: str) -> str:
-    """Files of this gateway alone; nothing written into a page runs or styles it, unless ``more_styles`` say so."""
+    """Files of this gateway alone; no inline script or style is allowed, unless ``more_styles`` say so."""
     styles = " ".join(("'self'", *more_styles))
     return (
         f"default-src 'none'; script-src 'self'; style-src {styles}; img-src 'self' data:; connect-src 'self'; "
@@ -30,9 +30,9 @@ _NO_CACHE: Final = (b"cache-control", b"no-cache")  # may be kept, and must be a
 
 
 class SecurityHeaders:
-    """ASGI middleware. What an answer says of itself stands.
+    """ASGI middleware. Headers that an answer sets itself are kept.
 
-    What says nothing about caching is not cached, or asked about where it has an ETag.
+    An answer without caching headers is not cached, or revalidated if it has an ETag.
     """
 
     def __init__(self, app: ASGIApp, counts: Counter[int]) -> None:
@@ -60,7 +60,7 @@ class SecurityHeaders:
 class AnswersHead:
     """ASGI middleware: HEAD is answered as GET is, without the body (RFC 9110, 9.3.2).
 
-    What would go on, a stream or a file, is told that the client is gone.
+    An answer that would go on, a stream or a file, is ended as if the client had left.
     """
 
     def __init__(self, app: ASGIApp) -> None:

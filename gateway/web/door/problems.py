@@ -14,7 +14,7 @@ from gateway.web.schemas import Fault, Problem
 
 MEDIA_TYPE: Final = "application/problem+json"
 _PLAINER: Final = {  # than pydantic says it
-    "extra_forbidden": "this is not known here: /docs lists what is",
+    "extra_forbidden": "unknown here: /docs lists what is available",
     "model_attributes_type": "send a JSON object, with Content-Type: application/json",
     "json_invalid": "this is no JSON",
 }
@@ -28,7 +28,7 @@ def problem_response(
     reason: str | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """A problem as it goes over the wire; ``instance`` is the path that was asked for, where it is known."""
+    """A problem as sent; ``instance`` is the requested path, if known."""
     problem = Problem(
         title=http.HTTPStatus(status).phrase,
         status=status,
@@ -41,7 +41,7 @@ def problem_response(
 
 
 def install(app: FastAPI) -> None:
-    """Answer all that goes wrong in ``app`` with problem details."""
+    """Answer every error in ``app`` with problem details."""
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(StoreError, _unavailable)
@@ -50,7 +50,7 @@ def install(app: FastAPI) -> None:
 
 
 def describe_problems(schema: dict[str, Any]) -> None:
-    """Say in the API's description under which media type problems come."""
+    """Declare in the API's description the media type of problems."""
     for operations in schema["paths"].values():
         for operation in operations.values():
             for code, response in operation["responses"].items():
@@ -71,9 +71,9 @@ async def _http(request: Request, error: Exception) -> Response:
 
 
 def _with_all_methods(request: Request, headers: Mapping[str, str] | None) -> Mapping[str, str] | None:
-    """Every method of this address, where each is a route of its own and a route knows only itself.
+    """Every method of this address; each is a route of its own that knows only itself.
 
-    Where GET is allowed, HEAD is (headers.AnswersHead), which the routes do not know.
+    HEAD is allowed wherever GET is (headers.AnswersHead), which the routes do not know.
     """
     if headers is None or "Allow" not in headers:
         return headers

@@ -18,7 +18,9 @@ STOP_WITHIN_S: Final = 1  # for answers under way
 
 @dataclass(frozen=True, slots=True)
 class Tls:
-    """Certificate chain and key in PEM files; ``client_ca`` makes clients show a certificate signed by it (mTLS)."""
+    """Certificate chain and key in PEM files; ``client_ca`` requires clients to show a certificate signed by it
+    (mTLS).
+    """
 
     certificate: Path
     key: Path
@@ -26,7 +28,7 @@ class Tls:
 
 
 def refuse_open_address(host: str, *, has_tokens: bool) -> None:
-    """Raise ConfigurationError where others than this machine could ask without a token."""
+    """Raise ConfigurationError if machines other than this one could ask without a token."""
     if not has_tokens and not is_loopback(host):
         raise ConfigurationError(
             f"[web] host = {host!r} can be reached from elsewhere, and there is no token: "
@@ -56,10 +58,10 @@ def server_config(app: FastAPI, host: str, port: int, tls: Tls | None = None) ->
 
 
 def renew_certificate(config: uvicorn.Config, tls: Tls) -> None:
-    """Give connections from now on the certificate and key that the files hold now; open ones keep theirs.
+    """Use the files' present certificate and key for new connections; open ones keep theirs.
 
-    Raises ConfigurationError, and changes nothing, for files that cannot be used. Trusted client authorities stay
-    as they are: a context can only learn more of them, never forget one.
+    Raises ConfigurationError, and changes nothing, for unusable files. Trusted client authorities stay as they are: a
+    context can add authorities, never remove one.
     """
     _tls_settings(tls)  # tried elsewhere first: a key that does not fit would leave the context half changed
     if isinstance(config, TlsConfig):
@@ -67,7 +69,7 @@ def renew_certificate(config: uvicorn.Config, tls: Tls) -> None:
 
 
 def _tls_settings(tls: Tls) -> dict[str, Any]:
-    """Checked here, so that a wrong file is a clear line at the start and not a traceback."""
+    """Checked here, so that a wrong file gives a clear line at the start and not a traceback."""
     try:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         context.load_cert_chain(tls.certificate, tls.key)

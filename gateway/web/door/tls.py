@@ -1,4 +1,4 @@
-"""TLS whose handshakes take places, too: a silent stranger holds one for some seconds, not a file handle for ever."""
+"""TLS whose handshakes occupy places, too: a silent stranger holds one for some seconds, not a file handle for ever."""
 
 import asyncio
 import ssl
@@ -11,7 +11,7 @@ from gateway.web.door.connection import REQUEST_S, GuardedConnection, has_place
 
 
 class TlsConfig(uvicorn.Config):
-    """uvicorn's settings, but for the handshake: it is TlsDoor's, and ``context`` what it is made with."""
+    """uvicorn's settings except for the handshake: TlsDoor makes it, with ``context``."""
 
     context: ssl.SSLContext
 

@@ -25,25 +25,25 @@ MOST_NAME: Final = 64
 
 
 def _named(name: str) -> str:
-    """A name that a terminal, the journal and the file can show as it is."""
+    """A name that a terminal, the journal and the file can show unchanged."""
     if not name or len(name) > MOST_NAME or not name.isprintable() or name != name.strip():
         raise ValueError(f"a token's name has 1 to {MOST_NAME} printable characters and no blank at either end")
     return name
 
 
 class Scope(StrEnum):
-    """What a token is good for."""
+    """The scope of a token."""
 
     READ = "read"
     OPERATE = "operate"
 
     def allows(self, wanted: "Scope") -> bool:
-        """Who may operate may read."""
+        """Scope operate includes read."""
         return self is Scope.OPERATE or wanted is Scope.READ
 
 
 class Token(BaseModel):
-    """A token as it is kept: its secret cannot be told from it."""
+    """A token as stored: the secret cannot be recovered from it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -55,7 +55,9 @@ class Token(BaseModel):
     expires_s: int | None = None
 
     def is_expired(self, now_s: float) -> bool:
-        """True also by a clock that stands before the token was made: it was never set, and can judge no age."""
+        """True also if the clock is before the token's creation: such a clock was never set, and cannot judge an
+        age.
+        """
         return self.expires_s is not None and not self.created_s <= now_s < self.expires_s
 
     def expiry(self) -> str:
@@ -73,7 +75,7 @@ class _Content(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class _Read:
-    """The file as it was when last read."""
+    """The file as last read."""
 
     stamp: tuple[int, int, int] | None
     by_id: dict[str, Token]
@@ -81,7 +83,7 @@ class _Read:
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """Whether a token was asked for when the file was as it is."""
+    """Whether a token was required in this state of the file."""
 
     stamp: tuple[int, int, int] | None
     are_in_use: bool
@@ -90,8 +92,7 @@ class _Asked:
 class TokenFile:
     """The tokens of one service. The command line writes the file; the service follows its changes.
 
-    A secret has 256 random bits, so its plain SHA-256 is as good as a slow hash and costs a request
-    nothing.
+    A secret has 256 random bits, so its plain SHA-256 is as good as a slow hash and costs almost nothing per request.
     """
 
     def __init__(self, path: Path, clock_s: Callable[[], float] = time.time) -> None:
@@ -103,9 +104,9 @@ class TokenFile:
         self.fault: str | None = None  # why no token is accepted, for the status
 
     def create(self, name: str, scope: Scope, lifetime_s: float | None = None) -> str:
-        """A new token, to be shown this once. Raises ConfigurationError where the name is taken or no name.
+        """A new token, to be shown this once. Raises ConfigurationError if the name is taken or invalid.
 
-        A broken file is set aside first, and said; then the next try begins a new one.
+        A broken file is first set aside and reported; the next try begins a new one.
         """
         try:
             _named(name)
@@ -130,7 +131,7 @@ class TokenFile:
         return f"{_PREFIX}_{token_id}_{secret}"
 
     def revoke(self, name: str) -> None:
-        """Forget the token of this name or id. Raises ConfigurationError where there is none."""
+        """Forget the token of this name or id. Raises ConfigurationError if there is none."""
         with self._alone():
             tokens = self.tokens()
             kept = tuple(token for token in tokens if name not in (token.name, token.id))
@@ -150,10 +151,10 @@ class TokenFile:
             raise ConfigurationError(f"{self._path} is no token file: {fault}") from None
 
     def are_in_use(self) -> bool:
-        """Whether a token is asked for, as the file is now; a broken one is set aside here, and ``fault`` tells.
+        """Whether a token is required, by the present file; a broken one is set aside here and reported in ``fault``.
 
-        A broken file closes the door, and its absence keeps it closed: whoever breaks it must not open the API to
-        all of this machine.
+        A broken file denies access, and its absence keeps it denied: breaking it must not open the API to all of this
+        machine.
         """
         try:
             tokens = self._tokens_or_set_aside()
@@ -172,7 +173,7 @@ class TokenFile:
     def are_asked_for(self) -> bool:
         """``are_in_use``, quick enough for every request: the file is read again when it has changed.
 
-        A file that is there and holds no token asks for none; one that has gone while tokens were in use does.
+        A file without tokens requires none; a file that disappeared while tokens were in use does.
         """
         stamp = self._files.stamp(self._path.name)
         if self._asked_at is not None and stamp == self._asked_at.stamp:
@@ -187,7 +188,7 @@ class TokenFile:
         return are_in_use
 
     def _tokens_or_set_aside(self) -> tuple[Token, ...]:
-        """The tokens. Raises ConfigurationError saying where a broken file lies now."""
+        """The tokens. Raises ConfigurationError that says where the broken file is now."""
         try:
             return self.tokens()
         except ConfigurationError as fault:
@@ -201,7 +202,7 @@ class TokenFile:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Whoever changes the file reads it first and is alone from then on."""
+        """A writer reads the file first and holds its lock from then on."""
         try:
             with self._files.locked():
                 yield
@@ -209,7 +210,7 @@ class TokenFile:
             raise ConfigurationError(f"{self._path} cannot be changed: {fault}") from None
 
     def verify(self, text: str) -> Token | None:
-        """The token this text is, None for any other text, or one that is revoked or expired."""
+        """The token of this text; None for any other text, or one that is revoked or expired."""
         prefix, _, rest = text.partition("_")
         token_id, _, secret = rest.partition("_")
         token = self._known().get(token_id)
@@ -219,7 +220,7 @@ class TokenFile:
         return token if is_valid else None
 
     def _known(self) -> dict[str, Token]:
-        """The tokens by id, read again whenever the file has changed. An unreadable file lets nobody in."""
+        """The tokens by id, read again whenever the file has changed. With an unreadable file nobody is let in."""
         stamp = self._files.stamp(self._path.name)
         if stamp != self._read.stamp:
             try:

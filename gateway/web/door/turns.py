@@ -27,9 +27,9 @@ _LOOK_S: Final = 0.05
 
 
 class Turns:
-    """ASGI middleware behind the guard: a client that asks for too much of the history at once waits for itself.
+    """ASGI middleware behind the guard: a client that requests too much of the history at once waits for itself.
 
-    Answers to others go on: each has a share of its own. A turn ends when the answer is read, or its client gone.
+    Answers to others continue: each client has its own share. A turn ends when the answer is read, or its client gone.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -46,7 +46,7 @@ class Turns:
             return
         mine = (_client_of(scope), is_stream)
         if not await self._has_turn(mine):
-            detail = "too many answers are under way: read them, or ask for less at a time"
+            detail = "too many answers are in progress: read them, or request less at a time"
             await problem_response(503, detail, path, headers={"retry-after": "5"})(scope, receive, send)
             return
         self._under_way[mine] += 1
@@ -73,7 +73,7 @@ class Turns:
 
 
 class InPieces:
-    """ASGI middleware: a long body leaves piece by piece, each when the one before has been read far enough."""
+    """ASGI middleware: sends a long body in pieces, each when the client has read enough of the one before."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

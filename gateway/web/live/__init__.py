@@ -1,7 +1,7 @@
-"""What is known right now: the board that shows the latest estimate, and the streams that hear of each new one.
+"""The current state: the board that shows the latest estimate, and the streams that send each new one.
 
-Estimates come in from the pipeline's thread; the latest with its age goes out, thousands of times a second if need be,
-and each new one as an event to every stream, after what a client missed meanwhile.
+Estimates come from the pipeline's thread; the latest with its age goes out, thousands of times a second if need be, and
+each new one as an event to every stream, after the events that a client missed.
 """
 
 from gateway.web.live.board import Board, Shown, boot_clock_s

@@ -1,4 +1,4 @@
-"""What the service knows right now, ready to be sent: filled by the pipeline, read by the web."""
+"""The service's current state, ready to be sent: the pipeline writes it, the web reads it."""
 
 import json
 import threading
@@ -20,13 +20,13 @@ _NOT_CALIBRATED: Final = Weights()
 
 
 def _nothing_yet(weights: Weights) -> dict[str, Any]:
-    """The JSON of the estimate before the first: its names, all null, the reason, and what weights lack."""
+    """The JSON of the estimate before the first: its names, all null, the reason, and the facts that weights lack."""
     blank = estimate_to_json(Estimate(0, 0, "", rejected=(Why.NO_ESTIMATE_YET,), weights=weights))
     return {**dict.fromkeys(blank), **{name: blank[name] for name in ("shares", "diagnostics", "weights", "rejected")}}
 
 
 def boot_clock_s() -> float:
-    """Seconds that go on while the machine sleeps: what was received before a suspend is old afterwards."""
+    """Seconds that also count while the machine sleeps: an estimate from before a suspend is old afterwards."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
@@ -39,7 +39,7 @@ def kind_of(estimate: Estimate) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What ``latest`` shows at one moment: the estimate (None before the first) and its age as it is told."""
+    """What ``latest`` shows at one moment: the estimate (None before the first) and its reported age."""
 
     estimate: Estimate | None
     age_s: float | None
@@ -87,12 +87,11 @@ class _Answer:
 class Board:
     """The latest estimate, rejection and provisional estimate.
 
-    ``publish``, ``restore`` and ``close`` may be called from any thread. A provisional estimate stands
-    in for ``latest`` while its drive has no good estimate: what was weighed before the last stop may
-    have been unloaded there.
+    ``publish``, ``restore`` and ``close`` may be called from any thread. A provisional estimate replaces ``latest``
+    while its drive has no good estimate: the load weighed before the last stop may have been unloaded there.
 
-    Estimates are kept as their JSON tells them, rounded: what follows from them is the same before and
-    after a restart. ``unweighed`` are the weights before the first: what may be known of them, and what they lack.
+    Estimates are kept as their rounded JSON, so that everything derived from them is the same before and after a
+    restart. ``unweighed`` are the weights before the first estimate: the known ones, and what the others lack.
     """
 
     def __init__(
@@ -114,7 +113,7 @@ class Board:
         self.fanout = Fanout()
 
     def publish(self, estimate: Estimate) -> None:
-        """Show an estimate. A provisional one goes to every stream; the others go there by the journal."""
+        """Show an estimate. A provisional one goes to every stream; the others get there through the journal."""
         record = estimate_to_json(estimate)
         with self._lock:
             self._show(estimate_from_json(record), self._clock())
@@ -122,9 +121,10 @@ class Board:
             self.fanout.publish(StreamEvent.of(PROVISIONAL, json_line(record), None))
 
     def restore(self, estimate: str | None, rejection: str | None, age_s: float | None) -> None:
-        """Show what an earlier run of the service stored, as old as it is; ``age_s`` None: unknown, so it is stale.
+        """Show the estimate that an earlier run of the service stored, with its age; ``age_s`` None: unknown, so it is
+        stale.
 
-        Raises ValueError or KeyError, and shows nothing of it, where that is not what this program writes.
+        Raises ValueError or KeyError, and shows nothing, if this program did not write it.
         """
         answer = None if estimate is None else estimate_from_json(json.loads(estimate))
         refusal = None if rejection is None else estimate_from_json(json.loads(rejection))
@@ -138,7 +138,7 @@ class Board:
             self._answer = _Answer.of(answer, refusal, received_s, self._none_yet)
 
     def close(self) -> None:
-        """End every stream; those who come later get none."""
+        """End every stream; later clients get none."""
         self.fanout.close()
 
     def age_s(self) -> float | None:
@@ -169,14 +169,14 @@ class Board:
             return tuple(self._recent)
 
     def heard(self) -> Estimate | None:
-        """The last full batch, answered or not; None before the first."""
+        """The last full batch, weighed or not; None before the first."""
         return self._heard
 
     def _age_s(self, answer: _Answer) -> float | None:
         return None if answer.received_s is None else max(0.0, self._clock() - answer.received_s)
 
     def _is_stale(self, answer: _Answer) -> bool:
-        """An age that nobody knows may be any. Before the first estimate there is nothing that could mislead."""
+        """An unknown age may be any age. Before the first estimate nothing can mislead."""
         age_s = self._age_s(answer)
         return answer.estimate is not None and (age_s is None or age_s > self._stale_after_s)
 

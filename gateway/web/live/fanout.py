@@ -1,4 +1,4 @@
-"""Who listens: each stream with its own place in the journal, a slow client ended alone, and counted."""
+"""Subscribers: each stream has its own place in the journal; a slow client is ended alone, and counted."""
 
 import asyncio
 import threading
@@ -25,10 +25,10 @@ class StreamEvent:
 
 
 class Subscription:
-    """What one client still has to hear of. All but ``hear`` and ``end`` belongs to the loop it was made in.
+    """The events that one client still has to receive. All but ``hear`` and ``end`` belongs to the loop it was made in.
 
-    Records lie in the journal, where the client has a place; an event that is not stored waits here, the newest of
-    them only, with the number of the newest record at its time.
+    Records are in the journal, where the client has a place; of events that are not stored only the newest waits here,
+    with the number of the newest record at its time.
     """
 
     def __init__(self, head: Callable[[], str]) -> None:
@@ -51,7 +51,7 @@ class Subscription:
         self._in_loop(self._news.set)
 
     async def wait(self, timeout_s: float) -> bool:
-        """Until there is news or the stream has ended; False where the time was out before."""
+        """Wait until there is news or the stream has ended; False if the time was out before."""
         with suppress(TimeoutError):
             await asyncio.wait_for(self._news.wait(), timeout_s)
         is_news = self._news.is_set()
@@ -59,12 +59,12 @@ class Subscription:
         return is_news
 
     def take(self) -> tuple[str, StreamEvent] | None:
-        """The event that is not stored, if there is one, and behind which record it comes."""
+        """The event that is not stored, if there is one, and the record it follows."""
         passing, self._passing = self._passing, None
         return passing
 
     def has_read(self) -> None:
-        """The client took what it was sent."""
+        """The client has received what it was sent."""
         self._n_unread = 0
 
     def _count(self, passing: tuple[str, StreamEvent] | None) -> None:
@@ -97,15 +97,15 @@ class Fanout:
         return len(self._subscriptions)
 
     def publish(self, event: StreamEvent) -> None:
-        """Tell every client of an event that is not stored; never waits for one."""
+        """Give every client an event that is not stored; never waits for one."""
         with self._lock:
             for subscription in self._subscriptions:
                 subscription.hear(event)
 
     def join(self, head: Callable[[], str]) -> Subscription:
-        """A subscription to what comes from now on; call it in the loop that will read it.
+        """A subscription to events from now on; call it in the loop that will read it.
 
-        ``head`` tells the newest record's cursor.
+        ``head`` gives the newest record's cursor.
         """
         subscription = Subscription(head)
         with self._lock:
@@ -116,7 +116,7 @@ class Fanout:
         return subscription
 
     def leave(self, subscription: Subscription) -> None:
-        """Forget a subscription, and count what it lost."""
+        """Remove a subscription, and count its lost events."""
         with self._lock:
             self._subscriptions.discard(subscription)
             self.n_slow_clients += subscription.is_lagging

@@ -1,4 +1,4 @@
-"""The one answer that is asked for thousands of times: made without detours."""
+"""The one answer that clients request thousands of times: served without detours."""
 
 from typing import Final
 
@@ -11,7 +11,7 @@ LATEST_PATH: Final = "/api/v1/estimates/latest"
 
 
 class LatestResponse(Response):
-    """The latest estimate with its age, or 304 where the client has all but the age.
+    """The latest estimate with its age, or 304 if the client has all but the age.
 
     The ETag is weak (RFC 9110, 8.8.3): it changes with everything but the age.
     """
@@ -29,8 +29,8 @@ class LatestResponse(Response):
 class LatestFirst:
     """ASGI middleware that answers GET latest before any other layer sees it.
 
-    The route of the same path stays declared for the API's description and gives the same answer; past
-    FastAPI's layers a core serves about twice as many of them.
+    The route of the same path stays declared for the API's description and gives the same answer; without FastAPI's
+    layers a core serves about twice as many requests.
     """
 
     def __init__(self, app: ASGIApp, board: Board) -> None:
@@ -45,7 +45,7 @@ class LatestFirst:
 
 
 def _has(scope: Scope, etag: str) -> bool:
-    """Whether If-None-Match names what we would send (weak comparison)."""
+    """Whether If-None-Match names the present ETag (weak comparison)."""
     for name, content in scope["headers"]:
         if name == b"if-none-match":
             named = content.decode("latin-1")

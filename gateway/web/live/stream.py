@@ -1,4 +1,4 @@
-"""Server-sent events: the journal from a place on, as it grows, until one side has enough."""
+"""Server-sent events: the journal from a place on, as it grows, until one side ends the stream."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -20,7 +20,7 @@ EVENT_SCHEMA: Final[dict[str, Any]] = {
     "type": "object",
     "description": "one server-sent event; data is JSON: an Estimate, a LoadEvent, a Trip, an Alarm, or {detail}",
     "properties": {
-        "id": {"type": "string", "description": "cursor: send it as Last-Event-ID to go on behind it"},
+        "id": {"type": "string", "description": "cursor: send it as Last-Event-ID to resume behind it"},
         "event": {"enum": ["estimate", "rejection", "provisional", "event", "trip", "alarm", "lagged", "closing"]},
         "data": {"type": "string"},
     },
@@ -79,7 +79,7 @@ class EventStream(Response):
         await send({"type": "http.response.body", "body": LAGGED if subscription.is_lagging else CLOSING})
 
     async def _chunks(self, subscription: Subscription, follower: Follower) -> AsyncIterator[bytes]:
-        """Records by their numbers, and between them, in its place, what is not stored."""
+        """Records by their numbers, and between them, in order, events that are not stored."""
         yield b"retry: %d\n\n" % RETRY_MS
         while True:
             is_last = subscription.ended.is_set()  # before the last look: what came before the end still goes out
@@ -99,7 +99,7 @@ class EventStream(Response):
 
 
 def _read(follower: Follower) -> list[Record]:
-    """Some records; none while the disk cannot be read: the next record or the keep-alive asks again."""
+    """Some records; none while the disk cannot be read: the next record or the keep-alive tries again."""
     try:
         return follower.read(_PAGE)
     except (StoreError, TimeoutError):

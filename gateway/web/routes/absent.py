@@ -1,4 +1,4 @@
-"""What stands in for a part of the service where there is none: a page without a service, a test."""
+"""Stand-ins for parts of the service that are absent: a page without a service, a test."""
 
 from typing import Any, Final
 
@@ -8,12 +8,12 @@ from gateway.records import json_line
 _NOT_CALIBRATED: Final = WeightRefusedError(
     "no_calibration", "no calibration is loaded, so there is nothing to correct"
 )
-_NO_SUCH_WEIGHT: Final = WeightRefusedError("no_such_weight", "there is no such known weight that still stands")
+_NO_SUCH_WEIGHT: Final = WeightRefusedError("no_such_weight", "there is no such known weight in use")
 _NOT_HERE: Final = CommissioningRefusedError("not_allowed", "there is no service behind this page that could calibrate")
 
 
 class _Absent:
-    """Answers each method as its table says: an exception is raised; what is not in it is refused."""
+    """Answers each method as its table says: an exception is raised; a method that is not in the table is refused."""
 
     def __init__(self, refusal: Exception, **answers: Any) -> None:
         self._refusal = refusal
@@ -59,7 +59,7 @@ NO_VERIFICATION: Final[Any] = _Absent(
 )
 NO_TREND: Final[Any] = _Absent(_NOT_CALIBRATED, told=json_line({"calibration_id": None, "parameters": []}))
 NO_ALARMS: Final[Any] = _Absent(
-    AlarmRefusedError("no_such_alarm", "it is none of the alarms that can be acknowledged"), standing="[]"
+    AlarmRefusedError("no_such_alarm", "it is not an alarm that can be acknowledged"), standing="[]"
 )
 NO_RECORD: Final[Any] = _Absent(_NOT_HERE, segments=(), open=None)
 NO_COMMISSIONING: Final[Any] = _Absent(

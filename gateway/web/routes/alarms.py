@@ -1,4 +1,4 @@
-"""/api/v1/alarms: who must know what, since when, and who has seen it."""
+"""/api/v1/alarms: active and past alarms, since when, and who acknowledged them."""
 
 import asyncio
 from typing import Annotated, Final, Literal, Protocol
@@ -28,7 +28,7 @@ class AlarmDesk(Protocol):
 
 
 class AlarmStep(BaseModel):
-    """When an alarm came to a state, and on what; null is unknown, or nothing of the kind."""
+    """When an alarm reached a state, and the cause; null is unknown, or not applicable."""
 
     state: Literal["early", "final", "cleared"]
     t: str = Field(json_schema_extra={"format": "date-time"})
@@ -43,7 +43,7 @@ class AlarmStep(BaseModel):
 class AlarmSeen(BaseModel):
     """Who has seen it."""
 
-    by: str = Field(description="name of the token; `local` where none are in use", examples=["yard"])
+    by: str = Field(description="name of the token; `local` if none are in use", examples=["yard"])
     at: str = Field(json_schema_extra={"format": "date-time"})
     note: str | None
 
@@ -55,18 +55,18 @@ class Alarm(BaseModel):
     revision: int = Field(description="rises with each step and with the acknowledgement")
     vehicle_id: str | None
     kind: Literal["overload", "imbalance", "sensor_fault", "drift", "no_estimate"]
-    where: str | None = Field(description="on the vehicle, or in what", examples=["rear_axle"])
+    where: str | None = Field(description="on the vehicle, or the part concerned", examples=["rear_axle"])
     state: Literal["early", "final", "cleared"]
     is_active: bool
     t_start: str = Field(json_schema_extra={"format": "date-time"})
     t_end: str | None = Field(description="null: it stands")
     sentence: str = Field(examples=["The vehicle weighs 2561 +- 28 kg, limit 2500 kg (confirmed)"])
-    steps: list[AlarmStep] = Field(description="what became of it, oldest first")
+    steps: list[AlarmStep] = Field(description="its steps, oldest first")
     acknowledged: AlarmSeen | None
 
 
 class AlarmsPage(BaseModel):
-    """Those that stand now, the worst first, and a piece of the history in the order of last revisions."""
+    """The active alarms, the worst first, and a piece of the history in the order of last revisions."""
 
     active: list[Alarm]
     items: list[Alarm]
@@ -77,7 +77,7 @@ class AlarmsPage(BaseModel):
 class Acknowledgement(Body):
     """A word to it."""
 
-    note: str = Field("", max_length=200, description="kept with the alarm; left out: none is")
+    note: str = Field("", max_length=200, description="kept with the alarm; optional")
 
 
 AlarmId = Annotated[str, Path(max_length=100, examples=["alarm-1790000300000000000-9f86d081884c"])]
@@ -90,14 +90,16 @@ def alarms_router(reader: StoreReader, desk: AlarmDesk) -> APIRouter:
 
     @router.get("/alarms", response_model=AlarmsPage, responses=problem_responses(422, 503))
     async def alarms(query: Annotated[HistoryQuery, Query()]) -> Response:
-        """What stands, and what stood. One that changes comes again, behind all that was there: follow next_cursor."""
+        """Active and past alarms. A changed alarm comes again, behind all earlier ones: follow next_cursor."""
         history = await entries_of(reader, ALARM, query)
         standing = await asyncio.to_thread(desk.standing)
         return Response(f'{{"active":{standing},{history}', media_type="application/json")
 
     @router.post("/alarms/{alarm_id}/acknowledgement", response_model=Alarm, responses=_REFUSALS)
     async def acknowledge(request: Request, alarm_id: AlarmId, said: Acknowledgement) -> Response:
-        """You have seen it: kept with your token's name and the time, and told to whoever is told of the alarm."""
+        """Acknowledge an alarm: the service keeps your token's name and the time, and sends them to everybody who gets
+        the alarm.
+        """
         return await answered(request, lambda: desk.acknowledge(alarm_id, who(request), said.note or None))
 
     return router

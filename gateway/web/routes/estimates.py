@@ -31,7 +31,7 @@ _CURSOR: Final = r"^[0-9a-z]{1,32}-[0-9]{1,18}$"
 
 def _as_it_was_given(text: str) -> str:
     if re.fullmatch(_CURSOR, text, re.ASCII) is None:
-        raise ValueError("send a next_cursor or last_cursor of an earlier answer, or an id of the stream, as it is")
+        raise ValueError("send a next_cursor or last_cursor of an earlier answer, or an id of the stream, unchanged")
     return text
 
 
@@ -57,7 +57,7 @@ class HistoryQuery(Span):
     limit: int = Field(100, ge=1, le=PAGE_LIMIT)
     cursor: Cursor | SkipJsonSchema[None] = Field(None, description="next_cursor or last_cursor of an earlier answer")
     order: Literal["oldest_first", "newest_first"] = Field(
-        "oldest_first", description="oldest_first to follow what comes, newest_first for the last ones"
+        "oldest_first", description="oldest_first to follow new records, newest_first for the last ones"
     )
 
 
@@ -72,10 +72,10 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
     router = APIRouter(prefix=PREFIX, tags=["api"])
 
     @router.get(
-        "/estimates/latest", response_model=Latest, responses={304: {"description": "nothing but the age is new"}}
+        "/estimates/latest", response_model=Latest, responses={304: {"description": "nothing but the age has changed"}}
     )
     async def latest(request: Request) -> Response:
-        """The last good estimate and how old it is. Its ETag changes with all but the age."""
+        """The last good estimate and its age. Its ETag changes with all but the age."""
         return LatestResponse(board, request.scope)
 
     @router.get("/estimates", response_model=EstimatesPage, responses=problem_responses(422, 503))
@@ -88,7 +88,7 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
 
     @router.get("/status", response_model=Status)
     async def status_now() -> Status:
-        """What the service is doing, in words and in numbers."""
+        """The state of the service, as a sentence and as numbers."""
         return status()
 
     @router.get(
@@ -102,7 +102,7 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
     async def stream(last_event_id: Annotated[Cursor | SkipJsonSchema[None], Header()] = None) -> Response:
         """Server-sent events: estimate, rejection, provisional; data is the estimate object.
 
-        With Last-Event-ID, what was missed comes first.
+        With Last-Event-ID, missed events come first.
         """
         if board.fanout.n_subscribers >= settings.n_streams_max:
             raise HTTPException(503, f"{settings.n_streams_max} streams are open already: close one")
@@ -112,7 +112,7 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
 
 
 async def asked(reader: StoreReader, kinds: Sequence[str], **question: Any) -> Page:
-    """A page of the history; a cursor that is none is the client's fault."""
+    """A page of the history; an invalid cursor is the client's fault."""
     try:
         return await asyncio.to_thread(reader.page, kinds, **question)
     except ValueError as error:
@@ -120,7 +120,7 @@ async def asked(reader: StoreReader, kinds: Sequence[str], **question: Any) -> P
 
 
 def _question(query: EstimatesQuery, n_left: int, cursor: str | None) -> dict[str, Any]:
-    """What to ask of the store for the next records of an answer."""
+    """The store query for the next records of an answer."""
     return {
         "since_ns": query.since,
         "until_ns": query.until,

@@ -30,7 +30,7 @@ class Place(BaseModel):
 
 
 class Stop(BaseModel):
-    """A standstill at which the load can have changed; null: nothing is known of it."""
+    """A standstill at which the load can have changed; null: unknown."""
 
     t_start: str
     t_end: str
@@ -40,7 +40,7 @@ class Stop(BaseModel):
 
 
 class CarriedLoad(BaseModel):
-    """What was aboard, by all batches of that load."""
+    """The load, by all batches of it."""
 
     payload_kg: float
     payload_std_kg: float
@@ -124,12 +124,12 @@ def events_router(reader: StoreReader) -> APIRouter:
 
     @router.get("/events", response_model=EventsPage, responses=problem_responses(422, 503))
     async def events(query: Annotated[HistoryQuery, Query()]) -> Response:
-        """What was loaded and unloaded. A revised one comes again, behind all that was there: follow next_cursor."""
+        """Loading and unloading. A revised event comes again, behind all earlier ones: follow next_cursor."""
         return await _page(reader, EntryKind.EVENT, query)
 
     @router.get("/trips", response_model=TripsPage, responses=problem_responses(422, 503))
     async def trips(query: Annotated[HistoryQuery, Query()]) -> Response:
-        """Every drive with its load and tonne-kilometres. A revised one comes again: follow next_cursor."""
+        """Every drive with its load and tonne-kilometres. A revised trip comes again: follow next_cursor."""
         return await _page(reader, EntryKind.TRIP, query)
 
     for kind, path in _PATHS.items():
@@ -146,7 +146,7 @@ async def _page(reader: StoreReader, kind: EntryKind, query: HistoryQuery) -> Re
 
 
 async def entries_of(reader: StoreReader, kind: str, query: HistoryQuery) -> str:
-    """One page of entries as the rest of a JSON object. Raises RequestValidationError for a cursor that is none."""
+    """One page of entries as the rest of a JSON object. Raises RequestValidationError for an invalid cursor."""
     page = await asked(
         reader,
         (kind,),

@@ -1,4 +1,4 @@
-"""For those who watch the service: health and metrics."""
+"""For monitoring: health and metrics."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ def health_router(status: Callable[[], Status], registry: CollectorRegistry) -> 
 
     @router.get("/health/ready", response_model=Ready, responses=problem_responses(503))
     async def ready(request: Request) -> Response:
-        """200 while estimates can come; else 503 with the reason."""
+        """200 while estimates are possible; else 503 with the reason."""
         now = status()
         if not now.is_ready:
             return problem_response(503, now.not_ready_reason or now.sentence(), request.url.path)

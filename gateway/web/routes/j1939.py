@@ -10,7 +10,7 @@ from gateway.web.routes.weights import Scales
 
 
 class J1939Weight(BaseModel):
-    """One parameter. ``raw`` is the count on the wire; 65535 says not available, 65024 error; then ``kg`` is null."""
+    """One parameter. ``raw`` is the count on the wire; 65535 means not available, 65024 error; then ``kg`` is null."""
 
     pgn: int = Field(examples=[65258])
     spn: int = Field(examples=[582])
@@ -32,7 +32,7 @@ class J1939Weights(BaseModel):
 
 
 def j1939_router(board: Board, scales: Scales, *, draws_trailers: bool) -> APIRouter:
-    """The route that tells weights in J1939's terms; ``draws_trailers`` as for the frames that are sent."""
+    """The route that gives weights in J1939's terms; ``draws_trailers`` as for the frames that are sent."""
     router = APIRouter(prefix="/api/v1", tags=["standards"])
 
     @router.get("/weights/j1939")

@@ -1,4 +1,4 @@
-"""/api/v1/known-loads: the actual load, where it is known, as in the demonstration."""
+"""/api/v1/known-loads: the actual load, if it is known, as in the demonstration."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class KnownLoadTold(BaseModel):
 
 
 class KnownLoadsTold(BaseModel):
-    """In order of time. They are for comparison only: no estimate knows them."""
+    """In order of time. They are for comparison only: no estimate uses them."""
 
     items: list[KnownLoadTold]
 

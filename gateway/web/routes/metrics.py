@@ -33,7 +33,7 @@ Labelled = Iterable[tuple[Sequence[str], float | None]]
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A metric: its name, its help, its samples at a moment (None: there is no such part), the names of its labels."""
+    """A metric: its name, its help, its present samples (None: there is no such part), the names of its labels."""
 
     name: str
     text: str
@@ -42,7 +42,7 @@ class Row:
 
 
 def one(name: str, text: str, path: str, of_unit: float = 1.0) -> Row:
-    """A metric without labels: what stands at a path of the moment, left out where that is unknown."""
+    """A metric without labels: the value at a path of the status, left out if unknown."""
 
     def samples(moment: Moment) -> Labelled | None:
         reading = _at(moment, path)
@@ -106,29 +106,29 @@ def _found(quantity: Outward) -> tuple[Row, Row]:
     )
 
 
-_ROWS: Final = "Rows by what became of them."
+_ROWS: Final = "Rows by outcome."
 _STD: Final = "Its standard deviation."
 TABLE: Final = (
     Row(
         "springscale_info",
-        "Always 1; the labels tell which service this is.",
+        "Always 1; the labels identify this service.",
         _info,
         ("version", "vehicle_id", "estimator", "calibration_id"),
     ),
     by(
         "springscale_state",
-        "1 for what the service is doing, 0 for the others.",
+        "1 for the present state of the service, 0 for the others.",
         "state",
         lambda m: {state: float(state is m.now.state) for state in State},
     ),
-    one("springscale_ready", "1 while estimates can come.", "now.is_ready"),
+    one("springscale_ready", "1 while estimates are possible.", "now.is_ready"),
     one("springscale_uptime_seconds", "Since the start of the service.", "now.uptime_s"),
     one("springscale_bus_frames_total", "CAN data frames received.", "now.bus.n_frames"),
     one("springscale_bus_error_frames_total", "CAN error frames received.", "now.bus.n_error_frames"),
     one("springscale_bus_reconnects_total", "Times the interface was opened again.", "now.bus.n_reconnects"),
     counts(
         "springscale_bus_dropped_frames_total",
-        "Frames lost on the way in.",
+        "Frames lost before they were read.",
         "where",
         "now.bus",
         inbox="n_inbox_dropped",
@@ -137,7 +137,7 @@ TABLE: Final = (
     one("springscale_bus_last_frame_age_seconds", "Since the last frame.", "now.bus.last_frame_age_s"),
     Row(
         "springscale_decoded_frames_total",
-        "Frames of mapped signals by what became of them.",
+        "Frames of mapped signals by outcome.",
         lambda m: [((count.signal, count.reason), count.n) for count in m.now.decode],
         ("signal", "reason"),
     ),
@@ -184,9 +184,9 @@ TABLE: Final = (
         pruned="n_pruned",
     ),
     one("springscale_verification_due", "1 while one with known loads is due.", "now.verification.is_due"),
-    Row("springscale_verification_passed", "1 where the last of this calibration passed.", _passed),
-    by("springscale_alarm", "0 while nothing is the matter, 1 told early, 2 confirmed.", "alarm", _levels),
-    one("springscale_alarms_unacknowledged", "Alarms that nobody has seen.", "now.alarms.n_unacknowledged"),
+    Row("springscale_verification_passed", "1 if the last of this calibration passed.", _passed),
+    by("springscale_alarm", "0 without an alarm, 1 provisional, 2 confirmed.", "alarm", _levels),
+    one("springscale_alarms_unacknowledged", "Alarms that nobody has acknowledged.", "now.alarms.n_unacknowledged"),
     one("springscale_alarms_told_total", "Alarms sent since the start, provisional and final.", "now.alarms.n_told"),
     Row(
         "springscale_record_refused",
@@ -197,7 +197,7 @@ TABLE: Final = (
     one("springscale_record_written_bytes_total", "Bytes written to it.", "now.record.n_bytes_written"),
     counts(
         "springscale_record_frames_total",
-        "Frames by what became of them.",
+        "Frames by outcome.",
         "outcome",
         "now.record",
         written="n_frames_written",
@@ -249,7 +249,7 @@ TABLE: Final = (
 
 
 class StatusCollector:
-    """Turns the status of the moment into metrics whenever they are asked for."""
+    """Turns the present status into metrics at each request."""
 
     def __init__(self, board: Board, scales: Scales, status: Callable[[], Status], responses: Counter[int]) -> None:
         self._board = board
@@ -258,7 +258,7 @@ class StatusCollector:
         self._responses = responses
 
     def describe(self) -> Iterable[Metric]:
-        """Nothing beforehand: the registry need not collect to register."""
+        """Nothing in advance: the registry need not collect to register."""
         return ()
 
     def collect(self) -> Iterator[Metric]:

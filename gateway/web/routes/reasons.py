@@ -1,4 +1,6 @@
-"""/api/v1/reasons: what each reason in ``rejected`` means, and each source of error in ``error_budget``, in words."""
+"""/api/v1/reasons: the meaning of each reason in ``rejected``, and of each source of error in ``error_budget``, in
+words.
+"""
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
@@ -15,25 +17,25 @@ class ReasonInWords(BaseModel):
     reason: Why = Field(examples=[Why.TOO_SLOW])
     cause: Cause = Field(examples=[Cause.DRIVE])
     happened: str = Field(examples=["too much of the window below `speed_min_mps`: town, queue, yard"])
-    advice: str = Field(examples=["nothing; the next open road will do"])
+    advice: str = Field(examples=["nothing; an open road is enough"])
 
 
 class SourceInWords(BaseModel):
     """A cause of error."""
 
     source: str = Field(examples=["load_length"])
-    words: str = Field(examples=["how long and high this very load is"])
+    words: str = Field(examples=["the length and height of this very load"])
 
 
 class RemedyInWords(BaseModel):
-    """What would narrow an error."""
+    """Remedies that narrow an error."""
 
     remedy: Remedy
     advice: str = Field(examples=["drive another ten minutes with the same load"])
 
 
 class ReasonsInWords(BaseModel):
-    """Every reason there is, and every source of error with what narrows it."""
+    """All reasons, and all sources of error with their remedies."""
 
     items: list[ReasonInWords]
     sources: list[SourceInWords]
@@ -55,7 +57,7 @@ def reasons_router() -> APIRouter:
 
     @router.get("/reasons", response_model=ReasonsInWords)
     async def reasons() -> Response:
-        """What each reason in ``rejected`` and each source in ``error_budget`` means; fixed by the service's
+        """The meaning of each reason in ``rejected`` and each source in ``error_budget``; fixed by the service's
         version.
         """
         return Response(body, media_type="application/json")

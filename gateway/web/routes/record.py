@@ -1,4 +1,4 @@
-"""/api/v1/record: the ring log, listed and fetched. Raw frames may tell where a vehicle was: scope operate."""
+"""/api/v1/record: the ring log, listed and fetched. Raw frames may contain the vehicle's position: scope operate."""
 
 import asyncio
 import re
@@ -21,7 +21,7 @@ _RANGE: Final = re.compile(r"bytes=(?:([0-9]{1,18})-([0-9]{0,18})|-([0-9]{1,18})
 
 
 class KeptSegment(Protocol):
-    """A file of the ring log as far as it can be fetched."""
+    """A file of the ring log, as far as it can be fetched."""
 
     @property
     def name(self) -> str: ...
@@ -36,14 +36,14 @@ class KeptSegment(Protocol):
 
 
 class FrameLog(Protocol):
-    """Who keeps the frames. ``open`` blocks, and raises OSError where the disk refuses."""
+    """Who keeps the frames. ``open`` blocks, and raises OSError if the disk fails."""
 
     def segments(self) -> Sequence[KeptSegment]:
         """Oldest first."""
         ...
 
     def open(self, name: str) -> tuple[BinaryIO, int] | None:
-        """A segment and how many of its bytes there are; None where there is none of that name."""
+        """A segment and the number of its bytes; None if there is none of that name."""
         ...
 
 
@@ -51,14 +51,14 @@ class SegmentTold(BaseModel):
     """One file: gzip-compressed candump lines, the frames of at most an hour."""
 
     name: str = Field(examples=["00000042-20261121T035000Z.log.gz"])
-    n_bytes: int = Field(description="what can be fetched now; the newest one grows", examples=[1_204_113])
+    n_bytes: int = Field(description="bytes available now; the newest file grows", examples=[1_204_113])
     n_frames: int = Field(examples=[731_002])
     t_start: str = Field(json_schema_extra={"format": "date-time"}, description="stamp of the first frame")
     t_end: str = Field(json_schema_extra={"format": "date-time"}, description="stamp of the last")
 
 
 class SegmentsTold(BaseModel):
-    """In the order in which they were begun. Put one behind the other they are one log."""
+    """In the order of their creation. Put one behind the other they are one log."""
 
     items: list[SegmentTold]
 
@@ -69,7 +69,7 @@ def record_router(log: FrameLog) -> APIRouter:
 
     @router.get(RECORD_PATH)
     async def recorded_segments() -> SegmentsTold:
-        """The files of the ring log that can be fetched, oldest first; none where it is off ([record] enabled)."""
+        """The files of the ring log that can be fetched, oldest first; none if it is off ([record] enabled)."""
         return SegmentsTold(items=[_told(segment) for segment in log.segments()])
 
     @router.get(RECORD_PATH + "/{name}", response_class=Response, responses=_answers())
@@ -77,7 +77,7 @@ def record_router(log: FrameLog) -> APIRouter:
         request: Request,
         name: Annotated[str, Path(max_length=64, description="as the list has it")],
         wanted: Annotated[
-            str | None, Header(alias="Range", description="one range of bytes: to go on after a cut")
+            str | None, Header(alias="Range", description="one range of bytes: to resume after a cut")
         ] = None,
     ) -> Response:
         """One file, as candump text in gzip: for `springscale estimate`, `springscale replay`, or zcat."""
@@ -86,7 +86,7 @@ def record_router(log: FrameLog) -> APIRouter:
         except OSError as refusal:
             return problem_response(503, f"the ring log cannot be read: {refusal}", request.url.path)
         if opened is None:
-            return problem_response(404, "there is no such file: the list has those there are", request.url.path)
+            return problem_response(404, "there is no such file: the list has all of them", request.url.path)
         file, size = opened
         piece = None if "if-range" in request.headers else _range(wanted, size)
         if piece is not None and piece.start >= piece.stop:
@@ -109,8 +109,9 @@ def _told(segment: KeptSegment) -> SegmentTold:
 
 
 def _range(wanted: str | None, size: int) -> range | None:
-    """The bytes asked for, empty where there are none such; None for the whole (RFC 9110, 14.2: what is not understood
-    is passed over, and several ranges at a time are not)."""
+    """The requested bytes, empty if there are none; None for the whole (RFC 9110, 14.2: an unintelligible range is
+    ignored, and so are several ranges at a time).
+    """
     found = _RANGE.fullmatch(wanted or "")
     if found is None:
         return None

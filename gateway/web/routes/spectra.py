@@ -1,4 +1,4 @@
-"""/api/v1/spectra/latest: what the springs said in the last batch, and what the fitted vehicle should have said."""
+"""/api/v1/spectra/latest: the measured spectra of the last batch, and those that the fitted vehicle predicts."""
 
 import math
 from typing import Any
@@ -41,20 +41,20 @@ class LatestSpectra(BaseModel):
     estimator: str | None = Field(examples=["cross_spectrum"])
     rejected: list[str] = Field(examples=[[]])
     payload_kg: float | None = Field(
-        description="as weighed; the model is of what was measured, before known weights", examples=[271.3]
+        description="final estimate; the model shows the one measured before known weights", examples=[271.3]
     )
     front_share_pct: float | None = Field(examples=[50.4])
     spectra: Spectra | None = Field(description="as measured")
     model: Spectra | None = Field(
-        description="of the calibrated vehicle with this payload and share; null where the estimator has no such "
-        "model or the batch no answer. Its frequencies are those that calibration used"
+        description="of the calibrated vehicle with this payload and share; null if the estimator has no such model "
+        "or the batch no answer. Its frequencies are those that calibration used"
     )
     acceleration_bands: list[BandHz] | None = Field(description="ratio index: numerator and denominator")
     pitch_rate_bands: list[BandHz] | None = Field(description="ratio index: numerator and denominator")
 
 
 def spectra_router(board: Board, calibrated: CalibratedVehicle | None) -> APIRouter:
-    """The route of the spectra; ``calibrated`` is what the service estimates with."""
+    """The route of the spectra; ``calibrated`` is the calibration that the service uses."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
     made: dict[str | None, str] = {}  # the answer on the last batch asked for
 
@@ -85,7 +85,7 @@ def _answer_on(heard: Estimate | None, calibrated: CalibratedVehicle | None) -> 
 
 
 def modelled_of(heard: Estimate, calibrated: CalibratedVehicle | None) -> SpectraSeen | None:
-    """The fitted model's spectra for one batch; None where there is no model, no answer or no spectrum."""
+    """The fitted model's spectra for one batch; None if there is no model, no answer or no spectrum."""
     if calibrated is None or calibrated.cross_spectrum is None or heard.estimator != "cross_spectrum":
         return None
     if heard.calibration_id != calibrated.id:
@@ -97,7 +97,7 @@ def modelled_of(heard: Estimate, calibrated: CalibratedVehicle | None) -> Spectr
 
 
 def _fitted(heard: Estimate, wheelbase_m: float) -> Fitted | None:
-    """What the estimator told of its fit; the delay of the mean speed where it told none."""
+    """The delay that the estimator fitted; else that of the mean speed."""
     told = {name: x for name, x in heard.diagnostics.items() if math.isfinite(x)}
     payload_kg, front_share_pct = (
         (raw or shown).number
@@ -121,7 +121,7 @@ def _fitted(heard: Estimate, wheelbase_m: float) -> Fitted | None:
 
 
 def _is_whole(seen: SpectraSeen) -> bool:
-    """True where every number is known and both sensors moved at every frequency."""
+    """True if every number is known and both sensors moved at every frequency."""
     is_known = all(np.isfinite(getattr(seen, name)).all() for name in seen.__slots__)
     return is_known and bool((seen.vertical_acceleration > 0.0).all() and (seen.pitch_rate > 0.0).all())
 

@@ -1,4 +1,4 @@
-"""/api/v1/vehicle: what is known of the vehicle, its calibration and its signals."""
+"""/api/v1/vehicle: the vehicle, its calibration and its signals."""
 
 from collections.abc import Callable
 
@@ -25,12 +25,12 @@ class CalibrationFigures(BaseModel):
 
 
 class VehicleDescription(BaseModel):
-    """Who the vehicle is, how it is calibrated, how its signals are."""
+    """The vehicle's identity, its calibration, and the health of its signals."""
 
     vehicle_id: str | None
     vin: str | None
     estimator: str | None
-    calibration: CalibrationFigures | None = Field(description="null: not calibrated, no payload can be told")
+    calibration: CalibrationFigures | None = Field(description="null: not calibrated, no payload can be estimated")
     figures: Vehicle | None = Field(
         description="the vehicle as its campaign stated it, with the limits in force; unknown is null"
     )
@@ -38,12 +38,12 @@ class VehicleDescription(BaseModel):
 
 
 def vehicle_router(status: Callable[[], Status], calibrated: CalibratedVehicle | None) -> APIRouter:
-    """The routes about the vehicle itself; ``calibrated`` is what the service estimates with."""
+    """The routes about the vehicle itself; ``calibrated`` is the calibration that the service uses."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
     @router.get("/vehicle")
     async def vehicle() -> VehicleDescription:
-        """Who the vehicle is, its calibration and ranges, the health of its signals."""
+        """The vehicle's identity, its calibration and ranges, the health of its signals."""
         now = status()
         return VehicleDescription(
             vehicle_id=now.vehicle_id,

@@ -24,7 +24,7 @@ class VssPoint(BaseModel):
 
 
 def vss_router(board: Board, scales: Scales) -> APIRouter:
-    """The route that speaks VSS."""
+    """The route for VSS."""
     router = APIRouter(prefix="/api/v1", tags=["standards"])
 
     @router.get("/vss")
@@ -36,7 +36,7 @@ def vss_router(board: Board, scales: Scales) -> APIRouter:
 
 
 def vss_points(board: Board, scales: Scales) -> list[VssPoint]:
-    """Every path we speak, in a fixed order; the overlay's are described in docs/vss/springscale.vspec."""
+    """Every VSS path that we support, in a fixed order; docs/vss/springscale.vspec describes those of the overlay."""
     weights, shown = weigh_latest(board, scales), board.shown()
     points = [
         VssPoint(path="Vehicle.CurbWeight", value=_uint16(_kerb_kg(scales)), unit="kg", timestamp=None),

@@ -30,7 +30,7 @@ class LoadPlace(BaseModel):
 
 
 class WeighedWhen(BaseModel):
-    """Which estimate weights are of, and how old it is."""
+    """The estimate that the weights belong to, and its age."""
 
     id: str | None = Field(description="of the estimate")
     t_end: str | None
@@ -48,7 +48,7 @@ class LatestWeights(WeightFigures, WeighedWhen):
 
 
 class Scales:
-    """Weights of estimates as they are sent: of this vehicle, unknown where nothing is known of it."""
+    """Weights of estimates as they are sent: of this vehicle, unknown if its figures are."""
 
     def __init__(self, calibrated: CalibratedVehicle | None) -> None:
         self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
@@ -56,11 +56,11 @@ class Scales:
         self._known: dict[int, tuple[Estimate, Weights]] = {}  # by identity: the estimates are kept with them
 
     def weigh(self, estimate: Estimate | None) -> Weights:
-        """By this vehicle's figures now, whatever an estimate brought along; None: before the first."""
+        """By this vehicle's present figures, not those that the estimate was stored with; None: before the first."""
         return weighed(estimate or _NONE, self.vehicle, self._unsprung).weights
 
     def weigh_each(self, estimates: Sequence[Estimate]) -> list[Weights]:
-        """Likewise of many, each computed once however often these are asked for. From any thread."""
+        """The same for many, each computed once however often it is requested. From any thread."""
         known, found = self._known, dict[int, tuple[Estimate, Weights]]()
         for one in estimates:
             if id(one) not in found:
@@ -69,14 +69,14 @@ class Scales:
         return [found[id(one)][1] for one in estimates]
 
     def place(self, estimate: Estimate | None) -> Place | None:
-        """Where its payload lies; None where that cannot be told."""
+        """The position of its payload; None if unknown."""
         if self.vehicle is None or estimate is None or estimate.posterior is None:
             return None
         return place_of(self.vehicle, estimate.posterior)
 
 
 def weights_router(board: Board, scales: Scales) -> APIRouter:
-    """The route that tells weights."""
+    """The route of weights."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
     @router.get("/weights/latest")

@@ -1,4 +1,4 @@
-// The cab page: asks one small question every few seconds and shows the answer, its age, and what it does not know.
+// The cab page: asks one small question every few seconds and shows the answer, its age, and what is unknown.
 
 import { stayAwake } from "/assets/cab/wake-lock.js";
 import { aboard, about, alarm, alarmText, eventText, lightText, notSeen, ownReading, phrase, question, roomText, stood } from "/assets/cab/sentences.js";
@@ -21,7 +21,7 @@ function now() {
   return { wall: Date.now(), page: performance.now() };
 }
 
-/** Neither clock alone: one may be set, the other may stand still while the phone sleeps. */
+/** Uses two clocks: one may be set, the other may stand still while the phone sleeps. */
 const secondsSince = (then) => Math.max(Date.now() - then.wall, performance.now() - then.page) / 1000;
 
 async function askNow() {
@@ -39,7 +39,7 @@ async function askNow() {
   draw();
 }
 
-/** Two texts in a place, or none of it where both are empty. */
+/** Shows two texts in an element, or hides it if both are empty. */
 function sayBoth(id, [first, one], [second, other]) {
   write(first, one);
   write(second, other);

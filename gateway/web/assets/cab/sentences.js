@@ -1,4 +1,4 @@
-// What the cab page says, from the answer of /api/v1/cab.
+// The cab page's sentences, from the answer of /api/v1/cab.
 
 import { ago, between, capital, clock, duration, figure, number, reasons, words } from "/assets/dashboard/words.js";
 import { speaker } from "/assets/language.js";
@@ -19,7 +19,7 @@ const up = (kg) => Math.ceil(kg / STEP_KG) * STEP_KG;
 
 const said = (text, isCurrent) => (isCurrent ? text : phrase("earlier", { text }));
 
-/** A wheel bears too much, and neither an axle nor the whole does: taking something out is not what helps. */
+/** A wheel carries too much, but neither an axle nor the whole does: unloading is not the remedy. */
 const isUneven = (cab) => cab.light === "over" && cab.room.length > 0 && cab.room.every((room) => room.kg >= 0);
 
 export function lightText(cab, isCurrent) {
@@ -28,7 +28,7 @@ export function lightText(cab, isCurrent) {
   return phrase(cab.has_limits ? "light.unknown" : "light_no_limit");
 }
 
-/** Which places the light is about, and how probable too much is. */
+/** The places that the light refers to, and the probability of an overload. */
 export function about(cab) {
   if (!cab.light_about.length) return "";
   const percent = Math.min(99, Math.max(1, Math.round(100 * cab.over_limit_probability)));
@@ -36,9 +36,9 @@ export function about(cab) {
 }
 
 /**
- * The one answer: what is asked, the kilograms (null: nobody knows), and how they come about.
+ * The one answer: the question, the kilograms (null: unknown), and how they are found.
  * They are safe: by the lower end of the 95 % interval, of the tightest of the whole and the axles. What must come out
- * is by the same end, so that after it the load is safe too.
+ * uses the same end of the interval, so that the load is safe afterwards too.
  */
 export function question(cab, isCurrent) {
   if (!cab.room.length) return unknownRoom(cab);
@@ -71,7 +71,7 @@ function whyNot(cab) {
 
 export const roomText = (room) => [capital(placeName(room.place)), phrase(room.kg < 0 ? "too_much" : "spare", { kg: figure(Math.abs(room.kg), 0, "kg") })];
 
-/** What nobody can see now; empty where what was weighed is what is aboard. */
+/** What cannot be known now; empty if the weighed load is still aboard. */
 export function notSeen(cab) {
   if (cab.load === "standing") return phrase("unseen", { time: clock(cab.t_end) });
   return cab.load === "not_weighed_yet" ? phrase("changed") : "";
@@ -84,7 +84,7 @@ function alarmName(name) {
   return phrase.named("alarm", name);
 }
 
-/** Those that stand, the confirmed ones first; not of what the light is red about. */
+/** Active alarms, the confirmed ones first, without those that the red light shows already. */
 export function alarmText(cab) {
   const isSaid = (name) => cab.light === "over" && cab.light_about.some((place) => name === `overload.${place}`);
   const told = (level) => Object.keys(cab.alarms).filter((name) => cab.alarms[name] === level && !isSaid(name)).map(alarmName);
@@ -117,7 +117,7 @@ export function ownReading(reading, silentS) {
   return [capital(phrase.named("own", reading.signal)), `${figure(reading.number, digits, reading.unit)}${silent}`];
 }
 
-/** What must be said before anything else, and what of it grows from second to second: a screen reader need not hear it. */
+/** The most urgent sentence, and its part that changes from second to second: a screen reader skips that part. */
 export function alarm(cab, { isRefused, isGone, silentS }) {
   if (isRefused) return [phrase("wants_token"), ""];
   if (isGone) return [`${phrase("gone")}${cab ? ` ${phrase("last_heard")}` : ""}`, phrase("gone_for", { duration: duration(silentS) })];

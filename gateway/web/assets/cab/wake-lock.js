@@ -1,4 +1,4 @@
-// Keeps the screen on where the browser lets a page do so, and says where it does not.
+// Keeps the screen on if the browser allows it, and says if it does not.
 
 // Names of rows in /assets/words/cab.js
 const HELD = "awake";
@@ -6,7 +6,7 @@ const INSECURE = "awake_insecure";
 const UNKNOWN = "awake_unknown";
 const REFUSED = "awake_refused";
 
-/** Asks at once, whenever the page is looked at again, and at a touch; `tell` hears how it went. */
+/** Requests it at once, whenever the page becomes visible again, and at a touch; calls `tell` with the result. */
 export function stayAwake(tell) {
   let lock = null;
 

@@ -1,4 +1,4 @@
-// Alarms: those that stand come first on the page, each with a button to acknowledge it; those that ended stand below.
+// Alarms: active ones come first on the page, each with a button to acknowledge it; ended ones are below.
 
 import { ALARMS, change, hasToken } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
@@ -13,7 +13,7 @@ export const alarmsOf = ({ active, items }) => [...new Map([...items, ...active]
 
 const about = (alarm) => `${alarm.kind} ${alarm.where ?? ""}`;
 
-/** Only the last of its kind and place can be acknowledged; its beginning tells which. */
+/** Only the last of its kind and place can be acknowledged; its start identifies it. */
 const isLast = (alarm, alarms) => alarms.every((other) => about(other) !== about(alarm) || other.t_start <= alarm.t_start);
 
 const isUnseen = (alarm, alarms) => alarm.acknowledged === null && isLast(alarm, alarms);
@@ -23,7 +23,7 @@ const seen = ({ acknowledged }) =>
 
 const when = (alarm) => (alarm.t_end ? span(alarm.t_start, alarm.t_end) : phrase("alarm_since", { time: clock(alarm.t_start) }));
 
-/** What is the matter, from the last step before it ended. */
+/** The alarm's content, from the last step before it ended. */
 function plain({ kind, where, steps }) {
   const { found, std, limit, unit, detail } = steps.filter((step) => step.state !== "cleared").at(-1);
   const measured = () => ({ found: withStd(found, std, 0, unit), limit: withStd(limit, null, 0, unit) });

@@ -1,4 +1,4 @@
-// What the gateway asks about a stated fact, in the reader's language, and the answers that were probably meant.
+// The gateway's doubts about stated facts, in the reader's language, and the answers that were probably meant.
 
 import { phrase } from "/assets/dashboard/phrases.js";
 import { figure, number } from "/assets/dashboard/words.js";
@@ -29,7 +29,7 @@ export function asked({ kind, numbers }) {
 
 const answer = (x) => (Array.isArray(x) ? x[1] : x);
 
-/** The button that takes what was probably meant; empty where no slip explains the doubts. */
+/** The button that accepts the probable answer; empty if no slip explains the doubts. */
 export function meantText(doubts) {
   const meant = Object.entries(doubts[0]?.meant ?? {}).filter(([name]) => name in FIELDS);
   if (meant.length === 0) return "";
@@ -39,7 +39,7 @@ export function meantText(doubts) {
   return phrase("com_meant", { answers: answers.join(", ") });
 }
 
-/** The vehicle with these answers in the place of what was typed; nothing that was not typed. */
+/** The vehicle with these answers in place of the typed ones; only typed answers are replaced. */
 export function changed(vehicle, doubts) {
   const typed = Object.entries(vehicle).filter(([, x]) => x !== null);
   return { ...Object.fromEntries(typed), ...doubts[0].meant };

@@ -1,4 +1,4 @@
-// What was entered so far, each with the way back to it.
+// The answers so far, each with a link back to it.
 
 import { asked } from "/assets/dashboard/commissioning-doubts.js";
 import { made, pair } from "/assets/dashboard/page.js";
@@ -15,7 +15,7 @@ function axles({ kerb_front_axle_kg: front, kerb_rear_axle_kg: rear }) {
   return phrase("com_axles", { front: kg(front), rear: kg(rear), share: figure((100 * front) / (front + rear), 0, "%") });
 }
 
-/** What was typed, else what its line says, else that nobody knows it. */
+/** The typed answer, else the line's, else that it is unknown. */
 function typedOrLine(typed, ofLine, digits, unit) {
   if (typed !== null && typed !== undefined) return figure(typed, digits, unit);
   return ofLine === undefined ? UNKNOWN : phrase("com_as_line", { value: figure(ofLine, digits, unit) });

@@ -47,7 +47,7 @@ function learnedText({ learned, n_batches, driven_s, is_fitting }) {
   });
 }
 
-/** How long until the next window counts, as a clock that runs on between two answers of the gateway. */
+/** Time until the next window counts, as a clock that runs on between two answers of the gateway. */
 function showWindow() {
   if (windowAt === null) return;
   const [seconds, since] = windowAt;
@@ -202,7 +202,7 @@ function draft(begunAt) {
   return kept?.begun_at === begunAt ? kept.answers : null;
 }
 
-/** With what is typed and not sent, else with what was sent, else with what its line's vehicles have in common. */
+/** Filled with the typed answers, else with those sent before, else with the line's common figures. */
 function fillVehicle() {
   const { line, vehicle, begun_at } = known.commissioning.underway;
   const typed = draft(begun_at);
@@ -219,7 +219,7 @@ form.addEventListener("input", () => {
   localStorage.setItem(DRAFT, JSON.stringify({ begun_at: known.commissioning.underway.begun_at, answers: typedNow() }));
 });
 
-/** One question to the gateway: its own words where it refuses, and no button twice. */
+/** One request to the gateway: shows its own words if it refuses, and disables the button meanwhile. */
 async function step(place, path, claim, method = "POST") {
   const buttons = [...place.querySelectorAll("button")];
   for (const button of buttons) button.disabled = true;
@@ -293,7 +293,7 @@ element("commissioning-meant").addEventListener("click", () => {
 });
 element("commissioning-confirm").addEventListener("click", () => step(element("commissioning-doubts"), "/confirm"));
 
-/** What counts once the calibration in use is gone. */
+/** The calibration that takes effect once the present one is gone. */
 function before({ history, active }) {
   return activeText(history.find((one) => one.ended === null && one.id !== active.id) ?? null);
 }

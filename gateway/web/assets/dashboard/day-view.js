@@ -33,7 +33,7 @@ function tripText(trip) {
 
 const isTrip = (entry) => "distance_m" in entry;
 
-/** Those of the last day before the newest, oldest first; what was withdrawn is gone. */
+/** The entries of the last 24 hours of data, oldest first, without withdrawn ones. */
 function lastDay(events, trips) {
   const told = [...events.filter((event) => !event.is_withdrawn), ...trips];
   const newest = Math.max(...told.map((entry) => at(entry.t_end)));
@@ -67,7 +67,7 @@ function tripBar(trip, x, y) {
   return drawn("rect", { class: `day-${kind}`, x: left, y: top, width: Math.max(right - left, LEAST_WIDTH), height: FLOOR - top });
 }
 
-/** Puts labels where they overlap none put before them, and leaves out what has no room; the list below says all. */
+/** Places labels that overlap no earlier one, and omits those without room; the list below is complete. */
 function labels(wanted, width) {
   const taken = [];
   return wanted.filter((label) => {
@@ -85,7 +85,7 @@ function changeLabel(event, x, y) {
   return { text, kind: "day-change", x: (x(event.t_start) + x(event.t_end)) / 2, y: Math.max(top, 12), size: Math.abs(event.change_kg) };
 }
 
-/** Bars of load over time, to scale with the pixels there are. */
+/** Bars of load over time, scaled to the pixels available. */
 function timeline(entries, width) {
   const [first, last] = [Math.min(...entries.map((entry) => at(entry.t_start))), Math.max(...entries.map((entry) => at(entry.t_end)))];
   const loads = entries.flatMap((entry) => (isTrip(entry) ? [entry.payload_kg ?? 0] : [entry.before.payload_kg, entry.after.payload_kg]));

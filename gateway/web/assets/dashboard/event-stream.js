@@ -1,11 +1,11 @@
-// Server-sent events over fetch: unlike EventSource it can carry a token, and it says why a connection failed.
+// Server-sent events over fetch: unlike EventSource it can send a token, and it says why a connection failed.
 
 import { ask } from "/assets/dashboard/gateway.js";
 
 const FIRST_PAUSE_MS = 1000;
 const LAST_PAUSE_MS = 30000;
 
-/** Calls `onEvent(kind, record)` for each event and `onLink(isLive)` as the connection comes and goes; never ends. */
+/** Calls `onEvent(kind, record)` for each event and `onLink(isLive)` when the connection comes or goes; never ends. */
 export async function follow(url, lastEventId, onEvent, onLink) {
   let cursor = lastEventId;
   let pauseMs = FIRST_PAUSE_MS;

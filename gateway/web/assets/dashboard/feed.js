@@ -1,4 +1,5 @@
-// Keeps what the page knows in step with the gateway: asks at the start and now and then, follows the stream between.
+// Keeps the page's state in step with the gateway: fetches it at the start and now and then, follows the stream in
+// between.
 
 import { follow } from "/assets/dashboard/event-stream.js";
 import { alarmsOf } from "/assets/dashboard/alarm-view.js";
@@ -39,7 +40,7 @@ async function askDay() {
 
 const askAlarms = async () => learn({ alarms: alarmsOf(await load(ALARMS)) });
 
-/** With the newest revision of one entry; an older one that comes late changes nothing. */
+/** With the newest revision of one entry; an older one that arrives late changes nothing. */
 function revised(entries, entry) {
   const before = (entries ?? []).find((one) => one.id === entry.id);
   if (before && before.revision >= entry.revision) return entries;
@@ -71,7 +72,7 @@ const remembered = (record) => [record, ...(known.batches ?? []).filter((batch) 
 
 let asking = null;
 
-/** Once for all events that come together, as they do after a pause. */
+/** Once for all events that arrive together, as they do after a pause. */
 function askSoon() {
   asking ??= setTimeout(() => {
     asking = null;
@@ -97,7 +98,7 @@ function onEvent(kind, record) {
 
 const giveUpUntilNext = (error) => console.info(error.message);
 
-/** What needs an answer before the page is whole; asked again whenever the stream comes back. */
+/** What the page needs to be complete; fetched again whenever the stream comes back. */
 async function catchUp() {
   await askNow();
   await Promise.all([askOnce(), askSpectra(), askTruth(), askKnownWeights(), askVerifications(), askCommissioning()]);
@@ -122,7 +123,7 @@ export async function feed() {
   });
 }
 
-/** Looks further back, or less far. */
+/** Shows a longer or shorter past. */
 export function lookBack(hours) {
   learn({ hours });
   askBatches().catch(giveUpUntilNext);

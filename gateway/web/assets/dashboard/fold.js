@@ -1,15 +1,15 @@
-// On a phone the cards that say more than the load are folded to their titles; a wider page shows them whole.
+// On a phone the less important cards are folded to their titles; a wider page shows them whole.
 
 const isPhone = matchMedia("(max-width: 40rem)");
 
-/** Charts in a card that is folded wait; they hear of it when there is room for them. */
+/** Charts in a folded card wait until there is room for them. */
 function toggle(card, isFolded) {
   card.classList.toggle("folded", isFolded);
   card.querySelector(".fold")?.setAttribute("aria-expanded", String(!isFolded));
   if (!isFolded) card.dispatchEvent(new Event("unfold", { bubbles: true }));
 }
 
-/** For what is wanted now. */
+/** For the content that is needed now. */
 export const unfold = (card) => toggle(card, false);
 
 function button(card) {

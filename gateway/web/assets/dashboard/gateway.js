@@ -1,4 +1,4 @@
-// How the pages ask the gateway: with the token of this session, if one was entered.
+// Requests to the gateway: with the token of this session, if one was entered.
 
 const TOKEN = "springscale-token";
 export const KNOWN_WEIGHTS = "/api/v1/known-weights";
@@ -17,7 +17,7 @@ function headers(token = sessionStorage.getItem(TOKEN)) {
   return token ? { Authorization: `Bearer ${token}` } : {};
 }
 
-/** The response, whatever its body; throws Refused where a token is missing or wrong, Error for anything else. */
+/** The response, whatever its body; throws Refused if a token is missing or wrong, Error for anything else. */
 export async function ask(path, more = {}, signal = null) {
   const response = await fetch(path, { headers: { ...headers(), ...more }, cache: "no-store", signal });
   if (response.status === 401 || response.status === 403) throw new Refused(path);
@@ -27,11 +27,11 @@ export async function ask(path, more = {}, signal = null) {
 
 export const load = async (path) => (await ask(path)).json();
 
-/** Asks for a change, with another token where one is given; returns what `state` tells after it. Throws the gateway's own words. */
+/** Requests a change, with another token if one is given; returns the `state` after it, or throws the gateway's words. */
 export async function change(method, path, token, claim, state) {
   const said = { ...headers(token || undefined), "Content-Type": "application/json" };
   const response = await fetch(path, { method, body: claim && JSON.stringify(claim), headers: said }).catch(() => {
-    throw new Error("The gateway did not answer. Look whether anything changed before you try again.");
+    throw new Error("The gateway did not answer. Check whether anything changed before you try again.");
   });
   if (!response.ok) throw new Error((await response.json()).detail);
   return load(state);

@@ -8,7 +8,7 @@ import { UNKNOWN, between, capital, clock, duration, figure, number, words } fro
 
 const NEEDED = new Set(["vertical_acceleration", "pitch_rate", "speed"]);
 
-/** What is wrong stands out: silence of what is needed, while the vehicle is awake. */
+/** Highlights faults: silence of a needed signal while the vehicle is awake. */
 function stateOf(signal, isCalm) {
   if (!isSilent(signal)) return [phrase("heard"), ""];
   const isNeeded = NEEDED.has(signal.signal);
@@ -29,7 +29,7 @@ function signalRow(signal, isCalm) {
   return built;
 }
 
-/** What a vehicle may send and this one never did is one line. */
+/** Optional signals that were never received take one line. */
 function signalRows(signals, isCalm) {
   const isNotSent = ({ signal, last_age_s: age }) => age == null && !NEEDED.has(signal);
   const rows = signals.filter((signal) => !isNotSent(signal)).map((signal) => signalRow(signal, isCalm));
@@ -45,7 +45,7 @@ function queue({ n_waiting, waiting_age_s }) {
   return phrase(waiting_age_s === null ? "waiting_some" : "waiting", { n: n_waiting, duration: waiting_age_s === null ? "" : duration(waiting_age_s) });
 }
 
-/** How estimates get to the fleet; nothing where no broker is configured. */
+/** How estimates get to the fleet; empty if no broker is configured. */
 function uplinkPairs(uplink) {
   if (uplink === null) return [];
   return [
@@ -54,7 +54,7 @@ function uplinkPairs(uplink) {
   ];
 }
 
-/** How alarms and events are pushed; nothing where no address is configured. */
+/** How alarms and events are pushed; empty if no address is configured. */
 function webhookPairs(webhook) {
   if (webhook === null) return [];
   const link = webhook.last_fault === null ? "webhook_works" : "webhook_fails";
@@ -101,7 +101,7 @@ show(({ vehicle }) => {
   element("calibrated").replaceChildren(...pairs);
 }, "vehicle");
 
-/** Names of settings stand in backquotes: as code on the page. */
+/** Names of settings are in backquotes: shown as code on the page. */
 function withCode(text) {
   return text.split("`").map((part, n) => (n % 2 ? made("code", part) : part));
 }

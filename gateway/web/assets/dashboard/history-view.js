@@ -13,7 +13,7 @@ const QUANTITIES = {
   side: { value: "cg_left_m", interval: "cg_left_interval95_m", digits: 3, unit: "m", isRare: true },
 };
 
-/** Local time without a zone, as the charts want it. */
+/** Local time without a zone, as the charts expect it. */
 function local(iso) {
   const when = new Date(iso);
   return new Date(when.getTime() - when.getTimezoneOffset() * 60e3).toISOString().slice(0, 23);

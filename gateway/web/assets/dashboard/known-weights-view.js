@@ -1,4 +1,4 @@
-// Known weights: what is in use, what waits for a confirmation, and how one is stated or taken back.
+// Known weights: those in use, those that wait for a confirmation, and the forms to state one or take it back.
 
 import { KNOWN_WEIGHTS, change, hasToken } from "/assets/dashboard/gateway.js";
 import { known, learn, show } from "/assets/dashboard/known.js";
@@ -59,7 +59,7 @@ show(({ knownWeights }) => {
   element("weights-entries").replaceChildren(...history.filter((one) => one.state !== "held").map(entry));
 }, "knownWeights");
 
-/** What can be asked for: the question, what would come of it, and how the gateway is asked. */
+/** The possible requests: the question, its effect, and the request to the gateway. */
 const CHOICES = {
   empty: {
     question: () => phrase("empty_question"),

@@ -1,6 +1,6 @@
-// What the page knows, and who shows which part of it.
+// The page's state, and the views of its parts.
 
-/** Everything learned from the gateway; null is not learned yet. */
+/** Everything received from the gateway; null: not received yet. */
 export const known = {
   latest: null, // GET /estimates/latest
   latestAtMs: 0, // performance.now() of that answer: the age goes on even where the gateway is gone
@@ -30,12 +30,12 @@ export const known = {
 
 const views = [];
 
-/** Calls `draw(known)` whenever one of the `parts` is learned. */
+/** Calls `draw(known)` whenever one of the `parts` changes. */
 export function show(draw, ...parts) {
   views.push({ draw, parts });
 }
 
-/** Takes in what was learned and draws what shows it. */
+/** Stores what was received and redraws its views. */
 export function learn(news) {
   Object.assign(known, news);
   for (const { draw, parts } of views) if (parts.some((part) => part in news)) draw(known);

@@ -7,7 +7,7 @@ import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as nam
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 
-/** What became of the last batch, where none was weighed yet, and what to do about it. */
+/** The outcome of the last batch, if none was weighed yet, and what to do about it. */
 function noneYet(refusal, reasons, commissioning) {
   if (refusal == null) return phrase("none_yet");
   if (refusal.rejected.includes("no_calibration") && commissioning?.is_allowed) {
@@ -18,7 +18,7 @@ function noneYet(refusal, reasons, commissioning) {
   return phrase("none_because", { reasons: named(refusal.rejected) }) + todo;
 }
 
-/** The last batch was refused, none was weighed since, and not merely the road told nothing. */
+/** The last batch was refused, none was weighed since, and the reason is not merely the road. */
 function isDoubted({ last_rejection: refusal, ...latest }, reasons) {
   if (refusal == null || latest.payload_kg == null || (!latest.provisional && refusal.t_end <= latest.t_end)) return false;
   return refusal.rejected.some((reason) => ["The sensors", "The answer"].includes(reasons.get(reason)?.cause));
@@ -77,7 +77,7 @@ function announce(latest) {
   announcedId = latest.id;
 }
 
-/** Each source with what it adds, and once each what would narrow it; the widths are half those of 95 % intervals. */
+/** Each source with its part of the error, and each remedy once; the widths are half those of 95 % intervals. */
 show(({ latest, sources, remedies: advised }) => {
   const lines = latest?.error_budget ?? [];
   element("budget").hidden = lines.length === 0;

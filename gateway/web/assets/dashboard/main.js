@@ -1,4 +1,4 @@
-// The dashboard: views first, then what fills them.
+// The dashboard: creates the views, then the feed that fills them.
 
 import "/assets/dashboard/phrases.js"; // first: the others find its words in the page
 import "/assets/dashboard/theme-button.js";

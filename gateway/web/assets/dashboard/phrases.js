@@ -1,4 +1,4 @@
-// The dashboard's words in the reader's language; loading this writes those that stand in the page itself.
+// The dashboard's words in the reader's language; loading this module translates those in the page itself.
 
 import { fill, language, speaker } from "/assets/language.js";
 import { COMMISSIONING_WORDS } from "/assets/words/commissioning.js";
@@ -8,7 +8,7 @@ import { REASONS_DE, REMEDIES_DE, SOURCES_DE } from "/assets/words/reasons.js";
 
 export const phrase = speaker(COMMON, DASHBOARD, COMMISSIONING_WORDS);
 
-/** What the gateway says in English of reasons, sources and remedies, by name, in the reader's language. */
+/** The gateway's English texts of reasons, sources and remedies, by name, in the reader's language. */
 export function explained({ items, sources, remedies }) {
   const isGerman = language === "de";
   const inGerman = (told) => {

@@ -7,7 +7,7 @@ const isTouch = matchMedia("(pointer: coarse)");
 
 let loading = null;
 
-/** Elements that stand where the library would write styles for maps, which the page's policy forbids. */
+/** Stand-ins for the elements into which the library would write styles for maps, which the page's policy forbids. */
 function standIns() {
   return document.body.dataset.chartStyles.split(" ").filter(Boolean).map((id) => {
     const meta = document.createElement("meta");
@@ -16,7 +16,7 @@ function standIns() {
   });
 }
 
-/** Resolves once the library is there; a chart that cannot come leaves its table and its words. */
+/** Resolves once the library is there; if it fails to load, the table and the text remain. */
 function library() {
   loading ??= new Promise((resolve, reject) => {
     const script = document.createElement("script");
@@ -68,7 +68,7 @@ function layout({ xaxis, yaxis, ...more }) {
 
 const wanted = new WeakMap(); // place -> [traces, shape] to be drawn there next
 
-/** Draws or redraws a chart, once numbers are on the page and there is room for it; of several wishes, the last. */
+/** Draws or redraws a chart, once numbers are on the page and there is room for it; of several requests, the last. */
 export async function plot(place, traces, shape) {
   const wish = [traces, shape];
   wanted.set(place, wish);

@@ -1,4 +1,4 @@
-// Whether silence is as it should be: a parked vehicle's bus is silent, and nobody need be alarmed.
+// Whether silence is normal: a parked vehicle's bus is silent, which is no cause for alarm.
 
 import { phrase } from "/assets/dashboard/phrases.js";
 
@@ -8,7 +8,7 @@ export const isSilent = (signal) => signal.last_age_s == null || signal.last_age
 
 export const silentSignals = (status) => status.signals.filter(isSilent).map((one) => phrase.named("signal", one.signal));
 
-/** Nothing at all on the bus, where there was something before; a bus never heard may well not be connected. */
+/** No frames at all on a bus that had some before; a bus that never had any may not be connected. */
 export function isAsleep({ status, latest }) {
   if (status?.state !== "waiting_for_bus" || status.bus.n_identifiers) return false;
   return status.bus.n_frames > 0 || Boolean(latest?.id);

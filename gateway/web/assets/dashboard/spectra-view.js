@@ -35,7 +35,7 @@ function line(spectra, name, colourName, width) {
   };
 }
 
-/** A phase that wraps is broken where it jumps, not drawn across. */
+/** A phase that wraps is interrupted at the jump, not drawn across. */
 function wrapped(trace) {
   const y = trace.y.map((phase, n) => (n > 0 && Math.abs(phase - trace.y[n - 1]) > Math.PI ? null : phase));
   return { ...trace, y };

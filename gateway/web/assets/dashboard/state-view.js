@@ -11,7 +11,7 @@ const TONES = {
   estimating: "good", stale: "warn", reader_fault: "bad",
 };
 
-/** What is wrong beside the state. */
+/** Faults beside the state. */
 function beside({ store, uplink, warnings }) {
   const said = [];
   if (store.state !== "ok") said.push(phrase("memory_only", { reason: store.reason }));
@@ -19,7 +19,7 @@ function beside({ store, uplink, warnings }) {
   return [...said, ...warnings].join(" ");
 }
 
-/** The gateway's own sentence knows more details than can be said anew in another language. */
+/** The gateway's own English sentence has more details than the translation. */
 function sentence(status) {
   if (language === "en") return status.state_in_words;
   const said = [phrase(`sentence.${status.state}`)];

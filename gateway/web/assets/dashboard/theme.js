@@ -1,6 +1,6 @@
 "use strict";
 
-// Before the first paint, and therefore no module: the chosen theme, else the system's.
+// Runs before the first paint, and is therefore no module: the chosen theme, else the system's.
 {
   const KEPT = "springscale-theme";
   const CHOICES = ["system", "light", "dark"];

@@ -1,4 +1,4 @@
-// The van from above, front to the left: what each axle and wheel bears, and where the load's centre of gravity lies.
+// The van from above, front to the left: the load on each axle and wheel, and the load's centre of gravity.
 // To scale along by the wheelbase and across by the track width.
 
 import { phrase } from "/assets/dashboard/phrases.js";
@@ -30,7 +30,7 @@ function wheel([place, x, side], weights) {
   return shape("rect", { class: `wheel ${overOf(weights?.[place])}`, x: x - 17, y: y - 7, width: 34, height: 14, rx: 4 });
 }
 
-/** Beside the wheel, towards the other axle: what it carries, and its limit below; nothing where nobody knows. */
+/** Beside the wheel, towards the other axle: its load, and its limit below; empty if unknown. */
 function wheelLabel([place, x, side], weights) {
   const weight = weights?.[place];
   if (weight?.kg == null) return [];
@@ -71,7 +71,7 @@ export function ellipse(along, across, correlation) {
   };
 }
 
-/** Where the load lies with 95 %: along and across by an ellipse, along alone by a bar. */
+/** The 95 % region of the load's position: along and across by an ellipse, along alone by a bar. */
 function spread(place, x, y, radius, scale) {
   if (place.left_m == null || place.left_std_m == null) {
     const reach = Math.min(Z95 * place.std_m * scale.along, LARGEST_REACH);
@@ -85,7 +85,7 @@ function spread(place, x, y, radius, scale) {
   return [shape("ellipse", { class: "spread", ...where }), shape("ellipse", { class: "about", ...where })];
 }
 
-/** The load as a disc whose area is its mass, with the 95 % region of its place. */
+/** The load as a disc whose area is its mass, with the 95 % region of its position. */
 function load(place, payloadKg, fullKg, scale) {
   if (!place) return [];
   const x = FRONT_X + place.position_m * scale.along, y = MIDDLE_Y + (place.left_m ?? 0) * scale.across;
@@ -107,13 +107,13 @@ function sensor(figures, scale) {
   ];
 }
 
-/** "0.12 m left of the centre line"; nothing where nobody knows. */
+/** "0.12 m left of the centre line"; empty if unknown. */
 export function aside(place, told) {
   if (place?.left_m == null) return "";
   return phrase(place.left_m < 0 ? "right_of" : "left_of", { metres: told(Math.abs(place.left_m), place.left_std_m) });
 }
 
-/** The drawing for who cannot see it: all that it shows. */
+/** The drawing as text, for people who cannot see it. */
 function inWords(weights) {
   const place = weights?.load;
   const across = aside(place, (metres) => `${number(metres, 2)} m`);
@@ -123,13 +123,13 @@ function inWords(weights) {
   return `${phrase(place ? "van_load" : "van_empty", { where })}${borne.length ? phrase("van_bears", { places: capital(borne.join(", ")) }) : ""}`;
 }
 
-/** Pixels per metre along and across; across as along where nobody told the track width. */
+/** Pixels per metre along and across; the same for both if the track width is unknown. */
 function scaleOf(figures) {
   const along = (REAR_X - FRONT_X) / figures.wheelbase_m;
   return { along, across: figures.track_width_m ? (2 * HALF_TRACK) / figures.track_width_m : along };
 }
 
-/** The drawing; `place` is the load's, null where none is to be drawn. */
+/** The drawing; `place` is the load's position, null for none. */
 export function drawVan(vehicle, weights, place, payloadKg) {
   const scale = scaleOf(vehicle.figures);
   const fullKg = Math.max(vehicle.calibration?.payload_seen_kg[1] ?? 0, 1);

@@ -1,4 +1,4 @@
-// Where the load lies: the van from above, and its weights in words.
+// The load's position: the van from above, and its weights in words.
 
 import { show } from "/assets/dashboard/known.js";
 import { element, pair, say, write } from "/assets/dashboard/page.js";
@@ -10,7 +10,7 @@ const WHEELS = ["front_left", "front_right", "rear_left", "rear_right"];
 const LIMITED = ["gross", "front_axle", "rear_axle", ...WHEELS];
 const NO_WHEELS = { track_width: "no_track", roll_rate: "no_roll" };
 
-/** Weights and payload come in two answers: the load is drawn only where both are of one estimate. */
+/** Weights and payload come in two answers: the load is drawn only if both belong to one estimate. */
 const loadOf = (weights, latest) => (weights?.id === latest?.id ? weights?.load : null);
 
 function weightInWords(weight) {
@@ -18,7 +18,7 @@ function weightInWords(weight) {
   return `${withStd(weight.kg, weight.std_kg, 0, "kg")}${limit}`;
 }
 
-/** Why no wheel is weighed; what wheels carry stands in the drawing. */
+/** Why no wheel is weighed; the drawing shows the wheel loads. */
 function wheelPairs(weights) {
   const why = NO_WHEELS[weights.front_left.lacks];
   return why && weights.front_left.kg == null && weights.front_axle.kg != null ? [pair(phrase("wheels"), phrase(why))] : [];

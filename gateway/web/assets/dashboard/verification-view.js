@@ -1,4 +1,4 @@
-// Known loads: when they were last held against what was weighed, what drifts meanwhile; and the form that states one.
+// Known loads: their last comparison with the estimates, the drift since then, and the form that states one.
 
 import { KNOWN_WEIGHTS, VERIFICATIONS, ask, change, hasToken } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
@@ -61,7 +61,7 @@ show(({ trend }) => {
   element("drift").replaceChildren(...trend.parameters.map((one) => made("li", trendText(one), one.is_drifting || one.is_off ? "warning" : "")));
 }, "trend");
 
-/** What a known load can be good for: how the dialog says it, and how the gateway is told. */
+/** The uses of a known load: the dialog's text, and the request to the gateway. */
 const PURPOSES = {
   verify: {
     effect: phrase("verify_effect"),
@@ -93,7 +93,7 @@ function fit() {
   }
 }
 
-/** What is typed, as the gateway takes it. */
+/** The typed values, as the gateway expects them. */
 function typed() {
   const by = element("known-by").value, load = { by };
   for (const name of FIELDS[by]) {

@@ -32,7 +32,7 @@ const TIME = { hour: "2-digit", minute: "2-digit" };
 const DAY = { day: "numeric", month: "short", ...TIME };
 const YEAR = { year: "numeric", ...DAY };
 
-/** Days are named where they are not today, years where they are not this one: one way of writing times on all pages. */
+/** Shows the day unless it is today, and the year unless it is this one: one way of writing times on all pages. */
 function format(...instants) {
   const now = new Date();
   if (instants.every((one) => one.toDateString() === now.toDateString())) return new Intl.DateTimeFormat(locale, TIME);

@@ -1,4 +1,4 @@
-// The fleet: asks every few seconds, shows a line per vehicle, alarmed ones first; the search keeps what matches.
+// The fleet: fetches every few seconds, shows a line per vehicle, alarms first; the search keeps matching lines.
 
 import { element, made, write } from "/assets/dashboard/page.js";
 import { UNKNOWN, ago, capital, clock, figure, withStd, words } from "/assets/dashboard/words.js";

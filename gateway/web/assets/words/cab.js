@@ -25,12 +25,12 @@ export const CAB = {
   safe: ["Safe: {safe}; best estimate {best}{interval}. Limit: {place}.", "Sicher: {safe}; beste Schätzung {best}{interval}. Grenze: {place}."],
   too_heavy: ["Overload: best estimate {best}{interval}. Limit: {place}.", "Überladung: beste Schätzung {best}{interval}. Grenze: {place}."],
   interval: [" (95 %: {between})", " (95 %: {between})"],
-  room_unknown: ["What you can still load is not known: {missing}.", "Wie viel noch geladen werden darf, ist nicht bekannt: {missing}."],
+  room_unknown: ["The spare load is not known: {missing}.", "Wie viel noch geladen werden darf, ist nicht bekannt: {missing}."],
   missing_empty: ["the empty weight of the vehicle is not known", "das Leergewicht des Fahrzeugs ist nicht bekannt"],
   missing_limit: ["no limit is set ([vehicle] gross_limit_kg in springscale.toml)", "keine Grenze ist gesetzt ([vehicle] gross_limit_kg in springscale.toml)"],
   not_weighed: ["The last minutes could not be weighed: {reasons}.", "Die letzten Minuten konnten nicht gewogen werden: {reasons}."],
   not_calibrated: ["This vehicle is not calibrated.", "Dieses Fahrzeug ist nicht kalibriert."],
-  not_yet: ["The first weight comes after some minutes of driving.", "Das erste Gewicht kommt nach einigen Minuten Fahrt."],
+  not_yet: ["The first weight comes after a few minutes of driving.", "Das erste Gewicht kommt nach einigen Minuten Fahrt."],
   spare: ["{kg} spare", "{kg} frei"],
   too_much: ["{kg} too much", "{kg} zu viel"],
 
@@ -68,11 +68,11 @@ export const CAB = {
     "Das Telefon kann den Bildschirm abschalten: Browser halten ihn nur über HTTPS an. Stellen Sie bis dahin am Telefon ein, dass er nie abschaltet.",
   ],
   awake_unknown: [
-    "The phone may switch its screen off: this browser cannot keep it on, so set the phone's own screen time-out to never.",
+    "The phone may switch its screen off: this browser cannot keep it on, so set the phone's screen time-out to never.",
     "Das Telefon kann den Bildschirm abschalten: Dieser Browser kann ihn nicht anhalten. Stellen Sie am Telefon ein, dass er nie abschaltet.",
   ],
   awake_refused: [
-    "The phone may switch its screen off: it refused to keep it on, perhaps to save its battery. Touch the page to ask again.",
+    "The phone may switch its screen off: it refused to keep it on, perhaps to save its battery. Touch the page to try again.",
     "Das Telefon kann den Bildschirm abschalten: Es hat abgelehnt, vielleicht um den Akku zu schonen. Berühren Sie die Seite, um erneut zu fragen.",
   ],
 };

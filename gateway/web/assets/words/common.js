@@ -14,7 +14,7 @@ export const COMMON = {
   show_vehicle: ["Show the vehicle", "Fahrzeug anzeigen"],
   wants_token: ["The gateway needs a token.", "Das Gateway verlangt ein Token."],
   gone: ["The gateway does not answer.", "Das Gateway antwortet nicht."],
-  last_heard: ["What is shown is the last it sent.", "Gezeigt wird, was es zuletzt gesendet hat."],
+  last_heard: ["These are its last values.", "Gezeigt wird, was es zuletzt gesendet hat."],
   asking: ["Asking the gateway.", "Das Gateway wird gefragt."],
 
   "place.gross": ["whole vehicle", "ganzes Fahrzeug"],

@@ -18,5 +18,5 @@ export const FLEET = {
   over: ["over the limit: {places}", "über der Grenze: {places}"],
   early: ["{name} (first sign)", "{name} (erstes Anzeichen)"],
   since: ["since {time}", "seit {time}"],
-  gone: ["The fleet's service does not answer. What is shown is the last it sent.", "Der Dienst der Flotte antwortet nicht. Gezeigt wird, was er zuletzt gesendet hat."],
+  gone: ["The fleet's service does not answer. These are its last values.", "Der Dienst der Flotte antwortet nicht. Gezeigt wird, was er zuletzt gesendet hat."],
 };

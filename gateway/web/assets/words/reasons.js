@@ -1,4 +1,4 @@
-// German for what /api/v1/reasons says in English: why a batch was not weighed [what happened, what to do], the sources
+// German for the English of /api/v1/reasons: why a batch was not weighed [what happened, what to do], the sources
 // of an estimate's error, and what would narrow it.
 
 export const REASONS_DE = {

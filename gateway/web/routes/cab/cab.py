@@ -26,12 +26,12 @@ _EVENTS: Final = 20  # a corrected one comes again behind newer ones
 
 
 def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], scales: Scales) -> APIRouter:
-    """The route that tells a driver."""
+    """The route for the driver."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
     @router.get("/cab", responses=problem_responses(503))
     async def cab() -> Cab:
-        """How much more may go in, whether it is too much, how old that is, and what was loaded last."""
+        """How much can still be loaded, whether it is too much, how old that is, and what was loaded last."""
         now, shown = status(), board.shown()
         load = None if shown.estimate is None else as_of_load(shown.estimate)
         weights = scales.weigh(load)
@@ -88,7 +88,7 @@ def _has_limits(weights: Weights) -> bool:
 
 
 def _rejected(heard: Estimate | None, shown: Estimate | None) -> tuple[Why, ...]:
-    """Of the last whole batch, where none was weighed since. An early look makes up for no refused batch."""
+    """Of the last whole batch, if none was weighed since. A provisional estimate does not replace a refused batch."""
     if heard is None:
         return ()
     is_weighed_since = shown is not None and not shown.is_provisional and shown.t_end_ns >= heard.t_end_ns
@@ -100,7 +100,7 @@ def _events(reader: StoreReader) -> tuple[str, ...]:
 
 
 def _newest(texts: tuple[str, ...]) -> CabEvent | None:
-    """The last by the clock of those that still stand."""
+    """The latest of the active ones."""
     told: list[dict[str, Any]] = [json.loads(text) for text in texts]
     standing = [one for one in told if not one["is_withdrawn"]]
     if not standing:
@@ -115,7 +115,7 @@ def _interval(quantity: Quantity) -> list[float] | None:
 
 
 def _of_std(quantity: Quantity) -> tuple[float, float]:
-    """A load's together have no interval of their own (Epoch)."""
+    """The fused estimate of a load has no interval of its own (Epoch)."""
     return Quantity.normal(quantity.number, quantity.std).interval95
 
 

@@ -13,7 +13,7 @@ RoomPlace = Literal["gross", "front_axle", "rear_axle"]
 
 
 class LoadKnown(StrEnum):
-    """Whether what was weighed is what is aboard."""
+    """Whether the weighed load is still aboard."""
 
     WEIGHED = "weighed"
     STANDING = "standing"
@@ -22,7 +22,9 @@ class LoadKnown(StrEnum):
 
 
 class RoomLeft(BaseModel):
-    """What may still go aboard before one place bears its limit, all of it resting there; negative: too heavy."""
+    """The load that can still go aboard before one place reaches its limit, all of it resting there; negative: too
+    heavy.
+    """
 
     place: RoomPlace
     kg: float = Field(examples=[288.7])
@@ -49,30 +51,32 @@ class Cab(BaseModel):
     vehicle_id: str | None
     state: State
     load: LoadKnown = Field(
-        description="weighed: by what was driven since the last stop; standing: what is loaded now is not seen; "
+        description="weighed: by the drive since the last stop; standing: what is loaded now is not measured; "
         "not_weighed_yet: it has driven on since a stop, and the numbers are of before that stop"
     )
-    stood_s: float | None = Field(description="for how long it has stood; null: it drives")
+    stood_s: float | None = Field(description="standstill so far; null: it drives")
     t_end: str | None = Field(description="end of the last batch in it, UTC")
     age_s: float | None
     is_stale: bool
     is_early: bool = Field(description="true: an early look, not a whole batch yet")
     light: Light = Field(
-        description="near: a limit lies within the 95 % interval; over: too much is more probable than not; "
-        "unknown: no limit or no weight is known, or it is doubted"
+        description="near: a limit lies within the 95 % interval; over: too much is more probable than not; unknown: "
+        "no limit or no weight is known, or it is doubted"
     )
     light_about: list[str] = Field(description="places the light is about, the worst first", examples=[["rear_axle"]])
     over_limit_probability: float | None = Field(description="of the worst place, 0 to 1", examples=[0.02])
     room: list[RoomLeft] = Field(description="the tightest first; empty: unknown, as the light is")
     is_doubted: bool = Field(
-        description="the last whole batch was refused for what sensors or answer showed, so nobody knows whether what "
-        "was weighed before holds; never where that was too heavy"
+        description="the last whole batch was refused because of the sensors or the answer, so the earlier weight may "
+        "no longer be valid; never if that was too heavy"
     )
     has_limits: bool = Field(description="whether a gross or an axle limit is known at all")
-    lacks: Lack | None = Field(description="what the gross weight would need to be known")
+    lacks: Lack | None = Field(description="facts that are missing for the gross weight")
     payload_kg: float | None
     payload_interval95_kg: list[float] | None
-    alarms: dict[str, str] = Field(description="those that stand, by name: early or final; see /api/v1/alarms")
-    rejected: list[str] = Field(description="why the last whole batch was refused; empty: it was not, or none came")
+    alarms: dict[str, str] = Field(description="active alarms, by name: early or final; see /api/v1/alarms")
+    rejected: list[str] = Field(
+        description="why the last whole batch was refused; empty: it was not, or there was none"
+    )
     last_event: CabEvent | None
     own_readings: tuple[OwnReading, ...] = Field(description="of the vehicle's own load sensors, not weighed here")

@@ -1,7 +1,7 @@
-"""What can be asked about the calibration in use, and changed: known weights, and known loads held against it.
+"""Routes of the calibration in use: known weights, and known loads compared with it.
 
-Requests with a good token come in; who keeps these things (a desk of the service) answers in JSON, blocking, from a
-thread of its own; its refusals go out as problems with a reason.
+Requests with a valid token come in; a part of the service answers in JSON, blocking, from a thread of its own; its
+refusals go out as problems with a reason.
 """
 
 from gateway.web.routes.calibration.known_weights import KnownWeightService, known_weights_router

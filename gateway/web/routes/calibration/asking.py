@@ -1,4 +1,4 @@
-"""How a desk of the service is asked: in a thread of its own, its refusals as problems."""
+"""Calls to parts of the service: in a thread of its own, refusals as problems."""
 
 import asyncio
 from collections.abc import Callable
@@ -23,7 +23,7 @@ _CODES: Final = {
 
 
 async def answered(request: Request, ask: Callable[[], str], status: int = 200) -> Response:
-    """What ``ask`` answers, or the problem with which it refuses."""
+    """The answer of ``ask``, or the problem with which it refuses."""
     try:
         return json_response(await asyncio.to_thread(ask), status)
     except (AlarmRefusedError, CommissioningRefusedError, WeightRefusedError) as refusal:

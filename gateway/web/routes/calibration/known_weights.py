@@ -1,4 +1,4 @@
-"""/api/v1/known-weights: what somebody knows of a load conditions every later estimate, until it is taken back.
+"""/api/v1/known-weights: a known weight conditions every later estimate, until it is taken back.
 
 ``/calibration/tare`` and ``/calibration/tickets`` are the same list, of one kind each.
 """
@@ -32,7 +32,7 @@ class KnownWeightService(Protocol):
         ...
 
     def add(self, kind: KnownWeightKind, by: str, note: str | None, stated: StatedWeight | None = None) -> str:
-        """The new KnownWeightEntry; nothing stated: the vehicle is empty now. Raises WeightRefusedError."""
+        """The new KnownWeightEntry; without a stated load, the vehicle is empty now. Raises WeightRefusedError."""
         ...
 
     def confirm(self, by: str, entry_id: str) -> str:
@@ -70,11 +70,11 @@ class KnownWeightRequest(Body):
 
 
 class TareRequest(Body):
-    """The claim that makes a tare."""
+    """The statement that makes a tare."""
 
     note: Note = ""
     is_empty: Literal[True] = Field(
-        description="you know that the vehicle is empty, and was so while it was last weighed (`offer` says when)"
+        description="you know that the vehicle is empty, and was during the last weighing (`offer` says when)"
     )
 
 
@@ -86,15 +86,15 @@ class TicketRequest(Body):
 
 
 class KnownWeightEntry(KnownWeightFields):
-    """One known weight: what is true of a load, and what was estimated of it without this entry."""
+    """One known weight: the true load, and its estimate without this entry."""
 
     state: Literal["in_use", "held", "ended", "other_calibration"] = Field(
-        description="held: its estimate contradicts it by more than three standard deviations; it counts once confirmed"
+        description="held: it contradicts its estimate by more than three standard deviations; it counts once confirmed"
     )
 
 
 class OfferedLoad(BaseModel):
-    """The load that was weighed last, as it is estimated now."""
+    """The load that was weighed last, with its present estimate."""
 
     payload_kg: float
     payload_std_kg: float
@@ -106,7 +106,7 @@ class OfferedLoad(BaseModel):
 
 
 class Offer(BaseModel):
-    """Whether "it is empty now" is possible, and of which load; else why not."""
+    """Whether "it is empty now" is possible, and for which load; else why not."""
 
     is_possible: bool
     reason: str | None = Field(examples=["no_counted_batch"])
@@ -115,11 +115,11 @@ class Offer(BaseModel):
 
 
 class KnownWeightState(BaseModel):
-    """Every known weight, newest first, and what they teach together."""
+    """Every known weight, newest first, and their combined effect."""
 
     known_weights_id: str | None = Field(description="hash of those in use, as estimates name it; null: there are none")
     n_teaching: int
-    mean_error_kg: float | None = Field(description="estimated without it less known: mean over those in use")
+    mean_error_kg: float | None = Field(description="estimate without it minus known weight: mean over those in use")
     error_std_kg: float | None = Field(description="scatter of these errors; null with fewer than two")
     offer: Offer
     fault: str | None = Field(description="what is wrong with the file")
@@ -127,7 +127,7 @@ class KnownWeightState(BaseModel):
 
 
 class UndoQuery(BaseModel):
-    """How far to go back."""
+    """How many to take back."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -145,21 +145,21 @@ def known_weights_router(service: KnownWeightService) -> APIRouter:
 
     @router.get(KNOWN_WEIGHTS_PATH, response_model=KnownWeightState)
     async def known_weights(request: Request) -> Response:
-        """Every known weight, what they teach together, and the load that "it is empty now" would be of."""
+        """Every known weight, their combined effect, and the load at which "it is empty now" would be taken."""
         return await answered(request, service.state)
 
     @router.post(KNOWN_WEIGHTS_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
     async def add_known_weight(request: Request, claim: KnownWeightRequest) -> Response:
-        """State what is known of a load: it counts from the next batch on. On disk when answered.
+        """State a known load: it counts from the next batch on. On disk when answered.
 
-        One that its estimate contradicts is kept as `held` and counts once somebody confirms it.
+        A known weight that contradicts its estimate is kept as `held` and counts once somebody confirms it.
         """
         stated = None if claim.weight is None else claim.weight.stated()
         return await answered(request, lambda: service.add(claim.kind, who(request), claim.note or None, stated), 201)
 
     @router.post(KNOWN_WEIGHTS_PATH + "/{entry_id}/confirm", response_model=KnownWeightState, responses=_CHANGED)
     async def confirm_known_weight(request: Request, entry_id: EntryId) -> Response:
-        """Take a held one into use: both numbers were seen, and the known one is right."""
+        """Confirm a held known weight: you have seen both numbers, and the known one is right."""
         return await answered(request, lambda: service.confirm(who(request), entry_id))
 
     @router.delete(KNOWN_WEIGHTS_PATH + "/{entry_id}", response_model=KnownWeightState, responses=_CHANGED)
@@ -174,7 +174,7 @@ def known_weights_router(service: KnownWeightService) -> APIRouter:
 
     @router.post(TARE_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
     async def set_tare(request: Request, claim: TareRequest) -> Response:
-        """It is empty now: the same as a known weight of kind `empty`."""
+        """State that the vehicle is empty now: the same as a known weight of kind `empty`."""
         return await answered(request, lambda: service.add(EMPTY[0], who(request), claim.note or None), 201)
 
     @router.delete(TARE_PATH, response_model=KnownWeightState, responses=_CHANGED)
@@ -189,7 +189,7 @@ def known_weights_router(service: KnownWeightService) -> APIRouter:
 
     @router.post(TICKETS_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
     async def add_ticket(request: Request, claim: TicketRequest) -> Response:
-        """A weighbridge's ticket: the same as a known weight of kind `ticket`."""
+        """State a weighbridge's ticket: the same as a known weight of kind `ticket`."""
         stated = claim.weight.stated()
         return await answered(
             request, lambda: service.add(KnownWeightKind.TICKET, who(request), claim.note or None, stated), 201

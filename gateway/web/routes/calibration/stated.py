@@ -1,4 +1,4 @@
-"""A weight as a request states it: gross, by axle, or a known payload and its place."""
+"""A weight as a request states it: gross, by axle, or a known payload and its position."""
 
 import time
 from typing import Annotated, Final, Literal
@@ -14,13 +14,13 @@ Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0, allow_inf_nan=False)]
 
 
 class _When(BaseModel):
-    """The moment at which the weight was known, and which drive carried it."""
+    """The time at which the weight was known, and the drive that carried it."""
 
     model_config = ConfigDict(extra="forbid")
 
-    at: Instant | None = Field(None, description="when it was taken [default: now]")
+    at: Instant | None = Field(None, description="time of the weighing [default: now]")
     drive: Drive | None = Field(
-        None, description="the drive before or after `at` carried it [default: whichever was weighed, if one alone was]"
+        None, description="the drive before or after `at` carried it [default: whichever was weighed, if only one was]"
     )
 
     std_kg: float | None = Field(
@@ -32,7 +32,7 @@ class _When(BaseModel):
     )
 
     def at_text(self) -> str:
-        """RFC 3339; what lies beyond the years that stamps can hold is brought to their edge."""
+        """RFC 3339; a time beyond the range of time stamps is moved to its edge."""
         at_ns = time.time_ns() if self.at is None else self.at
         return iso_utc(min(max(at_ns, 0), _LAST_NS))
 
@@ -67,7 +67,7 @@ class AxleWeights(_When):
 
 
 class KnownPayload(_When):
-    """What is aboard, from papers or from scales."""
+    """The load aboard, from papers or from scales."""
 
     by: Literal["payload"]
     payload_kg: Kilograms = Field(examples=[270.0])

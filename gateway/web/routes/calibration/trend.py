@@ -1,4 +1,4 @@
-"""/api/v1/calibration/trend: how the vehicle's own parameters have changed since it was calibrated, and the gyro."""
+"""/api/v1/calibration/trend: changes of the vehicle's own parameters, and of the gyro, since it was calibrated."""
 
 from typing import Final, Literal, Protocol
 

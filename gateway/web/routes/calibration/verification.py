@@ -1,4 +1,4 @@
-"""/api/v1/calibration/verifications: known loads held against what was weighed, as dated records."""
+"""/api/v1/calibration/verifications: known loads compared with the estimates, as dated records."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Final, Literal, Protocol
@@ -29,7 +29,7 @@ class VerificationDesk(Protocol):
         ...
 
     def record(self, record_id: str) -> Mapping[str, Any] | None:
-        """A VerificationRecord; None where there is none of this id."""
+        """A VerificationRecord; None if none has this id."""
         ...
 
     def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str:
@@ -45,7 +45,7 @@ class VerificationRequest(Body):
 
 
 class Rule(BaseModel):
-    """What is asked for ([verification] in the settings)."""
+    """The requirements ([verification] in the settings)."""
 
     permitted_error_pct: float = Field(description="of the known gross weight")
     permitted_axle_error_pct: float | None = Field(description="of each axle's known weight; null: not judged")
@@ -84,19 +84,19 @@ class VerificationRecord(BaseModel):
 
     id: str = Field(examples=["sha256:9f86d081"])
     at: str = Field(json_schema_extra={"format": "date-time"})
-    by: str = Field(description="name of the token; `local` where none are in use")
+    by: str = Field(description="name of the token; `local` if none are in use")
     note: str | None
     vehicle_id: str | None
     calibration_id: str
     estimator: str
-    known_weights_id: str | None = Field(description="known weights that the weighing took into account; null: none")
+    known_weights_id: str | None = Field(description="known weights that the estimate used; null: none")
     rule: Rule
     loads: list[LoadTold]
     verdict: Literal["passed", "failed"]
 
 
 class VerificationState(BaseModel):
-    """What is asked for, when it is due, and the records, newest first."""
+    """The requirements, when the next one is due, and the records, newest first."""
 
     rule: Rule
     due: VerificationStatus
@@ -110,7 +110,7 @@ def verification_router(desk: VerificationDesk) -> APIRouter:
 
     @router.get(VERIFICATIONS_PATH, response_model=VerificationState)
     async def verification_state(request: Request) -> Response:
-        """What is asked for, when a verification is due, and the records."""
+        """The requirements, when a verification is due, and the records."""
         return await answered(request, desk.told)
 
     @router.post(
@@ -120,7 +120,9 @@ def verification_router(desk: VerificationDesk) -> APIRouter:
         responses={**REFUSALS, **problem_responses(400, 422)},
     )
     async def verify(request: Request, claim: VerificationRequest) -> Response:
-        """Hold known loads against what was weighed of them. Nothing is learned; on disk when answered."""
+        """Compare known loads with their estimates. The calibration does not change; the record is on disk before the
+        answer.
+        """
         stated = [load.stated() for load in claim.loads]
         return await answered(request, lambda: desk.verify(who(request), claim.note or None, stated), 201)
 
@@ -135,7 +137,7 @@ def verification_router(desk: VerificationDesk) -> APIRouter:
         """One record as a page to print, or to keep as a file: it needs nothing else."""
         record = desk.record(record_id)
         if record is None:
-            return problem_response(404, "there is no such record: the list has those there are", request.url.path)
+            return problem_response(404, "there is no such record: the list has all of them", request.url.path)
         return HTMLResponse(verification_page(record), headers={"content-security-policy": POLICY})
 
     return router

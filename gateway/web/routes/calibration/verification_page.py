@@ -62,8 +62,8 @@ def verification_page(record: Mapping[str, Any]) -> str:
             [_load(load) for load in record["loads"]],
         ),
         *_axles(record["loads"]),
-        "<p>Known loads were held against what the vehicle weighed while it drove, each without what "
-        "it knew of that very load; nothing was learned from them. An error is weighed less known.</p>",
+        "<p>Known loads were compared with the estimates of the driving vehicle, each estimate without knowledge of "
+        "that very load; the calibration did not change. An error is estimate minus known.</p>",
         '<div class="sign"><p>Place, date</p><p>Name, signature</p></div>',
     ]
     head = f'<meta charset="utf-8"><title>Verification {escape(record["at"][:10])}</title><style>{_STYLE}</style>'

@@ -1,6 +1,6 @@
 """/api/v1/calibration/commissioning: a vehicle calibrated on its own machine, step by step.
 
-``steps`` has the addresses, ``shapes`` what is said and answered; the desk behind them is the service's.
+``steps`` has the addresses, ``shapes`` the requests and answers; the service implements them.
 """
 
 from gateway.web.routes.commissioning.shapes import CommissioningState, LinesFound

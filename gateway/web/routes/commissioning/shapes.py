@@ -1,4 +1,4 @@
-"""What is said and answered while a vehicle is commissioned."""
+"""Requests and answers while a vehicle is commissioned."""
 
 from typing import Literal
 
@@ -12,13 +12,13 @@ Source = Literal["package", "administrator", "uploaded"]
 
 
 class Begin(Body):
-    """Begins anew; forbidden while another is under way."""
+    """Starts a commissioning; forbidden while another is under way."""
 
     note: str = Field("", max_length=200, description="kept in the history")
 
 
 class LineNamed(BaseModel):
-    """A file among the lines there are."""
+    """A file among the available lines."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -27,7 +27,7 @@ class LineNamed(BaseModel):
 
 
 class ChooseLine(Body):
-    """One of the lines there are; null: none, what is usual of any vehicle."""
+    """One of the available lines; null: none, with the prior of any vehicle."""
 
     line: LineNamed | None
 
@@ -35,23 +35,25 @@ class ChooseLine(Body):
 class ClaimEmpty(Body):
     """The claim that the drive rests on."""
 
-    again: bool = Field(False, description="forget what was driven so far: it was not empty then")
+    again: bool = Field(False, description="discard the drive so far: the vehicle was not empty then")
 
-    is_empty: Literal[True] = Field(description="you know that the vehicle is empty, and will be until this is over")
+    is_empty: Literal[True] = Field(
+        description="you know that the vehicle is empty, and will be until the calibration is made"
+    )
 
 
 class UploadLine(Body):
-    """A calibration of a sister vehicle, or a line file, as it lies on your disk."""
+    """The calibration of a vehicle of the same model, or a line file, from your disk."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,58}\.json$", examples=["van-model.json"])
     content: str = Field(max_length=1_000_000, description="the file's text")
     signature: str | None = Field(
-        None, max_length=4096, description="the text of its .sig, where the service asks for signatures"
+        None, max_length=4096, description="the text of its .sig, if the service requires signatures"
     )
 
 
 class LineTold(BaseModel):
-    """The line that was chosen; no name: none."""
+    """The chosen line; no name: none."""
 
     name: str
     id: str | None
@@ -59,21 +61,21 @@ class LineTold(BaseModel):
 
 
 class ChosenLine(LineTold):
-    """The same with what of it a form may be filled with."""
+    """The same with those of its figures that prefill the form."""
 
     vehicle: dict[str, object]
 
 
 class DoubtTold(BaseModel):
-    """A fact that is unlikely to be true: nothing goes on until it is corrected or confirmed.
+    """A fact that is unlikely to be true: it must be corrected or confirmed before the next step.
 
-    ``numbers`` are those of the text, ``meant`` the answers that would leave no doubt, where one slip explains it.
+    ``numbers`` are those of the text, ``meant`` the answers that would leave no doubt, if one slip explains it.
     """
 
     kind: DoubtKind
     numbers: dict[str, float]
     meant: dict[str, float | tuple[float, float]]
-    is_of_drive: bool = Field(description="the drive contradicts what was stated; false: what was typed is unusual")
+    is_of_drive: bool = Field(description="the drive contradicts the stated facts; false: a stated fact is unusual")
     text: str
     advice: str
 
@@ -95,7 +97,7 @@ class FindingTold(BaseModel):
 
 
 class InspectionTold(BaseModel):
-    """What the last minutes of driving show of axes, signs, units and rates; a fault must be mended first."""
+    """What the last minutes of driving show about axes, signs, units and rates; a fault must be mended first."""
 
     seconds: float
     has_fault: bool
@@ -103,17 +105,17 @@ class InspectionTold(BaseModel):
 
 
 class LearnedTold(BaseModel):
-    """How well loads would be weighed with what is known now, and what is needed: standard deviations."""
+    """The accuracy reached so far and the accuracy needed: standard deviations."""
 
     payload_std_kg: float
     front_share_std_pct: float
     needed_std_kg: float
-    share: float = Field(description="0..1 of what is to be learned")
+    share: float = Field(description="0 to 1 of the goal")
     is_enough: bool
 
 
 class UnderwayTold(BaseModel):
-    """What is under way, and which step is wanted next."""
+    """The commissioning under way, and its next step."""
 
     step: Literal["line", "vehicle", "empty", "drive", "fit"]
     begun_at: str = Field(json_schema_extra={"format": "date-time"})
@@ -123,18 +125,18 @@ class UnderwayTold(BaseModel):
     vehicle: VehicleAnswers | None
     empty: EmptyTold | None = Field(description="null: nobody has said that it is empty")
     doubts: list[DoubtTold] = Field(description="what is asked still")
-    confirmed: list[DoubtTold] = Field(description="what was asked and confirmed")
-    inspection: InspectionTold | None = Field(description="null: nothing was driven yet")
+    confirmed: list[DoubtTold] = Field(description="doubts that were confirmed")
+    inspection: InspectionTold | None = Field(description="null: no driving yet")
     n_batches: int = Field(description="of the empty drive that count")
-    driven_s: float = Field(description="seconds in them, the open one as far as it has come")
-    next_window_s: float | None = Field(description="until the next one counts; null: it stands")
+    driven_s: float = Field(description="seconds in them, including the open one")
+    next_window_s: float | None = Field(description="until the next one counts; null: the vehicle stands")
     learned: LearnedTold | None = Field(description="null: before the first batch is fitted")
     is_fitting: bool
     fault: str | None = Field(description="why the last fit made no calibration")
 
 
 class MadeEnd(BaseModel):
-    """How a calibration went out of use."""
+    """How a calibration was replaced."""
 
     at: str = Field(json_schema_extra={"format": "date-time"})
     by: str
@@ -157,11 +159,11 @@ class MadeTold(BaseModel):
 
 
 class CommissioningState(BaseModel):
-    """Where a commissioning stands, and what was made before, newest first."""
+    """State of the commissioning, and earlier calibrations, newest first."""
 
     is_allowed: bool
     why_not: str | None
-    is_offered: bool = Field(description="the service has no calibration and none is on its way")
+    is_offered: bool = Field(description="the service has no calibration, and none is pending")
     underway: UnderwayTold | None
     is_pending: bool = Field(description="another calibration than the one at work counts from the next drive on")
     active: MadeTold | None = Field(description="null: the calibration that the settings name, if any")

@@ -1,4 +1,4 @@
-"""The addresses of a commissioning: what stands, and a step each."""
+"""The addresses of a commissioning: its state, and one for each step."""
 
 import asyncio
 from typing import Annotated, Final, Protocol
@@ -51,40 +51,40 @@ def commissioning_router(desk: CommissioningDesk) -> APIRouter:
 
     @router.get("", response_model=CommissioningState)
     async def commissioning_state() -> Response:
-        """Where it stands: the step that is wanted, what inspection shows, what was learned, what was made."""
+        """The state: the next step, the findings of inspection, the accuracy reached, the calibrations made."""
         return json_response(await asyncio.to_thread(desk.told))
 
     @router.post("", status_code=201, response_model=CommissioningState, responses=of_body)
     async def begin_commissioning(request: Request, said: Begin) -> Response:
-        """Begin. On disk when answered, as every step."""
+        """Begin. On disk before the answer, as every step."""
         note = said.note if "note" in said.model_fields_set else None
         return await answered(request, lambda: desk.begin(who(request), note), 201)
 
     @router.delete("", response_model=CommissioningState, responses=refusals)
     async def cancel_commissioning(request: Request) -> Response:
-        """Forget what is under way, at any step. Calibrations made before stay as they are."""
+        """Discard the commissioning under way, at any step. Calibrations made before stay as they are."""
         return await answered(request, lambda: desk.cancel(who(request)))
 
     @router.get("/lines", response_model=LinesFound)
     async def lines() -> Response:
-        """The lines there are: of the package, of the administrator, uploaded."""
+        """The available lines: of the package, of the administrator, uploaded."""
         return json_response(await asyncio.to_thread(desk.lines))
 
     @router.post("/lines", status_code=201, response_model=LinesFound, responses={**of_body, **problem_responses(413)})
     async def upload_line(request: Request, said: UploadLine) -> Response:
-        """Keep a file to choose, checked whole, and its signature where the service asks for one; up to 1 MiB."""
+        """Upload a file to choose from, checked whole, with its signature if the service requires one; up to 1 MiB."""
         return await answered(request, lambda: desk.upload(said.name, said.content, said.signature), 201)
 
     @router.post("/line", response_model=CommissioningState, responses={**of_body, **problem_responses(404)})
     async def choose_line(request: Request, said: ChooseLine) -> Response:
-        """Which line the vehicle is of. May be answered anew until the calibration is made."""
+        """Which line the vehicle is of. May be changed until the calibration is made."""
         return await answered(
             request, lambda: desk.choose_line(*((said.line.name, said.line.source) if said.line else (None, None)))
         )
 
     @router.post("/vehicle", response_model=CommissioningState, responses=of_body)
     async def state_vehicle(request: Request, said: Annotated[VehicleAnswers, BeforeValidator(utf8_only)]) -> Response:
-        """What the empty vehicle weighs, its wheelbase, and where the sensor sits. May be answered anew as well.
+        """The empty vehicle's weights, its wheelbase, and the sensor's position. May be changed until then, too.
 
         Answers that are unlikely are kept and asked about (``doubts``): correct them, or confirm.
         """
@@ -92,22 +92,22 @@ def commissioning_router(desk: CommissioningDesk) -> APIRouter:
 
     @router.post("/confirm", response_model=CommissioningState, responses=refusals)
     async def confirm_doubts(request: Request) -> Response:
-        """Every doubt that is open: it is so all the same. One that the drive raised puts its fit to use."""
+        """Every doubt that is open: it is so all the same. Confirming a doubt from the drive puts the fit to use."""
         return await answered(request, lambda: desk.confirm(who(request)))
 
     @router.post("/empty", response_model=CommissioningState, responses=of_body)
     async def claim_empty(request: Request, said: ClaimEmpty) -> Response:
-        """It is empty now: what is driven from now on counts, until enough is known."""
+        """The vehicle is empty now: driving counts from now on, until the goal is reached."""
         return await answered(request, lambda: desk.is_empty(who(request), again=said.again))
 
     @router.post("/fit", response_model=CommissioningState, responses=refusals)
     async def fit_now(request: Request) -> Response:
-        """Make the calibration of what was driven so far, enough or not."""
+        """Calibrate with the data so far, whether sufficient or not."""
         return await answered(request, lambda: desk.fit_now(who(request)))
 
     @router.post("/undo", response_model=CommissioningState, responses={**refusals, **problem_responses(422)})
     async def undo_commissioning(request: Request, query: Annotated[UndoQuery, Query()]) -> Response:
-        """Take the last calibration that was made here out of use, or all of them, from the next drive on."""
+        """Take the last calibration made here out of use, or all of them, from the next drive on."""
         return await answered(request, lambda: desk.undo(who(request), to_factory=query.to == "factory"))
 
     return router
