@@ -1,7 +1,7 @@
 """CAN in, motion out: frames from a bus or a log, decoded by the signal map into SI samples in the vehicle's axes.
 
 ``live`` receives from interfaces, ``logs`` reads and writes recordings, ``signals`` turns payloads into samples;
-``frames`` are columns, ``sink`` sends them to a bus again. python-can and cantools are known here alone.
+``frames`` are columns, ``sink`` sends them to a bus again. Only this room imports python-can and cantools.
 """
 
 import sys
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def _without(module: str) -> "Iterator[None]":
-    """Nobody finds ``module`` meanwhile, unless it is there already."""
+    """During that time ``module`` cannot be imported, unless it already was."""
     modules = cast(dict[str, Any], sys.modules)
     is_absent = modules.setdefault(module, None) is None
     yield

@@ -1,4 +1,4 @@
-"""Columns of frames: taken apart, put together."""
+"""Columns of frames: splitting and joining."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
@@ -11,12 +11,12 @@ LAST_SECOND: Final = 9_223_372_035  # int64 nanoseconds reach no further
 
 
 def empty_frames(width: int) -> Frames:
-    """No frame at all, with payload rows of ``width`` bytes."""
+    """No frames, with payload rows of ``width`` bytes."""
     return Frames(np.empty(0, np.int64), np.empty(0, np.uint32), np.empty(0, np.uint8), np.empty((0, width), np.uint8))
 
 
 def take(frames: Frames, rows: I64 | Bool | slice) -> Frames:
-    """The chosen rows: indices in the order wanted, a mask (n,), or a piece."""
+    """The chosen rows: indices in the desired order, a mask (n,), or a slice."""
     return Frames(frames.t_ns[rows], frames.can_id[rows], frames.length[rows], frames.payload[rows])
 
 
@@ -35,7 +35,7 @@ def join(parts: Sequence[Frames], width: int) -> Frames:
 
 
 def gathered(chunks: Iterable[Frames], n: int, width: int) -> Iterator[Frames]:
-    """The same frames in chunks of at least ``n``; only the last may hold fewer, and none is empty."""
+    """The same frames in chunks of at least ``n``; only the last may have fewer, and none is empty."""
     parts: list[Frames] = []
     n_waiting = 0
     for chunk in chunks:
@@ -56,7 +56,7 @@ def in_order(places: Sequence[I64], parts: Sequence[Frames], width: int) -> Fram
 
 
 def merge_frames(parts: Sequence[Frames]) -> Frames:
-    """Together in order of time; of equal stamps, the earlier part comes first. Payload widths may differ."""
+    """Joined in order of time; of equal stamps, the earlier part comes first. Payload widths may differ."""
     width = max((part.payload.shape[1] for part in parts), default=8)
     return in_order([part.t_ns for part in parts], [_widened(part, width) for part in parts], width)
 

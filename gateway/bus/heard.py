@@ -1,4 +1,4 @@
-"""Who speaks: every identifier of a channel, how often, and how long its frames are."""
+"""Identifiers heard: each identifier of a channel, how often, and how long its frames are."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -37,13 +37,13 @@ class Heard:
 
     @property
     def name(self) -> str:
-        """The identifier as candump writes it: three digits, or eight where it has 29 bits."""
+        """The identifier as candump writes it: three digits, or eight if it has 29 bits."""
         return id_name(self.can_id)
 
 
 @dataclass(slots=True)
 class _Count:
-    """What was heard of one identifier so far."""
+    """What was counted of one identifier so far."""
 
     n: int = 0
     first_ns: int = 0
@@ -74,7 +74,7 @@ def counted(chunks: Iterable[Frames]) -> Counts:
 
 
 def heard_on(channel: str | None, counts: Counts) -> tuple[Heard, ...]:
-    """What was counted, in order of the identifiers."""
+    """The counts, in order of the identifiers."""
     return tuple(
         Heard(channel, can_id, count.n, (count.last_ns - count.first_ns) / NS_PER_S, join(count.kept, CAN_FD_BYTES))
         for can_id, count in sorted(counts.items(), key=lambda item: (item[0] & EXTENDED_ID, item[0]))

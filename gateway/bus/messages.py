@@ -13,8 +13,8 @@ from gateway.units import NS_PER_S
 class ExactStamp(float):
     """A python-can time stamp, seconds as a float, that remembers its nanoseconds.
 
-    A double holds today's seconds to a quarter of a microsecond only; python-can's in-process bus hands
-    the object itself on, so a replay arrives with the stamps it was sent with.
+    A double resolves today's seconds to a quarter of a microsecond only; python-can's in-process bus passes the object
+    itself on, so a replay arrives with the stamps it was sent with.
     """
 
     t_ns: int
@@ -27,7 +27,7 @@ class ExactStamp(float):
 
 
 def stamp_to_ns(stamp: float) -> int:
-    """Nanoseconds of a python-can stamp, to the microsecond: all that a double holds of today's date."""
+    """Nanoseconds of a python-can stamp, to the microsecond: the resolution of a double for today's date."""
     return stamp.t_ns if isinstance(stamp, ExactStamp) else round(stamp * 1e6) * 1000
 
 
@@ -50,7 +50,7 @@ def frames_of(messages: Sequence[can.Message], width: int) -> Frames:
 
 
 def message_of(frames: Frames, row: int) -> can.Message:
-    """One row as a message with an exact stamp; CAN FD where it is longer than 8 bytes."""
+    """One row as a message with an exact stamp; CAN FD if it is longer than 8 bytes."""
     can_id, length = int(frames.can_id[row]), int(frames.length[row])
     return can.Message(
         timestamp=ExactStamp(int(frames.t_ns[row])),

@@ -1,4 +1,4 @@
-"""Which identifiers on a bus are like one that is missing: a device that was set to another number, or to 29 bits."""
+"""Identifiers on a bus that resemble a missing one: the device may be set to another number, or to 29 bits."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -14,7 +14,7 @@ MOST_SIMILAR: Final = 3
 
 
 def similar_to(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Heard]) -> tuple[str, ...]:
-    """In words: identifiers that nothing is mapped to, the most similar first."""
+    """In words: identifiers without a mapping, the most similar first."""
     return tuple(_told(one) for one in _similar(message, signal_map, heard))
 
 
@@ -24,7 +24,7 @@ def _told(one: Heard) -> str:
 
 
 def _similar(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Heard]) -> Iterator[Heard]:
-    """Identifiers that nothing is mapped to, the most similar first: elsewhere, of the other width, or near by."""
+    """Identifiers without a mapping, the most similar first: another source, the other width, or a near number."""
     mapped = [m.id_filter for m in signal_map.messages]
     free = [
         one for one in heard
@@ -38,7 +38,7 @@ def _similar(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Hear
 
 
 def _distance(message: MappedMessage, one: Heard) -> tuple[int, bool]:
-    """How far the numbers are apart, 29 bits or 11, source addresses aside; then whether the length is another."""
+    """Distance of the numbers, 29 bits or 11, source addresses aside; then whether the length differs."""
     ours, theirs = message.frame_id & ~EXTENDED_ID, one.can_id & ~EXTENDED_ID
     is_both_long = bool(message.frame_id & one.can_id & EXTENDED_ID)
     apart = abs(ours - theirs)

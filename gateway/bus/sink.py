@@ -1,4 +1,4 @@
-"""The sending side: frames onto a bus, by replay and simulation paced by their stamps, or as `broadcast` asks."""
+"""The sending side: frames onto a bus, paced by their stamps for replay and simulation, or as `broadcast` requests."""
 
 import threading
 import time
@@ -31,7 +31,7 @@ class BusSink(AbstractContextManager["BusSink"]):
     """An open channel to send on. On an in-process bus the recorded stamps travel with the frames."""
 
     def __init__(self, interface: str, channel: str, **options: Any) -> None:
-        """Raises BusError where the channel cannot be opened."""
+        """Raises BusError if the channel cannot be opened."""
         require_known_interface(interface)
         if interface == "virtual":
             options = {"preserve_timestamps": True, **options}
@@ -43,7 +43,7 @@ class BusSink(AbstractContextManager["BusSink"]):
         self._name = f"{interface} {channel}"
 
     def send(self, frames: Frames) -> None:
-        """Send every frame at once, in order. Raises BusError where the bus does not take them."""
+        """Send every frame at once, in order. Raises BusError if the bus does not accept them."""
         try:
             for row in range(len(frames)):
                 self._bus.send(message_of(frames, row), timeout=SEND_TIMEOUT_S)
@@ -59,7 +59,7 @@ class BusSink(AbstractContextManager["BusSink"]):
 
 @dataclass(frozen=True, slots=True)
 class ReplayProgress:
-    """How far a replay is: frames sent, and the recorded time from the first frame."""
+    """Progress of a replay: frames sent, and the recorded time from the first frame."""
 
     n_sent: int
     recorded_s: float
@@ -96,7 +96,7 @@ def replay_frames(
     on_progress: OnProgress | None = None,
     stop: threading.Event | None = None,
 ) -> int:
-    """Send chunks of frames paced by their stamps; how many were sent. A step back in time does not wait."""
+    """Send chunks of frames paced by their stamps; returns the number sent. A step back in time does not wait."""
     stop = stop or threading.Event()
     if speed != "max" and not speed > 0.0:
         raise BusError(f'speed {speed!r} is impossible: a number above 0, or "max"')

@@ -1,4 +1,4 @@
-"""From a weighbridge to the sprung mass and its front share: what a campaign's [vehicle] asks for.
+"""From a weighbridge to the sprung mass and its front share, for a campaign's [vehicle].
 
 sprung = sprung_of(AxleWeights(690.0, 710.0))            # unsprung masses unknown: estimated
 sprung.vehicle_keys()                                    # the keys of the campaign file
@@ -18,7 +18,7 @@ WEIGHED_STD: Final = 0.1  # of one that the campaign gives
 
 @dataclass(frozen=True, slots=True)
 class AxleWeights:
-    """What scales show under each axle of the empty vehicle, and the unsprung masses as far as they are known."""
+    """The scales' readings under each axle of the empty vehicle, and the unsprung masses as far as they are known."""
 
     front_kg: float
     rear_kg: float
@@ -28,7 +28,7 @@ class AxleWeights:
 
 @dataclass(frozen=True, slots=True)
 class Sprung:
-    """The sprung mass, its share on the front axle, and how sure both are (standard deviations)."""
+    """The sprung mass, its share on the front axle, and their standard deviations."""
 
     weights: AxleWeights
     mass_kg: float
@@ -61,9 +61,9 @@ def sprung_of(weights: AxleWeights, division_kg: float = DIVISION_KG) -> Sprung:
 
         M = F + R - u_f - u_r,    s = (F - u_f) / M
 
-    An unknown u is taken as k M with k = UNSPRUNG_SHARE, so that M = (F + R - known u) / (1 + k n), n of them
-    unknown. Standard deviations are of first order with independent errors: of a reading rounded to
-    ``division_kg``, division / sqrt(12); of an unsprung mass 10 % where it is given, 30 % where it is not.
+    An unknown u is taken as k M with k = UNSPRUNG_SHARE, so that M = (F + R - known u) / (1 + k n), n of them unknown.
+    Standard deviations are of first order with independent errors: of a reading rounded to ``division_kg``, division /
+    sqrt(12); of an unsprung mass 10 % if it is given, 30 % if not.
     Raises CampaignError for weights that leave no body to carry.
     """
     given = (weights.unsprung_front_kg, weights.unsprung_rear_kg)

@@ -28,7 +28,7 @@ OnFit = Callable[[str, int, int], None]  # (estimator, steps done, steps in all)
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A calibration file with all that stands behind it. What an estimator did not give is None.
+    """A calibration file with the data it was made from. None for an estimator without a result.
 
     ``doubts`` are of facts that the campaign states of the vehicle and that its drives contradict.
     """
@@ -58,11 +58,11 @@ def calibrate_inspected(
 ) -> Outcome:
     """Fits every named estimator on the identification parts of the runs without a fault.
 
-    ``like`` are calibrations of sister vehicles, or a line file: what they tell stands before the drives in place of
-    what is usual of any vehicle. ``bands`` and ``structure`` are the ratio index's: found on the campaign, or named.
+    ``like`` are calibrations of vehicles of the same model, or a line file: they replace the prior of any vehicle.
+    ``bands`` and ``structure`` are the ratio index's: found on the campaign, or named.
 
-    An estimator that these runs cannot carry is left out with a warning; raises CalibrationImpossibleError
-    when none is left, and where the faults of the runs leave no calibration worth its name.
+    An estimator that these runs do not determine is left out with a warning; raises CalibrationImpossibleError if none
+    is left, or if the faults of the runs leave no valid calibration.
     """
     if inspection.refusal is not None:
         raise CalibrationImpossibleError(_refused(campaign, inspection, inspection.refusal))
@@ -99,7 +99,7 @@ def _fit(
     structure: StructureChoice,
     on_fit: OnFit,
 ) -> tuple[RatioIndexFit | None, CrossSpectrumFit | None, list[str]]:
-    """What each named estimator learned, and a warning for each that these runs cannot carry."""
+    """The result of each named estimator, and a warning for each that these runs do not determine."""
     ratio_index: RatioIndexFit | None = None
     cross_spectrum: CrossSpectrumFit | None = None
     warnings: list[str] = []
@@ -132,7 +132,7 @@ def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
 
 
 def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], by_line: Seen | None) -> SeenPart:
-    """What the runs covered that hold a batch, and the line before them."""
+    """The ranges covered by the runs with a batch, and by the line before them."""
     driven = [run for run in runs if any(not batch.rejected for batch in run.batches)]
     return SeenPart(
         payload_kg=_span([*(run.payload_kg for run in driven), *(by_line.payload_seen_kg if by_line else ())]),
@@ -150,7 +150,7 @@ def _span(numbers: Sequence[float]) -> tuple[float, float]:
 
 
 def _roughness_span(batches: Sequence[Batch]) -> tuple[float, float] | None:
-    """None where no batch holds an unbroken stretch for a spectrum."""
+    """None if no batch has an unbroken stretch for a spectrum."""
     roughness = [roughness_mps2(spectra_of(batch), batch.mean_speed_mps) for batch in batches]
     known = [one for one in roughness if math.isfinite(one)]
     return _span(known) if known else None

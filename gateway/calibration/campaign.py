@@ -26,7 +26,7 @@ from gateway.toml_file import checked, read_toml
 OnRun = Callable[[int, int], None]  # (runs done, runs in all)
 
 LEAST_PAYLOAD_SHARE: Final = 0.004
-"""Of the empty mass. No vehicle carries four times its own, so that a load in tonnes reads less than this in kg."""
+"""Of the empty mass. No vehicle carries four times its own mass, so a load in tonnes reads less than this in kg."""
 
 
 class _Table(BaseModel):
@@ -39,7 +39,7 @@ class RunTable(_Table):
     log: Path = Field(
         description="its log: candump text, .asc, .blf, .mf4, .trc or .csv, each also as .gz, .zst or .xz"
     )
-    payload_kg: Kilograms = Field(description="what is aboard besides the empty vehicle: L; 0 for an empty run")
+    payload_kg: Kilograms = Field(description="load aboard in addition to the empty vehicle: L; 0 for an empty run")
     payload_position_m: Metres | None = Field(
         None, description="its centre of gravity behind the front axle: d; a loaded run needs it or `front_share_pct`"
     )
@@ -48,13 +48,15 @@ class RunTable(_Table):
     )
     payload_left_m: MetresLeft | None = Field(
         None,
-        description="its centre of gravity left of the vehicle's centre line, negative: right of it; absent: about "
-        f"there, with a standard deviation of {PAYLOAD_LEFT_STD_M:g} m",
+        description=f"its centre of gravity left of the vehicle's centre line, negative: right of it; absent: about "
+        "there, with a standard deviation of {PAYLOAD_LEFT_STD_M:g} m",
     )
     split: Literal["identification", "validation"] | None = Field(
         None, description="use the whole run for this alone; absent: cut at `identification_fraction`"
     )
-    start_s: float = Field(0.0, ge=0.0, description="begin so long after the first frame that the signal map reads")
+    start_s: float = Field(
+        0.0, ge=0.0, description="start of the piece, after the first frame that the signal map reads"
+    )
     end_s: float | None = Field(None, gt=0.0, description="end so long after that frame; after `start_s`")
 
     @model_validator(mode="after")
@@ -103,7 +105,7 @@ class Campaign:
         return self._signals if self._signals.startswith("springscale:") else str(self.path.parent / self._signals)
 
     def log_of(self, run: RunTable) -> Path:
-        """Where the run's log lies."""
+        """Path of the run's log."""
         return self.path.parent / run.log
 
     def front_share_pct(self, run: RunTable) -> float:
@@ -116,7 +118,7 @@ class Campaign:
 def load_campaign(path: Path, *, may_lack_runs: bool = False) -> Campaign:
     """Raises CampaignError naming every fault of the file, logs that are not there and loads that cannot be.
 
-    ``may_lack_runs`` takes a file whose runs, and signals, are still to be written.
+    ``may_lack_runs`` accepts a file whose runs, and signals, are still to be written.
     """
     tables = read_toml(path, CampaignError)
     model = DraftTable if may_lack_runs and not tables.get("runs") else CampaignTable
@@ -132,7 +134,7 @@ def load_campaign(path: Path, *, may_lack_runs: bool = False) -> Campaign:
 
 
 def _with_sprung(tables: dict[str, Any], path: Path) -> dict[str, Any]:
-    """With the sprung mass and its share that follow from the axle weights, where these alone are stated."""
+    """With the sprung mass and its share from the axle weights, if these alone are stated."""
     vehicle = tables.get("vehicle")
     if not isinstance(vehicle, dict) or "empty_mass_kg" in vehicle:
         return tables
@@ -158,9 +160,9 @@ def _range_faults(vehicle: Vehicle) -> Iterator[str]:
     for end, unsprung in zip(("front", "rear"), unsprung_kg(vehicle), strict=True):
         if unsprung <= 0.0:
             yield (
-                f"kerb_{end}_axle_kg: is {-unsprung:g} kg less than what empty_mass_kg and empty_front_share_pct put "
-                "on this axle: scales show axle and wheels besides; `springscale calibration sprung` makes these "
-                "figures from axle weights"
+                f"kerb_{end}_axle_kg: is {-unsprung:g} kg less than the load on this axle by empty_mass_kg and "
+                f"empty_front_share_pct: scales also include axle and wheels; `springscale calibration sprung` "
+                f"computes these figures from axle weights"
             )
 
 

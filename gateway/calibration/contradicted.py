@@ -1,17 +1,17 @@
-"""What a drive says against the facts that were stated of the vehicle: its weight, its wheelbase, its line, its sensor.
+"""Contradictions between a drive and the stated facts of the vehicle: its weight, its wheelbase, its line, its sensor.
 
-    contradictions(runs, vehicle, calibration, inherited) -> the doubts, none where all agrees
+    contradictions(runs, vehicle, calibration, inherited) -> the doubts, none if all agrees
 
-A fit takes the stated facts for true, and bends springs and dampers until the drive fits. How far they had to bend,
-held against how far they may (the prior: of the line, or of any vehicle), tells a false fact. With prior N(m, P),
-posterior N(x, C) and directions D in which a false fact moves the parameters, the marginal likelihood of the drive is
-Gaussian in the amount b of that fact:
+A fit takes the stated facts for true, and bends springs and dampers until the drive fits. Their shift, compared with
+its expected size (the prior: of the line, or of any vehicle), reveals a false fact. With prior N(m, P), posterior N(x,
+C) and directions D in which a false fact moves the parameters, the marginal likelihood of the drive is Gaussian in the
+amount b of that fact:
 
     b = H^-1 D' P^-1 (x - m)        H = D' (P^-1 - P^-1 C P^-1) D
 
-with the covariance H^-1; b' H b is chi-squared where the facts are true (S. M. Kay, Fundamentals of Statistical Signal
-Processing II, 1998, section 6.4). An axle that carries exp(b) times what was stated has a spring, damper, tyre and
-unsprung mass that seem exp(b) times too small, all alike.
+with the covariance H^-1; b' H b is chi-squared if the facts are true (S. M. Kay, Fundamentals of Statistical Signal
+Processing II, 1998, section 6.4). An axle that carries exp(b) times the stated weight has a spring, damper, tyre and
+unsprung mass that all seem exp(b) times too small.
 """
 
 from collections.abc import Iterator, Sequence
@@ -53,7 +53,7 @@ _SENSOR: Final = INDEX["sensor_position_m"]
 
 @dataclass(frozen=True, slots=True)
 class _Fitted:
-    """A fit beside the prior that it started from."""
+    """A fit and the prior that it started from."""
 
     prior: Prior
     x: F64
@@ -67,14 +67,14 @@ class _Fitted:
         return np.asarray(covariance @ directions.T @ precision @ (self.x - self.prior.mean), float), covariance
 
     def without_prior(self, i: int) -> tuple[float, float]:
-        """Parameter ``i`` as the drive alone tells it, with its standard deviation."""
+        """Parameter ``i`` from the drive alone, with its standard deviation."""
         before, after = self.prior.covariance[i, i], self.covariance[i, i]
         moved = float(before / max(before - after, 1e-9 * before))
         mean = float(self.prior.mean[i])
         return mean + (float(self.x[i]) - mean) * moved, sqrt(after * moved)
 
     def stds_off(self, i: int) -> float:
-        """How far parameter ``i`` lies from its prior, in standard deviations of that distance."""
+        """Distance of parameter ``i`` from its prior, in standard deviations of that distance."""
         before, after = self.prior.covariance[i, i], self.covariance[i, i]
         return float((self.x[i] - self.prior.mean[i]) / sqrt(max(before - after, 1e-9 * before)))
 
@@ -85,7 +85,7 @@ def contradictions(
     calibration: CrossSpectrumCalibration,
     inherited: Inherited | None = None,
 ) -> tuple[Doubt, ...]:
-    """What the drives that made ``calibration`` say against what ``vehicle`` states."""
+    """Contradictions between the drives of ``calibration`` and the statements of ``vehicle``."""
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=False).upright
     fitted = _Fitted(prior, upright(calibration.parameters), calibration.covariance[:_N, :_N])
     found = list(_sensor(fitted, vehicle))
@@ -148,7 +148,7 @@ def _weight(fitted: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
 
 
 def _axle_directions(vehicle: Vehicle) -> F64:
-    """(p, 2) how the parameters seem to move where front and rear axle carry more than was stated."""
+    """(p, 2) apparent change of the parameters if front and rear axle carry more than was stated."""
     directions = np.zeros((_N, len(_AXLES)))
     for column, axle in enumerate(_AXLES):
         directions[[INDEX[name.format(axle)] for name in _OF_AXLE], column] = -1.0
@@ -157,7 +157,7 @@ def _axle_directions(vehicle: Vehicle) -> F64:
 
 
 def _line(fitted: _Fitted) -> Iterator[Doubt]:
-    """Whether it is of this line at all: all that vehicles of a line share, each by itself."""
+    """Whether it is of this line at all: all figures that vehicles of a line share, each by itself."""
     off, covariance = fitted.amount(np.eye(_N)[:, _BUILT])
     if off @ np.linalg.solve(LINES_DIFFER * covariance, off) > chdtri(len(_BUILT), SELDOM_LINE):
         yield Doubt.of(DoubtKind.DRIVEN_LINE)

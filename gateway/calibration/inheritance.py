@@ -1,4 +1,4 @@
-"""What a calibration hands on to sisters of its vehicle: where it was driven, how wide its limits are, how it moved."""
+"""The parts of a calibration that other vehicles of the line inherit: its ranges, its limits, its usual movement."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -16,7 +16,7 @@ _POSITIVE: Final = {"gt": 0.0}
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """Over which loads, speeds and roads a half-car was fitted; fields as in CrossSpectrumCalibration."""
+    """Loads, speeds and roads of the fit; fields as in CrossSpectrumCalibration."""
 
     __pydantic_config__ = STRICT
 
@@ -34,7 +34,7 @@ class Seen:
 
     @classmethod
     def together(cls, seen: Sequence["Seen"]) -> Self:
-        """What several saw; their movement is the mean of theirs."""
+        """The union of several ranges; their movement is the mean of theirs."""
         loads = {(load.payload_kg, load.front_share_pct) for each in seen for load in each.known_loads}
         return cls(
             payload_seen_kg=_hull([each.payload_seen_kg for each in seen]),
@@ -46,7 +46,7 @@ class Seen:
         )
 
     def on(self, calibration: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
-        """``calibration`` believed over these too; what is usual is what these say."""
+        """``calibration``, valid over these too; the usual movement is theirs."""
         both = Seen.together([self, Seen.of(calibration)])
         usual = {"acceleration_rms_mps2": self.acceleration_rms_mps2, "pitch_rate_rms_radps": self.pitch_rate_rms_radps}
         wider = {one.name: getattr(both, one.name) for one in fields(Seen)} | usual
@@ -59,7 +59,7 @@ def _hull(spans: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What runs, or siblings, left out showed; fields as in CrossSpectrumCalibration."""
+    """Results of runs, or siblings, left out; fields as in CrossSpectrumCalibration."""
 
     __pydantic_config__ = STRICT
 
@@ -80,9 +80,9 @@ class Limits:
         return cls(**{one.name: _widest([getattr(each, one.name) for each in limits]) for one in fields(cls)})
 
     def on(self, calibration: CrossSpectrumCalibration, *, is_tested: bool) -> CrossSpectrumCalibration:
-        """``calibration`` with these in place of what nobody tested; of what was, the wider.
+        """``calibration`` with these in place of untested limits; of tested ones, the wider.
 
-        How badly it fits its own runs is always seen.
+        Its misfit on its own runs is always known.
         """
         own = Limits.of(calibration)
         widest = Limits.widest([self, own])
@@ -99,19 +99,19 @@ def _widest(several: Sequence[Any]) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Usual:
-    """How much a vehicle or a line usually moves (core.cross_spectrum.model.reading): friction shares hold for that."""
+    """The usual movement of a vehicle or a line (core.cross_spectrum.model.reading): friction shares refer to it."""
 
     __pydantic_config__ = STRICT
 
     log_amplitude: float
     stroke_mps: tuple[Positive, Positive] | None = field(
         default=None,
-        metadata=described("how fast the springs of front and rear axle usually move; null: no roll rate was read"),
+        metadata=described("usual stroke speed of the springs of front and rear axle; null: no roll rate was read"),
     )
 
     @classmethod
     def mean(cls, several: Sequence["Usual"]) -> Self:
-        """The mean of their logarithms; of how fast axles stroke, that of those that say so."""
+        """The mean of their logarithms; for stroke speeds, of those that have them."""
         log_strokes = [np.log(one.stroke_mps) for one in several if one.stroke_mps is not None]
         stroke_mps = None
         if log_strokes:
@@ -120,7 +120,7 @@ class Usual:
         return cls(fmean(one.log_amplitude for one in several), stroke_mps)
 
     def log_over(self, other: "Usual") -> tuple[float, float]:
-        """How much more than ``other`` front and rear axle move; both as the body, where either says no more."""
+        """Movement of front and rear axle relative to ``other``; that of the body for both, if either has no more."""
         if self.stroke_mps is None or other.stroke_mps is None:
             both = self.log_amplitude - other.log_amplitude
             return both, both

@@ -1,4 +1,4 @@
-"""The command line: springscale. Commands are loaded when they are called, so that --help is quick."""
+"""The command line: springscale. Commands are imported when they are called, so that --help is quick."""
 
 import os
 import sys
@@ -19,7 +19,7 @@ from gateway.errors import SpringscaleError
 _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",
     "calibration": "Show, compare and check calibration files; state known weights to a running service.",
-    "campaign": "Pack known-load drives into one archive, to hand on or to contribute.",
+    "campaign": "Pack known-load drives into one archive, to pass on or to contribute.",
     "check-config": "Check a configuration, without opening the bus.",
     "commission": "Calibrate a running service's vehicle from its axle weights and an empty drive.",
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",
@@ -27,18 +27,18 @@ _COMMANDS = {
     "evaluate": "Compare estimates with known loads: the error table.",
     "events": "What was loaded and unloaded where and when, and the trips between, from log files.",
     "feed": "Send an IMU of Linux IIO and a receiver behind gpsd onto a CAN interface.",
-    "fleet-report": "What a fleet's data set tells of each vehicle, as pages.",
-    "import": "Make a log of what a phone recorded: Sensor Logger or phyphox.",
+    "fleet-report": "A fleet's data set as pages: each vehicle and what needs attention.",
+    "import": "Make a log from the recording of a phone: Sensor Logger or phyphox.",
     "line": "Build the line of several vehicles, so that the next one is calibrated by an empty drive.",
-    "look": "What an unknown log holds, and a first signal map from it.",
+    "look": "The content of an unknown log, and a first signal map from it.",
     "record": "Frames on disk: list and fetch those of a service, or record from a bus.",
     "replay": "Send a log to a bus, paced by its time stamps.",
-    "reprocess": "Weigh a fleet's archive of logs anew, on all cores or a cluster.",
+    "reprocess": "Reprocess a fleet's archive of logs, on all cores or a cluster.",
     "reproduce": "Repeat the paper's section 4 in the simulator, as a report.",
     "run": "Run the service.",
     "simulate": "Simulate drives, as log files or onto a bus.",
     "token": "Make, list and revoke access tokens for other machines.",
-    "verification": "Known loads held against what a running service weighed, as dated records.",
+    "verification": "Known loads compared with the estimates of a running service, as dated records.",
 }  # each in the module of its name, or a room of ours
 _ROOMS = {"fleet-report": "fleet", "line": "fleet", "record": "asked", "verification": "asked", "commission": "asked"}
 _ROOMS |= {"campaign": "logs", "events": "logs", "feed": "logs", "import": "logs"}
@@ -47,7 +47,7 @@ _NAMES = {"import": "import_recording"}  # a word of the language names no modul
 
 INTERRUPTED = 130  # 128 and the number of SIGINT, as shells have it
 
-# What a vehicle does without: the extra "workbench", in Debian a package of its own.
+# Commands that a vehicle does not need: the extra "workbench", in Debian a package of its own.
 _WORKBENCH = frozenset({"matplotlib", "numba", "plotly"})
 _DEBIAN_TREE = Path("/usr/lib/springscale")
 
@@ -60,7 +60,7 @@ class _Lazy(click.Group):
         return sorted(_COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command itself, imported now; None where there is none of that name."""
+        """The command itself, imported now; None if there is none of that name."""
         if cmd_name not in _COMMANDS:
             return None
         name = _NAMES.get(cmd_name, cmd_name.replace("-", "_"))
@@ -71,7 +71,7 @@ class _Lazy(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """As click does; for a name that there is not, the one that was probably meant."""
+        """As click does; for an unknown name, the one that was probably meant."""
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as fault:

@@ -101,7 +101,7 @@ def calibrate(
         inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)  # other loads were driven with the sisters
     _tell_inspection(inspection, as_json=as_json, is_all=only_checks)
     if inspection.refusal is not None:
-        raise CalibrationImpossibleError(f"{campaign}: {inspection.refusal}; the findings say what to mend")
+        raise CalibrationImpossibleError(f"{campaign}: {inspection.refusal}; the findings say how to mend it")
     if only_checks:
         return
     with counted("fitting") as on_step:
@@ -140,10 +140,9 @@ def _command(
     structure: StructureChoice,
     window_s: float | None,
 ) -> str:
-    """What decides the result, as it would be asked for again: the calibration's id comes from it too.
+    """The options that decide the result: the calibration's id depends on them too.
 
-    Sisters by their ids. Not where the file lies or is written to, for the same drives give the same calibration under
-    any name.
+    Sisters by their ids. Without the places of its files: the same drives give the same calibration under any name.
     """
     words = ["springscale", "calibrate", campaign.name]
     words += [word for name in estimators for word in ("--estimator", name)]
@@ -161,19 +160,19 @@ def _plan_first(vehicle: Vehicle, like: Sequence[LikeFile], *, as_json: bool) ->
 
 
 def _ask_for_payload_range(campaign: Campaign, *, is_needed: bool) -> None:
-    """Errors are in percent of it, and a plan keeps within it: a van of 3.5 t carries far more than the default."""
+    """Errors are in percent of it, and a plan stays within it: a van of 3.5 t carries far more than the default."""
     if campaign.states_payload_range:
         return
     low_kg, high_kg = campaign.vehicle.payload_range_kg
     missing = f"{campaign.path}: vehicle.payload_range_kg: not stated"
     ask = "write what the vehicle may carry, such as payload_range_kg = [0.0, 1200.0]"
     if is_needed:
-        raise CampaignError(f"{missing}; a plan keeps within it: {ask}")
-    click.echo(f"{missing}: {low_kg:g} to {high_kg:g} kg is taken, errors are in percent of it; {ask}", err=True)
+        raise CampaignError(f"{missing}; a plan stays within it: {ask}")
+    click.echo(f"{missing}: using {low_kg:g} to {high_kg:g} kg, errors are in percent of it; {ask}", err=True)
 
 
 def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> None:
-    """For people always; as JSON where no calibration follows whose object would hold it."""
+    """Text always; JSON only if no calibration follows whose object would contain it."""
     if not as_json:
         click.echo(inspection_sentences(inspection))
     elif is_all or inspection.refusal is not None:
@@ -181,17 +180,17 @@ def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> 
 
 
 def _require_places(output: Path | None, report: Path | None) -> None:
-    """Before minutes of work: the file and the directory can lie where they shall."""
+    """Checked before minutes of work: the file and the directory can be written."""
     if output is not None and output.is_dir():
-        raise click.UsageError(f"--output {output}: is a folder, a file is wanted")
+        raise click.UsageError(f"--output {output}: is a folder, not a file")
     if output is not None and not output.parent.is_dir():
         raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")
     if report is not None and report.exists() and not report.is_dir():
-        raise click.UsageError(f"--report {report}: is a file, a directory is wanted")
+        raise click.UsageError(f"--report {report}: is a file, not a directory")
 
 
 def _inspect(campaign: Campaign, numbers: Sequence[int] | None, settings: BatchSettings) -> Inspection:
-    """The chosen drives read and inspected, a bar telling how far."""
+    """The chosen drives, read and inspected with a progress bar."""
     with counted("reading drives") as on_run:
         return inspect(campaign, settings, numbers=numbers, on_run=on_run)
 
@@ -237,7 +236,7 @@ def _sentences(
     widths: StatedWidths | None,
     said: Sequence[str],
 ) -> str:
-    """What was calibrated, with the warnings that are not ``said`` above it."""
+    """The finished calibration, with the warnings that were not ``said`` above it."""
     low, high = file.seen.payload_kg
     lines = [
         f"{output or 'no file written'}: {', '.join(file.estimators)}; payloads {low:g} to {high:g} kg, "

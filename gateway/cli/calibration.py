@@ -39,7 +39,7 @@ calibration.add_command(ticket_commands)
 @click.argument("file", type=FILE)
 @as_json
 def show(file: Path, as_json: bool) -> None:
-    """What FILE says: vehicle, ranges, parameters with their standard deviations, expected errors, provenance."""
+    """The content of FILE: vehicle, ranges, parameters with their standard deviations, expected errors, provenance."""
     held = load_calibration(file)
     click.echo(json_line({"id": held.id, **held.model_dump(mode="json")}) if as_json else calibration_text(held))
 
@@ -49,7 +49,7 @@ def show(file: Path, as_json: bool) -> None:
 @click.argument("other", type=FILE)
 @as_json
 def diff(one: Path, other: Path, as_json: bool) -> None:
-    """In what two files differ; fitted figures in combined standard deviations, the most different first."""
+    """The differences between two files; fitted figures in combined standard deviations, the most different first."""
     ours, theirs = load_calibration(one), load_calibration(other)
     changes = differences(ours, theirs)
     if as_json:
@@ -114,7 +114,7 @@ def sprung(
 
 
 def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:
-    """What reading the file has already proved."""
+    """Checks that reading the file has already made."""
     members = held.line.members if held.line else ()
     return (
         Check("content", Verdict.GOOD, f"matches its id {held.id}"),

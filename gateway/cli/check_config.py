@@ -28,7 +28,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
     trust, untrusted = settings.trust.for_reading(), dict[Path, str]()
 
     def read(path: Path) -> bytes:
-        """Every file that is not signed as it should be is told, not only the first."""
+        """Every file without a required signature is reported, not only the first."""
         try:
             return trust.read(path)
         except UntrustedFileError as fault:
@@ -70,7 +70,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
     if trust.keys:
         click.echo(f"Its files are signed as required, by {' or '.join(key.fingerprint for key in trust.keys)}.")
     if (commissioned := with_commissioned(settings)) is not settings:
-        click.echo(f"What weighs is the calibration that was made on the vehicle: {commissioned.calibration}.")
+        click.echo(f"The service weighs with the calibration that was made on the vehicle: {commissioned.calibration}.")
     elif setup.calibration is None:
         click.echo(
             "No calibration is configured: batches will carry spectra and rejected = no_calibration, until one is made "
@@ -79,7 +79,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
     elif limits := limits_in_force(setup):
         click.echo(f"It may weigh: {', '.join(f'{name} {kg:g} kg' for name, kg in limits.items())}.")
     else:
-        click.echo("No limit is known: nothing can be told to weigh too much. See [vehicle] gross_limit_kg.")
+        click.echo("No limit is known, so no overload can be reported. See [vehicle] gross_limit_kg.")
 
 
 def limits_in_force(setup: Setup) -> dict[str, float]:

@@ -45,7 +45,7 @@ VAN: Final = VehicleSection(
 def demo(once: bool, as_json: bool, port: int, speed: float, fleet: int | None) -> None:
     """A van drives empty, stops, is loaded with 270 kg and drives on; watch the service weigh it.
 
-    The first drive goes through at full speed, further ones with other loads follow at the speed asked for.
+    The first drive runs at full speed, further ones with other loads follow at the requested speed.
     """
     set_up_log("warning", under_journald=False)
     with TemporaryDirectory(prefix="springscale-demo-") as folder, as_file(files("gateway") / "demo") as shipped:

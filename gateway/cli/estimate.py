@@ -35,7 +35,7 @@ from gateway.setup import Setup, load_setup, setup_of
 @click.option(
     "--known-weights", type=FILE, default=None, help="known_weights.json of a service [default: that of --config]"
 )
-@click.option("--no-known-weights", is_flag=True, help="by the calibration alone, whatever weights the service knows")
+@click.option("--no-known-weights", is_flag=True, help="by the calibration alone, without the service's known weights")
 @one_estimator
 @window
 @as_json
@@ -54,8 +54,8 @@ def estimate(
 ) -> None:
     """One line per batch of every LOG, rejected ones included with their reasons.
 
-    With several logs each line says of which it is: in front of the line, as "log" in its JSON, or in a first column.
-    Where a calibration is given and no batch could be weighed, it says why and ends with 1.
+    With several logs each line names its log: in front of the line, as "log" in its JSON, or in a first column.
+    If a calibration is given and no batch could be weighed, it says why and exits with 1.
     """
     if as_json and as_csv:
         raise click.UsageError("give --json or --csv, not both")
@@ -84,7 +84,7 @@ Found = Iterable[tuple[Path | None, Estimate]]  # the log, where there are sever
 
 
 def _in_words(reasons: Counter[Why | None]) -> str:
-    """Why not one batch was weighed, the most frequent reason first, and what to do about each."""
+    """Why no batch was weighed, the most frequent reason first, and what to do about each."""
     lines = ["nothing was weighed" + ("" if reasons else ": there is no batch in these logs")]
     for why, n in reasons.most_common():
         if why is not None:
@@ -94,11 +94,11 @@ def _in_words(reasons: Counter[Why | None]) -> str:
 
 
 UNLIKE: Final = frozenset({Why.MODEL_MISFIT, Why.NO_SOLUTION, Why.AMBIGUOUS, Why.OUT_OF_RANGE, Why.SENSOR_CHANGED})
-"""What the calibration of another vehicle makes of a drive."""
+"""Reasons that the calibration of another vehicle gives for a drive."""
 
 
 def _other_vehicle(reasons: Counter[Why | None], calibration: CalibrationFile) -> Iterator[str]:
-    """The likely cause, where the drives moved as another vehicle does in most batches."""
+    """The likely cause, if most batches look like another vehicle's."""
     n_unlike = sum(n for why, n in reasons.items() if why in UNLIKE)
     if 2 * n_unlike > reasons.total():
         vehicle = calibration.vehicle
@@ -135,7 +135,7 @@ def _csv(found: Found, *, has_logs: bool) -> Iterator[str]:
 
 
 def _tell(report: LogReport) -> None:
-    """What could not be read, beside the estimates."""
+    """Unreadable parts of the log, beside the estimates."""
     for remark in report.remarks():
         click.echo(remark, err=True)
 
@@ -147,7 +147,7 @@ def prepared(
     estimator: str | None,
     window_s: float | None,
 ) -> tuple[Setup, BatchSettings, Path | None]:
-    """What estimates, how batches are formed, and where the service keeps its state (None without a service)."""
+    """The estimator, the batch settings, and the service's state directory (None without a service)."""
     if config_path is not None:
         if signals is not None:
             raise click.UsageError("give --config or --signals, not both")
@@ -162,7 +162,7 @@ def prepared(
 
 
 def with_known_weights(setup: Setup, named: Path | None, state: Path | None) -> Setup:
-    """With those of a file that was named, which must have one of this calibration; else with the service's."""
+    """With those of the named file, which must have one of this calibration; else with the service's."""
     if named is None:
         return setup if state is None else setup.with_known_weights_of(state / FILE_NAME)
     known = setup.with_known_weights_of(named)

@@ -43,11 +43,12 @@ def evaluate(
     window_s: float | None,
     as_json: bool,
 ) -> None:
-    """Hold estimates against the known loads of CAMPAIGN, a campaign file or an archive of `campaign pack`."""
+    """Compare estimates with the known loads of CAMPAIGN, a campaign file or an archive of `campaign pack`."""
     loaded, held = load_campaign(campaign), load_calibration(calibration)
     chosen = estimator or held.estimators[0]
     if chosen not in held.estimators:
-        raise ConfigurationError(f"{calibration}: holds no calibration for {chosen}, only {', '.join(held.estimators)}")
+        contained = ", ".join(held.estimators)
+        raise ConfigurationError(f"{calibration}: contains no calibration for {chosen}, only {contained}")
     with counted("reading drives") as on_run:
         judged = judge_campaign(
             loaded,
@@ -92,7 +93,7 @@ def _text(table: ErrorTable) -> str:
 
 
 def _widths(table: ErrorTable) -> Iterator[str]:
-    """How wide intervals are, judged, and why."""
+    """A verdict on the width of the intervals, and its causes."""
     widths = [width_of(table.judged, table.errors.of(target), target) for target in TARGETS]
     if any(widths):
         yield from (width.sentence for width in widths if width is not None)
@@ -109,7 +110,7 @@ def _row(name: str, errors: TargetErrors) -> str:
 
 
 def _sideways_lines(errors: Errors) -> Iterator[str]:
-    """Where the load lies sideways and each wheel's load, as far as they are told."""
+    """The errors of the lateral position and of the wheel loads, as far as they are known."""
     cg_left, wheels = errors.cg_left, errors.wheels
     if cg_left is not None and cg_left.mean_abs_m is not None:
         lengths = ((cg_left.bias_m, 9), (cg_left.std_m, 9), (cg_left.max_abs_m, 9), (cg_left.mean_abs_m, 12))

@@ -19,7 +19,8 @@ from gateway.records import json_line
 @click.option("--output", type=FILE, default=None, help="write a first signal map here")
 @as_json
 def look(log: Path, databases: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
-    """What LOG holds: identifiers, the signal maps that fit, the axis that carries gravity, and whether that can work.
+    """The content of LOG: identifiers, the signal maps that fit, the axis that shows gravity, and whether that can
+    work.
 
     Takes every kind of log that the other commands take.
     """

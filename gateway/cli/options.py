@@ -16,10 +16,10 @@ FILE = click.Path(path_type=Path)
 
 
 class Number(click.types.FloatParamType):
-    """Any number that is one: click takes nan, within whatever range, and inf."""
+    """A finite number: click accepts nan, whatever the range, and inf."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Raises a usage error for what was typed and is no finite number."""
+        """Raises a usage error for a typed text that is not a finite number."""
         number: float = super().convert(value, param, ctx)
         if isinstance(value, str) and not math.isfinite(number):
             self.fail(f"{value!r} is no number", param, ctx)

@@ -41,7 +41,7 @@ def _so_far(progress: ReplayProgress) -> str:
 
 
 def _require_sent(report: LogReport, from_channel: str | None) -> None:
-    """Raise LogUnreadableError where nothing was sent, saying why."""
+    """Raise LogUnreadableError, saying why, if nothing was sent."""
     if report.wanted:
         return
     if from_channel is not None and report.other_channel:

@@ -33,9 +33,9 @@ TOLD_EVERY_S: Final = 5.0
 )
 @click.option("--scheduler", default=None, help="address of a Dask scheduler, tcp://HOST:PORT [default: this computer]")
 @click.option("--workers", type=click.IntRange(1), default=None, help="processes on this computer [default: its cores]")
-@click.option("--dry-run", is_flag=True, help="tell how much there is and how long it will take; write nothing")
+@click.option("--dry-run", is_flag=True, help="print how much there is and how long it will take; write nothing")
 @click.option("--keep-going", is_flag=True, help="end with 0 although logs could not be read or jobs failed")
-@click.option("--retry-failed", is_flag=True, help="try those jobs again, too, of which nothing could be made")
+@click.option("--retry-failed", is_flag=True, help="also try those jobs again that gave no result")
 @trusted_keys
 @as_json
 def reprocess(
@@ -49,9 +49,9 @@ def reprocess(
     trusted_keys: Path | None,
     as_json: bool,
 ) -> None:
-    """Weighs every log of ARCHIVE anew: a manifest (.toml or .parquet), or a folder with an archive.toml in it.
+    """Reprocesses every log of ARCHIVE: a manifest (.toml or .parquet), or a folder with an archive.toml in it.
 
-    What has a receipt is not done again, so that a run that was stopped goes on where it was. With --json, progress
+    Jobs with a receipt are not done again, so that a stopped run resumes. With --json, progress
     comes as JSON lines on standard error. See docs/archive.md.
     """
     if scheduler is not None and workers is not None:
@@ -77,7 +77,7 @@ class _Progress:
         self._next_s = 0.0
 
     def __call__(self, progress: Progress) -> None:
-        """Tell it, where it is time to, or where the last piece is done."""
+        """Print the progress if it is time to, or at the last piece."""
         if time.monotonic() >= self._next_s or progress.n_done == progress.n_total:
             self._next_s = time.monotonic() + TOLD_EVERY_S
             click.echo(json_line(asdict(progress) | {"remaining_s": progress.remaining_s}), err=True)
@@ -85,7 +85,7 @@ class _Progress:
 
 @contextmanager
 def _workers(scheduler: str | None, n_workers: int | None) -> Iterator[Processes | Cluster]:
-    """Who does the work; stopped at once where the command is."""
+    """The executor of the jobs; stopped at once when the command stops."""
     workers = Processes(n_workers) if scheduler is None else cluster(scheduler)
     try:
         yield workers

@@ -16,7 +16,7 @@ QUICK_LONGEST_S: Final = 155.0  # two thirds of it, which identify, hold one bat
 
 
 @click.command("reproduce")
-@click.option("--output", type=FILE, required=True, help="directory to write; must hold no reproduction yet")
+@click.option("--output", type=FILE, required=True, help="directory to write; must contain no reproduction yet")
 @click.option(
     "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="decides roads, speeds and noise"
 )
@@ -26,7 +26,7 @@ QUICK_LONGEST_S: Final = 155.0  # two thirds of it, which identify, hold one bat
 @click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that simulate")
 @as_json
 def reproduce(output: Path, seed: int, quick: bool, workers: int, as_json: bool) -> None:
-    """The paper's figures and tables, its numbers beside ours, as report.html with all it is made of."""
+    """The paper's figures and tables, its numbers beside ours, as report.html with all its files."""
     with counted("starting") as on_step:
         report = write_report(
             output, extent_of(seed, workers, quick=quick), lambda what, done, of: on_step(done, of, what)

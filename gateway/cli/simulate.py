@@ -45,7 +45,7 @@ _BENCH = (
         "--loads-off-m",
         type=NumberRange(0.0, 1.0),
         default=0.0,
-        help="let every load stand somewhere within this of the centre line [default: as the plan has it]",
+        help="place every load at random within this distance of the centre line [default: as the plan has it]",
     ),
     click.option(
         "--unrelated",

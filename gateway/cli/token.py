@@ -1,4 +1,4 @@
-"""springscale token: who may ask the gateway from elsewhere."""
+"""springscale token: who may use the gateway from elsewhere."""
 
 import json
 from pathlib import Path
@@ -20,7 +20,7 @@ _config = click.option(
 def token_file(config_path: Path) -> TokenFile:
     """The tokens of the service that this file configures: tokens.json beside its database.
 
-    Root gives up its rights first: what lies in the service's directory is the service's, links among it.
+    Root gives up its rights first: files in the service's directory are the service's, links included.
     """
     directory = load_settings(config_path).store.directory
     become_owner_of(directory)
@@ -39,9 +39,9 @@ def token() -> None:
     type=click.Choice([str(scope) for scope in Scope]),
     default="read",
     show_default=True,
-    help="read: may ask; operate: may also change something",
+    help="read: may read; operate: may also change something",
 )
-@click.option("--days", type=NumberRange(min=0.0, min_open=True), help="how long it is good for; else until revoked")
+@click.option("--days", type=NumberRange(min=0.0, min_open=True), help="period of validity; else until revoked")
 @_config
 def create(name: str, scope: str, days: float | None, config_path: Path) -> None:
     """Make a token called NAME and print it, this once."""
@@ -53,7 +53,7 @@ def create(name: str, scope: str, days: float | None, config_path: Path) -> None
 @click.option("--json", "as_json", is_flag=True, help="one JSON object a line")
 @_config
 def list_tokens(as_json: bool, config_path: Path) -> None:
-    """Show the tokens there are; what they are made of cannot be shown."""
+    """List the tokens; their secrets cannot be shown."""
     for held in token_file(config_path).tokens():
         if as_json:
             click.echo(json.dumps({"id": held.id, "name": held.name, "scope": held.scope, "ends": held.expiry()}))

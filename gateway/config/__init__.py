@@ -1,7 +1,7 @@
 """springscale.toml and SPRINGSCALE_* variables -> frozen settings. An unknown key is an error that names it.
 
-Tables about what a service keeps, and how it is calibrated and verified, are in ``sections``, about where
-weights are sent in ``outward``.
+Tables about what a service keeps, and how it is calibrated and verified, are in ``sections``, about where weights are
+sent in ``outward``.
 """
 
 from pathlib import Path
@@ -35,11 +35,11 @@ ESTIMATOR_NAMES: tuple[EstimatorName, ...] = get_args(EstimatorName)
 
 
 class VehicleSection(Section):
-    """Who this vehicle is, and what it may weigh."""
+    """The vehicle's identity, and its limits."""
 
     id: str = Field("vehicle", min_length=1, max_length=64, description="name under which the fleet knows the vehicle")
     calibrated_as: str | None = Field(
-        None, description="name the vehicle has in its calibration file; where given, another vehicle's file is refused"
+        None, description="the vehicle's name in its calibration file; if set, another vehicle's file is refused"
     )
     vin: str | None = Field(
         None, pattern=r"^[A-HJ-NPR-Z0-9]{17}$", description="vehicle identification number (ISO 3779)"
@@ -54,7 +54,7 @@ class VehicleSection(Section):
 
 
 class BusSection(Section):
-    """Where the frames come from."""
+    """The source of the frames."""
 
     interface: str = Field("socketcan", description="any python-can interface: socketcan, slcan, pcan, virtual, ...")
     channel: str = Field("can0", description="channel of that interface")
@@ -62,7 +62,7 @@ class BusSection(Section):
         default_factory=dict, description="further arguments of that python-can interface, e.g. bitrate"
     )
     inbox_frames: int = Field(
-        65_536, ge=1024, le=16_777_216, description="frames held between reader and pipeline; more are dropped"
+        65_536, ge=1024, le=16_777_216, description="frames queued between reader and pipeline; more are dropped"
     )
     silence_s: Seconds = Field(2.0, description="the bus counts as silent (asleep) after this long without a frame")
 
@@ -77,7 +77,7 @@ class BatchSection(Section):
     usable_share_min: Share = Field(0.6, description="a batch counts with at least this share of usable samples")
     gap_share_max: Share = Field(0.2, description="a batch with a larger share of gaps is refused")
     last_batch_share_min: Share = Field(
-        0.95, description="the last batch of a drive counts when it holds at least this share of the window"
+        0.95, description="the last batch of a drive counts if it has at least this share of the window"
     )
     standstill_s: Seconds = Field(60.0, description="a standstill this long ends the drive")
     standstill_speed_mps: float = Field(0.5, gt=0.0, le=100.0, description="slower than this is standing")
@@ -150,16 +150,16 @@ KeyLine = Annotated[str, AfterValidator(_of_a_key)]
 
 
 class TrustSection(Section):
-    """Who must have signed what decides a weight: calibration file, signal map, databases."""
+    """Whose signature is required on files that decide a weight: calibration file, signal map, databases."""
 
     public_keys: tuple[KeyLine, ...] = Field(
         (),
-        description="ed25519 keys, each the line of a KEY.pub; where any is given, files that none of them signed are "
-        "refused",
+        description="ed25519 keys, each the line of a KEY.pub; if there are any, files without a signature by one of "
+        "them are refused",
     )
 
     def for_reading(self) -> Trust:
-        """The same trust for who reads such a file."""
+        """The same trust for the reader of such a file."""
         return Trust(tuple(dict.fromkeys(map(PublicKey.of, self.public_keys))))
 
 
@@ -180,7 +180,7 @@ class Settings(BaseSettings):
         nested_model_default_partial_update=True,
     )
 
-    signals: str = Field(description="signal map: a TOML file, or springscale:NAME for one that is shipped")
+    signals: str = Field(description="signal map: a TOML file, or springscale:NAME for a shipped one")
     calibration: Path | None = Field(None, description="calibration file; without it batches carry spectra only")
     estimator: EstimatorName = Field("cross_spectrum", description="which estimator answers")
     vehicle: VehicleSection = VehicleSection()
@@ -208,8 +208,8 @@ class Settings(BaseSettings):
         )
         if sends.casefold() == hears.casefold():
             raise ValueError(
-                f"[broadcast] {sends} is the bus that is listened to, where nothing is ever sent: "
-                "give [broadcast] an interface of its own"
+                f"[broadcast] {sends} is the bus that the service listens to, and it never sends there: give "
+                f"[broadcast] an interface of its own"
             )
         return self
 

@@ -1,4 +1,4 @@
-"""Tables of springscale.toml about who must know: when an alarm is told, and where to."""
+"""Tables of springscale.toml about alarms: when one is raised, and where it is sent."""
 
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
@@ -19,7 +19,7 @@ CAUSE_NAMES: Final = (  # those of core.alarms, which loads too much for this
 
 def _of_a_cause(name: str) -> str:
     if name not in CAUSE_NAMES:
-        raise ValueError(f"is no alarm; there are {', '.join(CAUSE_NAMES)}")
+        raise ValueError(f"is no alarm; known are {', '.join(CAUSE_NAMES)}")
     return name
 
 
@@ -27,34 +27,37 @@ CauseName = Annotated[str, AfterValidator(_of_a_cause)]
 
 
 class AlarmsSection(Section):
-    """When an alarm is told, confirmed and ended. Permitted weights are those of the vehicle."""
+    """When an alarm is raised, confirmed and ended. Permitted weights are those of the vehicle."""
 
     off: tuple[CauseName, ...] = Field(
-        (), description='alarms that are not wanted, by name or by kind: `["drift", "overload.front_left"]`'
+        (), description='unwanted alarms, by name or by kind: `["drift", "overload.front_left"]`'
     )
     early_probability: float = Field(
-        0.9, gt=0.5, lt=1.0, description="told early where it is so probable that a limit is passed, be it by one batch"
+        0.9, gt=0.5, lt=1.0, description="raised early if it is so probable that a limit is exceeded, even by one batch"
     )
     final_probability: float = Field(
-        0.95, gt=0.5, lt=1.0, description="confirmed where the batches of one load together make it so probable"
+        0.95, gt=0.5, lt=1.0, description="confirmed if the batches of one load together make it so probable"
     )
-    final_batches: int = Field(2, ge=2, le=20, description="how many batches of one load it takes at least")
+    final_batches: int = Field(2, ge=2, le=20, description="least number of batches of one load")
     clear_probability: float = Field(
-        0.25, gt=0.0, le=0.5, description="the alarm ends where the load makes it no more probable than this"
+        0.25, gt=0.0, le=0.5, description="the alarm ends when the load makes it no more probable than this"
     )
     side_share_max_pct: float = Field(
         55.0, ge=50.0, le=100.0, description="of the sprung mass, on the wheels of one side (needs a roll rate)"
     )
     axle_share_max_pct: float = Field(75.0, ge=50.0, le=100.0, description="of the sprung mass, on one axle")
     sensor_silent_s: float = Field(
-        60.0, ge=10.0, le=86_400.0, description="a needed sensor silent for so long on a bus that is alive is told"
+        60.0,
+        ge=10.0,
+        le=86_400.0,
+        description="a needed sensor that is silent for so long on a live bus raises an alarm",
     )
     sensor_silent_final_s: float = Field(600.0, ge=10.0, le=86_400.0, description="likewise, for sure")
     no_estimate_min: float = Field(
         120.0,
         ge=5.0,
         le=10_000.0,
-        description="minutes driven without an estimate before that is told; twice: for sure",
+        description="minutes driven without an estimate before an early alarm; twice as long confirms it",
     )
 
     @model_validator(mode="after")
@@ -70,7 +73,9 @@ _LOCAL: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 class WebhookSection(Section):
     """Where alarms and events are pushed to: an address that takes signed HTTP requests."""
 
-    url: str | None = Field(None, description="its address, https:// (http:// on this machine alone); without it none")
+    url: str | None = Field(
+        None, description="its address, https:// (http:// on this machine alone); without it nothing is pushed"
+    )
     secret_file: Path | None = Field(
         None, description="file with the secret we sign with: `whsec_` and base64, a line each; the first is the newest"
     )
@@ -80,7 +85,7 @@ class WebhookSection(Section):
     send: tuple[Literal["alarms", "events", "trips", "estimates"], ...] = Field(
         ("alarms", "events"), min_length=1, description="what it is sent"
     )
-    timeout_s: float = Field(20.0, ge=1.0, le=300.0, description="an answer that takes longer is none")
+    timeout_s: float = Field(20.0, ge=1.0, le=300.0, description="time limit for an answer")
     back_off_max_s: float = Field(300.0, gt=0.0, le=86_400.0, description="longest pause between two tries")
     give_up_h: float = Field(
         72.0, gt=0.0, le=8760.0, description="hours after which a letter that is answered with a refusal is given up"
@@ -95,7 +100,7 @@ class WebhookSection(Section):
         if parts.scheme not in {"https", "http"} or not parts.hostname or (parts.port or 1) < 1:
             raise ValueError("is no https:// address")
         if parts.username is not None or parts.fragment or not url.isascii() or not url.isprintable() or " " in url:
-            raise ValueError("may hold neither a user nor a fragment, and no character that must be escaped")
+            raise ValueError("may contain neither a user nor a fragment, and no character that must be escaped")
         if parts.scheme == "http" and parts.hostname not in _LOCAL:
             raise ValueError("would cross the network in the clear: use https://")
         return url

@@ -8,7 +8,7 @@ from gateway.config.sections import Seconds, Section
 
 
 class UplinkSection(Section):
-    """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that nobody can ask."""
+    """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that cannot be reached from outside."""
 
     host: str | None = Field(None, min_length=1, description="the broker; without it nothing is forwarded")
     port: int | None = Field(None, ge=1, le=65535, description="its port [default: 8883 with TLS, 1883 without]")
@@ -16,10 +16,10 @@ class UplinkSection(Section):
     ca: Path | None = Field(
         None, description="PEM file of the authority that signed the broker's certificate [default: the system's]"
     )
-    certificate: Path | None = Field(None, description="PEM file of our certificate, for a broker that asks for one")
+    certificate: Path | None = Field(None, description="PEM file of our certificate, for a broker that requires one")
     key: Path | None = Field(None, description="PEM file of its key")
-    username: str | None = Field(None, description="name under which the broker knows us")
-    password_file: Path | None = Field(None, description="file that holds nothing but the password")
+    username: str | None = Field(None, description="our client identifier at the broker")
+    password_file: Path | None = Field(None, description="file that contains only the password")
     topic: str = Field("springscale/{vehicle_id}", min_length=1, description="branch below which this vehicle reports")
     client_id: str | None = Field(None, min_length=1, description="[default: springscale- and the vehicle's id]")
     keep_alive_s: int = Field(60, ge=5, le=3600, description="the link is probed after this long without traffic")
@@ -28,13 +28,12 @@ class UplinkSection(Section):
         0.0,
         ge=0.0,
         le=86_400.0,
-        description="after a break, what was delivered in the last so many seconds before it is sent again: more than "
-        "the broker forgets when it is killed",
+        description="after a break, records delivered in the last so many seconds before it are sent again: more than "
+        "the broker loses when it is killed",
     )
     wait_for_listener: bool = Field(
         False,
-        description="a record that the broker takes though nobody subscribes to it, as MQTT 5 lets it say, stays "
-        "here and is tried again",
+        description="a record without a subscriber at the broker, as MQTT 5 reports it, is kept here and tried again",
     )
     home_assistant: str | None = Field(
         None,
@@ -55,7 +54,7 @@ class UplinkSection(Section):
 
 
 class BroadcastSection(Section):
-    """Weights sent onto another CAN bus than the one that is listened to, as J1939 frames."""
+    """Weights sent as J1939 frames onto another CAN bus than the one that the service listens to."""
 
     interface: str | None = Field(
         None, min_length=1, description="any python-can interface; without it nothing is ever sent on any bus"
@@ -64,14 +63,12 @@ class BroadcastSection(Section):
     options: dict[str, str | int | float | bool] = Field(
         default_factory=dict, description="further arguments of that python-can interface, e.g. bitrate"
     )
-    source_address: int | None = Field(
-        None, ge=0, le=253, description="J1939 address to send under, which nobody else on that bus may have"
-    )
+    source_address: int | None = Field(None, ge=0, le=253, description="J1939 source address, unique on that bus")
     priority: int = Field(6, ge=0, le=7, description="J1939 priority; 0 is the most urgent")
     every_s: float = Field(1.0, ge=0.1, le=3600.0, description="frames are sent so often")
     first_axle: int = Field(1, ge=0, le=1, description="number that the receivers expect of the front axle")
     draws_trailers: bool = Field(
-        False, description="the gross weight of the combination, which is not known then, is not told"
+        False, description="then the gross weight of the combination is unknown and is not sent"
     )
 
     @model_validator(mode="after")

@@ -17,10 +17,10 @@ class Section(BaseModel):
 
 
 class KeepSection(Section):
-    """What is kept of the batches themselves, for calibrations to come: no log is asked of anybody."""
+    """The batches kept for later calibrations, which then need no logs."""
 
     batches: int = Field(256, ge=0, le=100_000, description="batches kept at most, the newest (0: none)")
-    size_mb: float = Field(128.0, ge=1.0, le=100_000.0, description="disk space they may take; the oldest give way")
+    size_mb: float = Field(128.0, ge=1.0, le=100_000.0, description="disk space for them; the oldest are removed")
 
 
 class RecordSection(Section):
@@ -30,20 +30,22 @@ class RecordSection(Section):
     directory: Path | None = Field(None, description="folder of the segments [default: `record` in that of the store]")
     max_size_mb: float = Field(1024.0, ge=16.0, le=1e9, description="the oldest segments are removed beyond this size")
     max_daily_mb: float = Field(512.0, gt=0.0, le=1e9, description="no more than this is written in a day (UTC)")
-    free_mb: float = Field(256.0, ge=0.0, le=1e9, description="with less room left on the disk nothing is recorded")
+    free_mb: float = Field(256.0, ge=0.0, le=1e9, description="with less free space on the disk nothing is recorded")
     block_s: float = Field(
         120.0, ge=1.0, le=3600.0, description="frames are written together so often; a power cut costs as much"
     )
 
 
 class VerificationSection(Section):
-    """What a verification with known loads asks for, and how often: choose what your law or your customer asks for."""
+    """Requirements of a verification with known loads, and how often it is due: choose what your law or your customer
+    requires.
+    """
 
     permitted_error_pct: float = Field(
         5.0, gt=0.0, le=100.0, description="largest error of the gross weight, in percent of the known one"
     )
     permitted_axle_error_pct: float | None = Field(
-        None, gt=0.0, le=100.0, description="likewise of each axle's [default: axles are told and not judged]"
+        None, gt=0.0, le=100.0, description="the same for each axle's [default: axles are reported and not judged]"
     )
     loads: int = Field(1, ge=1, le=10, description="least number of known loads for a record to pass")
     every_days: float = Field(0.0, ge=0.0, le=36_500.0, description="due so long after the last that passed (0: never)")
@@ -52,27 +54,31 @@ class VerificationSection(Section):
 class CommissioningSection(Section):
     """Calibrating on the vehicle itself, from an empty drive."""
 
-    is_allowed: bool = Field(True, description="whether a calibration may be made here, by who may operate")
+    is_allowed: bool = Field(True, description="whether users with scope operate may make a calibration here")
     lines: Path | None = Field(None, description="folder with calibrations of sister vehicles and line files to choose")
     goal_pct: float = Field(
         4.5,
         ge=0.5,
         le=50.0,
-        description="driven enough where the standard deviation of a payload is this share of the largest payload",
+        description="the drive is sufficient when the standard deviation of a payload is this share of the largest "
+        "payload",
     )
     memory_mb: float = Field(
         768.0, ge=256.0, le=16_384.0, description="address space of the process that fits, which takes far less memory"
     )
     is_unsigned_believed: bool = Field(
         False,
-        description="where [trust] asks for signatures: use what was calibrated here, which nobody signs, all the same",
+        description="if [trust] requires signatures: accept calibrations made here, which nobody signs",
     )
 
 
 class PositionSection(Section):
-    """What is kept of where the vehicle was, and whether that may leave the box."""
+    """The vehicle's positions that are kept, and whether they may leave the vehicle."""
 
     decimals: int | None = Field(
-        None, ge=0, le=7, description="decimals of a degree kept: 2 is about 1 km, 4 about 10 m [default: none is kept]"
+        None,
+        ge=0,
+        le=7,
+        description="decimals of a degree kept: 2 is about 1 km, 4 about 10 m [default: no positions are kept]",
     )
     forward: bool = Field(False, description="forward kept positions to the broker of [uplink] too")

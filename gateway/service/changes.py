@@ -1,4 +1,4 @@
-"""What changed, for the log: a line where the batches or the service turn to something else, none while they stay."""
+"""Changes for the log: a line when the batches or the service change state, none while they stay."""
 
 import logging
 import math
@@ -12,7 +12,7 @@ from gateway.web import Board, LatestWeights
 
 
 class BatchLog:
-    """Told of every batch by the pipeline. ``weigh`` gives the weights the web shows, warnings included."""
+    """Called by the pipeline with every batch. ``weigh`` gives the weights the web shows, warnings included."""
 
     def __init__(self, weigh: Callable[[], LatestWeights]) -> None:
         self._weigh = weigh
@@ -20,7 +20,7 @@ class BatchLog:
         self._overloaded = self._now_overloaded()
 
     def __call__(self, found: Estimate) -> None:
-        """A new estimate is a line; rejected and provisional ones are for those who look for a fault (debug)."""
+        """A new estimate is a line; rejected and provisional ones are for fault finding (debug)."""
         if found.is_remainder:
             return
         is_answer = found.counted and not found.is_provisional
@@ -39,7 +39,7 @@ class BatchLog:
             self._tell_overload()
 
     def _tell_reasons(self, rejected: tuple[Why, ...]) -> None:
-        """Where the set is another than that of the batch before."""
+        """If the set differs from that of the batch before."""
         before, self._rejected = self._rejected, frozenset(rejected)
         if self._rejected != before:
             log_event(Event.REASONS_CHANGED, rejected=rejected, before=sorted(before))
@@ -77,7 +77,7 @@ def told_in_turn(*hearers: Callable[[Estimate], None]) -> Callable[[Estimate], N
 
 
 class StateLog:
-    """Told of the service's state by whoever watches it, often; writes where it is another than before."""
+    """Called often with the service's state; writes a line if it differs from the last one."""
 
     def __init__(self, board: Board) -> None:
         self._board = board

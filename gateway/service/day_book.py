@@ -1,4 +1,4 @@
-"""The service's day book: what each batch tells of loads and trips, written to the journal."""
+"""The service's day book: the load events and trips of each batch, written to the journal."""
 
 import json
 import logging
@@ -19,10 +19,10 @@ MOST: Final = 2 * HORIZON  # entries that so many batches can tell
 
 
 class DayBook:
-    """Told of every estimate once it is stored and shown; by the pipeline's thread alone."""
+    """Called with every estimate once it is stored and shown; by the pipeline's thread alone."""
 
     def __init__(self, setup: Setup, store: Store) -> None:
-        """Goes on from what the store remembers of the last batches."""
+        """Resumes from the stored batches."""
         self._store = store
         rules = Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules()
         try:
@@ -32,7 +32,7 @@ class DayBook:
             self._ledger = Ledger(rules)
 
     def __call__(self, found: Estimate) -> None:
-        """Write down what it tells."""
+        """Write its entries down."""
         for entry in self._ledger.add(found):
             text = json_line(entry.record)
             self._store.write_entry(entry.kind, entry.id, entry.t_end_ns, text, entry.revision)

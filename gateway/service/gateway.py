@@ -63,7 +63,7 @@ OnStarted = Callable[["Gateway"], None]
 
 
 class GatewayFailedError(SpringscaleError):
-    """A part of the running service died; the process ends so that systemd starts it anew."""
+    """A part of the running service died; the process ends so that systemd restarts it."""
 
 
 class Gateway:
@@ -80,10 +80,10 @@ class Gateway:
         open_receiver: OpenReceiver | None = None,
         setup_fault: str | None = None,
     ) -> None:
-        """``load`` reads the settings anew for a reload; without it a reload finds them unchanged.
+        """``load`` reads the settings again for a reload; without it a reload finds them unchanged.
 
         ``setup_fault`` says why the setup is not the one that the settings name (last_good).
-        ``open_receiver`` stands in for the interface (the soak run).
+        ``open_receiver`` replaces the interface (the soak run).
         """
         self._settings = settings
         self._on_started = on_started
@@ -170,7 +170,7 @@ class Gateway:
         self.is_to_start_anew = False  # with the calibration that was made meanwhile; see life.py
 
     def _parts(self) -> tuple[tuple[Part, ...], tuple[Part, ...]]:
-        """What the weighing cannot be without, and what goes on beside it; each in the order of the start."""
+        """Vital parts of the weighing, and the other parts; each in the order of the start."""
         vital = (
             Part("database writer", lambda: None, self.store.close, death=lambda: _ended(self.store), is_vital=True),
             Part(
@@ -202,14 +202,14 @@ class Gateway:
         return vital, tuple(beside)
 
     def _warnings(self) -> tuple[str, ...]:
-        """What is broken beside the weighing, as people read it."""
+        """Faults that do not stop the weighing, for people."""
         faults = [self._tokens.fault, self._reload.fault, self._web_fault, *self.proving.faults]
         faults += [part.told() for part in (*self._vital, *self._beside)]
         return tuple(fault for fault in faults if fault)
 
     @property
     def url(self) -> str:
-        """Where the dashboard is, once started."""
+        """Address of the dashboard, once started."""
         port = self._server.servers[0].sockets[0].getsockname()[1]
         scheme = "https" if self._server.config.is_ssl else "http"
         return f"{scheme}://{self._settings.web.host}:{port}"
@@ -257,7 +257,7 @@ class Gateway:
             self._reloading = asyncio.create_task(self._reload_beside())
 
     async def _reload_beside(self) -> None:
-        """And tell systemd when it begins and ends."""
+        """And notify systemd when it begins and ends."""
         self._notifier.send_reloading()
         try:
             await in_own_thread(self._reload)
@@ -265,7 +265,7 @@ class Gateway:
             self._notifier.send(READY="1")
 
     async def _serve_web(self) -> None:
-        """uvicorn until it ends; it leaves by SystemExit where it cannot start, which must not pass a task."""
+        """uvicorn until it ends; a failed start raises SystemExit, which must not leave a task."""
         with contextlib.suppress(SystemExit):
             await self._server.serve()
 
@@ -292,7 +292,7 @@ class Gateway:
                 await asyncio.wait_for(self._stopping.wait(), ASLEEP_SUPERVISE_S if is_asleep else SUPERVISE_S)
 
     def look(self, log_state: StateLog) -> None:
-        """What is to be done with the service as it is now; in a thread, for it may wait for a lock or a disk."""
+        """Periodic checks of the service's state; in a thread, for they may wait for a lock or a disk."""
         now = self.status()
         log_state(now)
         self.alarms.watch(now, self.proving.trend.trends)
@@ -300,14 +300,14 @@ class Gateway:
         self._notifier.send_status(now.sentence())
 
     def _look_around(self, state: State) -> None:
-        """A sensor that is not heard may speak under another identifier, which the bus's filters keep out."""
+        """A silent sensor may send under another identifier, which the bus's filters exclude."""
         if state in (State.WAITING_FOR_BUS, State.SENSOR_FAULT):
             self.around.look()
         else:
             self.around.forget()
 
     def _dead_part(self, serving: asyncio.Task[None]) -> str | None:
-        """Which vital part died, and of what; None while all live."""
+        """The vital part that died, and its exception; None while all live."""
         for part in self._vital:
             if (death := part.death()) is not None:
                 return f"the {part.name} {death}"
@@ -319,9 +319,10 @@ class Gateway:
         return None
 
     def _stop_parts(self) -> None:
-        """The bus first, then what it fed, then the disk: every accepted estimate is on it before anybody else stops.
+        """The bus first, then its consumers, then the disk: every accepted estimate is on it before the other parts
+        stop.
 
-        One deadline for all. Whatever hangs is left behind.
+        One deadline for all. Parts that hang are abandoned.
         """
         deadline = Deadline()
         self._notifier.send(STOPPING="1", STATUS="Stopping.")

@@ -1,4 +1,4 @@
-"""The thread that keeps batches for calibrations to come: the pipeline hands over, and never waits for the disk."""
+"""The thread that keeps batches for later calibrations: the pipeline queues them, and never waits for the disk."""
 
 import logging
 import queue
@@ -26,7 +26,7 @@ class _Handed:
 
 
 class Listener(Protocol):
-    """Who hears of batches after those that count are kept, in the keeper's thread."""
+    """The listener that receives batches after those that count are kept, in the keeper's thread."""
 
     @property
     def wants_all(self) -> bool:
@@ -48,9 +48,9 @@ class Nobody:
 
 
 class BatchKeeper:
-    """Puts every batch that any estimator could use on ``shelf``, and tells ``listener``.
+    """Puts every batch that any estimator could use on ``shelf``, and passes all to ``listener``.
 
-    ``fault`` says what the disk refused last, if so.
+    ``fault`` is the last fault of the disk, if any.
     """
 
     def __init__(self, shelf: Shelf, signal_map: SignalMap) -> None:
@@ -81,7 +81,7 @@ class BatchKeeper:
         self._waiting.join()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """Keep what waits, then end; what is not kept in time is lost and counted."""
+        """Keep the waiting batches, then end; those not kept in time are lost and counted."""
         end_s = time.monotonic() + timeout_s
         with suppress(queue.Full):
             self._waiting.put(None, timeout=timeout_s)
@@ -121,7 +121,7 @@ class BatchKeeper:
         self.n_lost += 1
         if self.fault is None:  # once until it works again
             log_event(Event.BATCH_NOT_KEPT, level=logging.WARNING, fault=why)
-        self.fault = f"batches cannot be kept for calibrations to come: {why}; weighing goes on"
+        self.fault = f"batches cannot be kept for later calibrations: {why}; weighing goes on"
 
 
 def _counts(batch: Batch) -> bool:

@@ -17,9 +17,9 @@ from gateway.setup import Setup, setup_of
 
 
 def setup_or_last_good(settings: Settings) -> tuple[Setup, str | None]:
-    """The setup, and what is wrong with the calibration file where its last good copy stands in for it.
+    """The setup, and the fault of the calibration file if its last good copy replaces it.
 
-    Raises as ``setup_of``; for a broken calibration file where there is no good copy of it.
+    Raises as ``setup_of``; for a broken calibration file if there is no good copy of it.
     """
     try:
         return setup_of(settings), None
@@ -35,7 +35,7 @@ def setup_or_last_good(settings: Settings) -> tuple[Setup, str | None]:
 
 
 def keep_copy(settings: Settings, calibration: CalibrationFile) -> None:
-    """Keep it for later starts; a disk that refuses is told and keeps nobody from weighing."""
+    """Keep it for later starts; a disk fault is logged and does not stop the weighing."""
     if settings.calibration is None or settings.calibration.parent == settings.store.directory:  # it lies there already
         return
     files, name, path = KeptFiles(settings.store.directory), _name_of(settings.calibration), settings.calibration

@@ -20,11 +20,10 @@ def live(
     on_started: OnStarted = lambda gateway: None,
     open_receiver: OpenReceiver | None = None,
 ) -> bool:
-    """Serve until told to stop -> whether to start anew. Raises as ``setup_of`` and as :meth:`Gateway.run`.
+    """Serve until stopped -> whether to restart. Raises as ``setup_of`` and as :meth:`Gateway.run`.
 
-    A calibration made on the vehicle is taken up between two drives, where no window is open: the service ends and
-    begins anew, as at any start. ``load`` reads the settings anew for a reload; ``open_receiver`` is as of
-    :class:`Gateway`.
+    A calibration made on the vehicle takes effect between two drives, when no window is open: the service ends and
+    restarts. ``load`` reads the settings again for a reload; ``open_receiver`` is as of :class:`Gateway`.
     """
     chosen, setup, fault = commissioned(settings)
     gateway = Gateway(
@@ -40,7 +39,7 @@ def live(
 
 
 def start_anew() -> None:
-    """End this process so that another takes its place: systemd's by the exit code, else the same command once more."""
+    """End this process so that another replaces it: systemd's by the exit code, else the same command once more."""
     if "NOTIFY_SOCKET" in os.environ:
         sys.exit(START_ANEW)
     sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""What every part of the service is to the gateway: started, watched, stopped in time, the same way for all."""
+"""The common interface of the service's parts: started, watched and stopped in time in the same way."""
 
 import asyncio
 import logging
@@ -21,9 +21,9 @@ CLOSE_WITHIN_S: Final = 3.0  # kept for the last records of the stop itself
 class Part:
     """A row of the gateway's table.
 
-    ``stop`` is given the seconds it may take. ``fault`` says what is wrong, for people; ``death`` why it works no more,
-    None while it does. The death of a vital part ends the process, so that systemd starts it anew; that of another is
-    shown, and the weighing goes on.
+    ``stop`` is given the seconds it may take. ``fault`` says what is wrong, for people; ``death`` why it no longer
+    works, None while it does. The death of a vital part ends the process, so that systemd restarts it; that of another
+    is shown, and the weighing goes on.
     """
 
     name: str
@@ -34,13 +34,13 @@ class Part:
     is_vital: bool = False
 
     def told(self) -> str | None:
-        """What is wrong with it, or that it works no more."""
+        """Its fault, or its death."""
         death = None if self.is_vital else self.death()
         return self.fault() if death is None else f"{death}; weighing goes on, a restart brings it back"
 
 
 class Sending(Protocol):
-    """A part with a thread that sends what was weighed."""
+    """A part with a thread that sends estimates."""
 
     NAME: ClassVar[str]
 
@@ -59,7 +59,7 @@ class Deadline:
         self._end_s = clock_s() + within_s
 
     def left_s(self, most_s: float = STOP_WITHIN_S, *, keep_s: float = 0.0) -> float:
-        """What one part may take of what is left, without the last ``keep_s``."""
+        """The share of one part of the time left, without the last ``keep_s``."""
         return max(0.0, min(most_s, self._end_s - keep_s - self._clock_s()))
 
 
@@ -67,14 +67,14 @@ class Questions(ThreadPoolExecutor):
     """Threads in which clients' questions wait for a lock or a disk. Its end waits for none of them."""
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Leave behind what hangs: the event loop, which ends its executor, would wait for ever."""
+        """Abandon tasks that hang: the event loop, which waits for its executor, would wait for ever."""
         super().shutdown(wait=False, cancel_futures=True)
 
 
 async def in_own_thread(work: Callable[[], object]) -> None:
-    """Do it in a thread of its own while the event loop goes on. Raises what it raises.
+    """Run it in a thread of its own while the event loop goes on. Raises what it raises.
 
-    Not in the loop's pool: clients' questions may have taken that, and one that hangs keeps the process from ending.
+    Not in the loop's pool: clients' requests may have used it up, and one that hangs keeps the process from ending.
     """
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
@@ -99,7 +99,7 @@ async def in_own_thread(work: Callable[[], object]) -> None:
 def stop_in_turn(parts: Sequence[Part], deadline: Deadline) -> list[str]:
     """Stop the last first -> names of those that did not stop in time; they are left behind.
 
-    Each stops in a thread of its own: whatever it waits for, a lock or a disk, nobody waits longer than the deadline.
+    Each stops in a thread of its own: if it waits for a lock or a disk, the others wait no longer than the deadline.
     """
     late = []
     for part in reversed(parts):

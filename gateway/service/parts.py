@@ -29,7 +29,7 @@ BYTES_PER_MB = 1_000_000
 
 
 def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with_places: bool) -> Uplink | None:
-    """None where no broker is configured."""
+    """None if no broker is configured."""
     if wanted is None:
         return None
     birth = {
@@ -50,20 +50,20 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with
 
 
 def _queue_name(wanted: UplinkSettings) -> str:
-    """The place in the queue belongs to where letters go: another broker or branch begins from the first row."""
+    """The place in the queue belongs to the receiver: another broker or branch begins at the first row."""
     return f"mqtt://{wanted.broker}/{wanted.topic}"
 
 
 @dataclass(frozen=True, slots=True)
 class Forwarding:
-    """Who is told of what is stored, as the settings have it; None where there is nobody."""
+    """The listeners to stored records, by the settings; None if there are none."""
 
     broker: UplinkSettings | None
     webhook: WebhookSettings | None
 
     @classmethod
     def of(cls, settings: Settings) -> "Forwarding":
-        """Raises ConfigurationError for what cannot work."""
+        """Raises ConfigurationError for impossible settings."""
         return cls(
             uplink_settings(settings.uplink, settings.vehicle), webhook_settings(settings.webhook, settings.vehicle)
         )
@@ -76,7 +76,7 @@ class Forwarding:
 
 
 def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: bool) -> Webhook | None:
-    """None where none is configured."""
+    """None if none is configured."""
     if wanted is None:
         return None
     outbox = Outbox(store, wanted.queue, with_places=with_places, only=wanted.kinds)
@@ -93,7 +93,7 @@ def store_of(wanted: StoreSection, undelivered_to: tuple[str, ...]) -> Store:
 
 
 def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
-    """It shows what was known before; a disk that refuses even to be read is no reason not to start."""
+    """It shows the last known state; an unreadable disk is no reason not to start."""
     board = Board(stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None))
     try:
         board.restore(**asdict(store.reader().latest()))
@@ -146,7 +146,7 @@ def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | No
 
 
 def broadcaster_of(wanted: BroadcastSection, board: Board) -> Broadcaster | None:
-    """None where nothing is to be sent. What the pages call old is not told to a bus, which has no word for it."""
+    """None if nothing is to be sent. A stale estimate is not sent to a bus, which cannot mark it."""
     if wanted.interface is None or wanted.channel is None or wanted.source_address is None:
         return None
 
@@ -159,7 +159,7 @@ def broadcaster_of(wanted: BroadcastSection, board: Board) -> Broadcaster | None
 
 
 def ring_log_of(settings: Settings, setup: Setup) -> RingLog | None:
-    """None where nothing is to be recorded. Frames get the channel that the signal map reads them from."""
+    """None if nothing is to be recorded. Frames get the channel that the signal map reads them from."""
     wanted = settings.record
     if not wanted.enabled:
         return None

@@ -31,15 +31,15 @@ ROLL_RATE_LOST: Final = (
     "check the sensor and the signal map; payload and front share go on"
 )
 NOISY: Final = (
-    "{} {:.1f} times as loud as expected in the last batch: look for a loose mount, a bad supply or a changed filter "
-    "or range in the device; what can be weighed goes on"
+    "{} {:.1f} times as noisy as expected in the last batch: look for a loose mount, a bad supply or a changed filter "
+    "or range in the device; weighing goes on where possible"
 )
 LATE_S: Final = 1.0  # a frame may be so much later here than its stamp
 STOP_WITHIN_S: Final = 6.0  # a full inbox holds several windows
 
 
 class Pipeline:
-    """Runs until :meth:`stop`; what kills it is kept in ``failure``."""
+    """Runs until :meth:`stop`; an exception that ends it is kept in ``failure``."""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class Pipeline:
         on_batch: Callable[[Estimate], None] = lambda found: None,
         on_frames: Callable[[Frames], None] = lambda frames: None,
     ) -> None:
-        """``on_batch`` hears of every estimate once it is stored and shown, ``on_frames`` of all that is decoded."""
+        """``on_batch`` receives every estimate once it is stored and shown, ``on_frames`` all decoded frames."""
         self.decoder = decoder
         self.flow = flow
         self.watch = SignalWatch(decoder.signals)
@@ -78,19 +78,19 @@ class Pipeline:
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """Take what is left in the inbox, close the open window, and end."""
+        """Process the rest of the inbox, close the open window, and end."""
         self._stop.set()
         self._thread.join(timeout_s)
         if self._thread.is_alive():
             log_event(Event.PIPELINE_LATE, level=logging.ERROR, n_frames_waiting=len(self._inbox))
 
     def weighed_age_s(self) -> float | None:
-        """Seconds since ``flow.weighed`` was found, on the board's clock; None where there is none. From any thread."""
+        """Seconds since ``flow.weighed`` was computed, on the board's clock; None if there is none. From any thread."""
         weighed, found_s = self._weighed_at
         return None if weighed is None else boot_clock_s() - found_s
 
     def is_between_drives(self, silence_s: float) -> bool:
-        """Whether what comes next is another drive: this one is over, or its bus is silent. From any thread."""
+        """Whether the next frame begins another drive: this one is over, or its bus is silent. From any thread."""
         newest_s = max(self.watch.last_heard.values(), default=0.0)
         return self.flow.scheduler.drive_start_ns is None or time.monotonic() - newest_s > silence_s
 
@@ -111,7 +111,7 @@ class Pipeline:
             log_event(Event.PIPELINE_DIED, level=logging.CRITICAL, failure=repr(failure))
 
     def _turn(self, timeout_s: float) -> bool:
-        """One drain of the inbox; True where there were frames."""
+        """One drain of the inbox; True if there were frames."""
         begun_s = time.monotonic()
         frames = self._inbox.drain(timeout_s)
         self.progress += 1
@@ -130,7 +130,7 @@ class Pipeline:
 
     def _hear_nothing(self, for_s: float) -> None:
         """The bus sleeps: the drive ends now, as the first row after it would end it. Only time spent listening counts,
-        so that a machine that stood still hears first what has gathered meanwhile.
+        so that a stalled machine first reads the frames that have gathered meanwhile.
         """
         self._silent_s += for_s
         if self.flow.scheduler.drive_start_ns is not None and self._silent_s > self.flow.scheduler.silence_s + LATE_S:
@@ -151,7 +151,7 @@ class Pipeline:
 
     @property
     def sensor_fault(self) -> str | None:
-        """What of the sensors is at fault though they weigh on, as people read it."""
+        """Faults of sensors that do not stop the weighing, for people."""
         return "; ".join(fault for fault in (self.roll_rate_fault, self.noise_fault) if fault) or None
 
     def _count(self, found: Estimate) -> None:
@@ -172,7 +172,7 @@ class Pipeline:
 
 
 def noise_fault(found: Estimate) -> str | None:
-    """Which sensor has become noisy and by how much, as people read it; None where none has."""
+    """Which sensor has become noisy and by how much, for people; None if none has."""
     ratio, name = max((found.diagnostics.get(key, 0.0), name) for key, name in SENSOR_OF.items())
     return NOISY.format(name, ratio) if ratio > NOISY_RATIO else None
 

@@ -1,8 +1,8 @@
-"""What SIGHUP changes in a running service: the log's level and the web's certificate. The rest wants a restart.
+"""Changes of a running service by SIGHUP: the log's level and the web's certificate. The rest needs a restart.
 
-A calibration or a signal map in the middle of a batch would make numbers that no offline run could repeat, so they
-begin with a restart, which takes about two seconds and loses the open window only; a reload checks them and says what
-the restart will find. Access tokens need neither: the service follows their file.
+A new calibration or signal map in the middle of a batch would give numbers that no offline run could repeat, so they
+take effect at a restart, which takes about two seconds and loses the open window only; a reload checks them and reports
+what the restart will find. Access tokens need neither: the service follows their file.
 """
 
 import logging
@@ -24,7 +24,7 @@ LoadSettings = Callable[[], Settings]
 
 
 class Reloader:
-    """Reads the settings anew and applies what can change live; what it cannot use changes nothing."""
+    """Reads the settings again and applies those that can change live; faulty ones change nothing."""
 
     def __init__(
         self,
@@ -34,9 +34,9 @@ class Reloader:
         setup: Setup | None = None,
         fault: str | None = None,
     ) -> None:
-        """``setup`` is the one at work: files that changed at the same path are held against it.
+        """``setup`` is the one in use: files that changed at the same path are compared with it.
 
-        ``fault`` is what is wrong with them from the start on; later reloads renew it, the status shows it.
+        ``fault`` is their fault from the start on; later reloads renew it, the status shows it.
         """
         self._running = running
         self._load = load
@@ -45,7 +45,7 @@ class Reloader:
         self.fault = fault
 
     def __call__(self) -> bool:
-        """True where settings and files as they are now were good; the log tells what changed and what waits."""
+        """True if the present settings and files are good; the log says what changed and what waits."""
         try:
             wanted = self._load()
             tls = tls_of(wanted)
@@ -62,13 +62,13 @@ class Reloader:
         return self.fault is None
 
     def _changed_files(self, wanted: Settings) -> list[str]:
-        """Keys whose files hold something else than what is at work. Files that cannot be used are a fault."""
+        """Keys whose files differ from those in use. Files that cannot be used are a fault."""
         if self._setup is None:
             return []
         try:
             fresh = setup_in_use(wanted)
         except SpringscaleError as fault:
-            self.fault = f"{fault}; what was loaded before goes on until it is mended and the service restarted"
+            self.fault = f"{fault}; the service keeps the earlier files until these are mended and it is restarted"
             log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=str(fault))
             return []
         self.fault = None
@@ -90,7 +90,7 @@ def tls_of(settings: Settings) -> Tls | None:
 
 
 def changed_keys(old: Settings, new: Settings) -> list[str]:
-    """Keys such as bus.channel that stand differently in the two, in alphabetical order."""
+    """Keys such as bus.channel that differ between the two, in alphabetical order."""
     before, after = dict(_leaves(old.model_dump())), dict(_leaves(new.model_dump()))
     return sorted(key for key in before.keys() | after.keys() if before.get(key) != after.get(key))
 

@@ -1,4 +1,4 @@
-"""Whether a service of these settings could start and do its work, as far as that can be told without the bus."""
+"""Whether a service with these settings can start and work, as far as that can be checked without the bus."""
 
 import os
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from gateway.web import TokenFile, refuse_open_address
 
 
 def startable_faults(settings: Settings, signal_map: SignalMap) -> Iterator[str]:
-    """Everything that would keep it from starting or from showing a fresh estimate, each with how to mend it."""
+    """Everything that would keep it from starting or from giving a fresh estimate, each with how to mend it."""
     yield from _signals_that_lack(signal_map)
     yield from _store_that_cannot_be_written(settings.store.directory)
     lacking = what_lacks(settings.bus.interface)
@@ -37,24 +37,24 @@ def _signals_that_lack(signal_map: SignalMap) -> Iterator[str]:
     mapped = set(signal_map.signals)
     for signal in (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE):
         if signal not in mapped:
-            yield f"{signal_map.name} maps no {signal}: nothing can be weighed without it; add [signals.{signal}]"
+            yield f"{signal_map.name} maps no {signal}, which every estimate needs: add [signals.{signal}]"
     if not mapped & {Signal.SPEED, Signal.WHEEL_SPEED}:
-        yield f"{signal_map.name} maps no speed: nothing can be weighed without it; add [signals.speed]"
+        yield f"{signal_map.name} maps no speed, which every estimate needs: add [signals.speed]"
 
 
 def _store_that_cannot_be_written(directory: Path) -> Iterator[str]:
-    """Another user's folder is that user's to write: of it nothing is said."""
+    """Another user's folder is for that user to write: it is not checked."""
     there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
     if not there.is_dir():
         yield f"[store] directory = {directory}: {there} is a file; name a folder"
     elif os.statvfs(there).f_flag & os.ST_RDONLY:
-        yield f"[store] directory = {directory}: lies on a file system that can only be read; name a folder elsewhere"
+        yield f"[store] directory = {directory}: is on a read-only file system; name a folder elsewhere"
     elif not os.access(there, os.W_OK | os.X_OK) and (there != directory or there.stat().st_uid == os.geteuid()):
         yield f"[store] directory = {directory}: {there} cannot be written; chmod u+w it, or name another folder"
 
 
 def _has_tokens(settings: Settings) -> bool:
-    """Whether the service has tokens; true too where others may not look: it is the service's own folder."""
+    """Whether the service has tokens; also true if we may not look: the folder is the service's own."""
     try:
         return bool(TokenFile(settings.store.directory / "tokens.json").tokens())
     except ConfigurationError:

@@ -1,4 +1,4 @@
-"""How the service is, gathered from all its parts for the web and for systemd."""
+"""The state of the service, gathered from all its parts for the web and for systemd."""
 
 import time
 from collections.abc import Callable
@@ -40,7 +40,7 @@ SPEED_LOST_S = 10.0  # without a valid speed for this long the service waits for
 
 
 class StatusReport:
-    """Callable that tells the present :class:`Status`; quick, and safe from any thread."""
+    """Callable that gives the present :class:`Status`; quick, and safe from any thread."""
 
     def __init__(
         self,
@@ -113,7 +113,7 @@ class StatusReport:
         )
 
     def _why_not_ready(self, state: State) -> str | None:
-        """Why no estimate can come; None where it can. A sleeping bus or a parked vehicle is no reason."""
+        """Why no estimate is possible; None if one is. A sleeping bus or a parked vehicle is no reason."""
         if state is State.READER_FAULT:
             return self._source.reason
         if self._setup.calibration is None:
@@ -121,7 +121,7 @@ class StatusReport:
         return None
 
     def state(self) -> State:
-        """The first that holds, worst first."""
+        """The first that applies, worst first."""
         speed_age_s = self._age_s(Signal.SPEED)
         claims: tuple[tuple[State, Callable[[], bool]], ...] = (
             (State.READER_FAULT, lambda: self._source.state is SourceState.READER_FAULT),
@@ -138,7 +138,7 @@ class StatusReport:
         return next((state for state, holds in claims if holds()), State.ESTIMATING)
 
     def _is_a_sensor_silent(self) -> bool:
-        """Whether a sensor that every estimate needs says nothing; one not heard yet counts from the start."""
+        """Whether a sensor that every estimate needs is silent; one not received yet counts from the start."""
         running_s = time.monotonic() - self._started
         ages_s = [self._age_s(signal) for signal in NEEDED_SENSORS if signal in self._setup.signal_map.signals]
         return any((running_s if age_s is None else age_s) > SENSOR_LOST_S for age_s in ages_s)
@@ -190,7 +190,7 @@ class StatusReport:
         return tuple(health)
 
     def _own_readings(self) -> tuple[OwnReading, ...]:
-        """In the units in which people read them."""
+        """In the units that people use."""
         readings = sorted(self._pipeline.watch.readings.items())
         return tuple(
             OwnReading(signal=str(signal), number=round(reading / of_unit, 3), unit=unit, age_s=age_s)
@@ -207,7 +207,7 @@ class StatusReport:
         )
 
     def _similar(self, signal: Signal) -> tuple[str, ...]:
-        """What was heard around that is like a silent signal's message."""
+        """Identifiers in the last survey that resemble a silent signal's message."""
         age_s = self._age_s(signal)
         heard = self._around.heard
         if not heard or (age_s is not None and age_s < SENSOR_LOST_S):

@@ -75,7 +75,7 @@ def test_a_damaged_object_costs_itself_alone(read):
 def test_a_file_damaged_between_containers_ends_there(read):
     frames, report = read(lambda content: content.replace(b"LOBJ", b"JUNK").replace(b"JUNK", b"LOBJ", 3), method=2)
     assert 50 < len(frames) < 70
-    assert report.ended_early == "the file is damaged: where an object should begin there is none"
+    assert report.ended_early == "the file is damaged: no object begins where one should"
 
 
 def test_a_container_packed_by_an_unknown_method_is_counted(read):

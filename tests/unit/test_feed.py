@@ -300,7 +300,7 @@ def test_the_command_tells_what_it_did_and_that_the_wrong_axis_is_up(tmp_path: P
     assert told["gravity_mps2"] == pytest.approx(0.0, abs=0.1)
     assert "name it by --up" in result.stderr
     empty = CliRunner().invoke(springscale, ["feed", *options[:6], "--sysfs", str(tmp_path / "none")])
-    assert "nothing to feed" in str(empty.exception)
+    assert "nothing to send" in str(empty.exception)
 
 
 def test_the_unit_calls_the_command_as_it_is() -> None:

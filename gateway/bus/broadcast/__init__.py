@@ -1,6 +1,6 @@
-"""Weights onto another CAN bus, for who asked for it: J1939 frames at a steady pace.
+"""Weights onto another CAN bus, if the settings ask for it: J1939 frames at a steady pace.
 
-What is weighed now comes in; frames go out on an interface of their own. The interface that is listened to is opened
+The present weights come in; frames go out on an interface of their own. The interface that is listened to is opened
 elsewhere (``bus.live``) and never sent on.
 """
 

@@ -17,9 +17,9 @@ STOP_WITHIN_S: Final = 1.0
 
 
 class Broadcaster:
-    """Sends what ``weighed_now`` says every ``every_s`` seconds until :meth:`stop`.
+    """Sends the weights of ``weighed_now`` every ``every_s`` seconds until :meth:`stop`.
 
-    ``weighed_now`` returns None for what is too old to be told. ``fault`` says why nothing is sent, for people.
+    ``weighed_now`` returns None if the estimate is too old to be sent. ``fault`` says why nothing is sent, for people.
     """
 
     NAME: ClassVar = "sender of weights"
@@ -47,7 +47,7 @@ class Broadcaster:
         self._thread.start()
 
     def stop(self, within_s: float = STOP_WITHIN_S) -> None:
-        """Send no more; a bus that takes no frame may keep its thread a little longer than this waits."""
+        """Stop sending; a bus that takes no frame may keep its thread a little longer than this waits."""
         self._stopping.set()
         self._thread.join(within_s)
 
@@ -79,7 +79,7 @@ class Broadcaster:
                 self._stopping.wait(self._every_s)
 
     def _note(self, fault: str | None) -> None:
-        """Tell a fault, and its end, once."""
+        """Log a fault, and its end, once."""
         if fault != self._fault:
             level = logging.INFO if fault is None else logging.WARNING
             event = Event.BROADCASTING if fault is None else Event.NOT_BROADCASTING

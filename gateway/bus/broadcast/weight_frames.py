@@ -21,9 +21,9 @@ _GROUP: Final = 0x3FFFF00  # the bits of an identifier that name the parameter g
 
 @dataclass(frozen=True, slots=True)
 class Sender:
-    """Who sends, and how urgently (SAE J1939-21, 5.2). The front axle has the number ``first_axle``.
+    """Source address and priority (SAE J1939-21, 5.2). The front axle has the number ``first_axle``.
 
-    What a vehicle draws its springs do not tell: with ``draws_trailers`` the combination's weight stays unknown.
+    The springs do not measure a trailer: with ``draws_trailers`` the combination's weight stays unknown.
     """
 
     source_address: int
@@ -40,7 +40,7 @@ class WeightFrames:
         self._sender = sender
 
     def of(self, shown: Estimate | None, t_ns: int) -> Frames:
-        """Frames (3,) stamped ``t_ns``; "not available" is every number that ``shown`` does not know, or None."""
+        """Frames (3,) stamped ``t_ns``; every number that ``shown`` lacks, or all if it is None, is "not available"."""
         weights = UNWEIGHED if shown is None else shown.weights
         counts = counts_of(shown, weights, draws_trailers=self._sender.draws_trailers)
         first = self._sender.first_axle
@@ -61,7 +61,7 @@ class WeightFrames:
         return self._sender.priority << _PRIORITY_SHIFT | group | self._sender.source_address | EXTENDED_ID
 
     def _encoded(self, name: str, known: Mapping[str, int]) -> bytes:
-        """The eight bytes; bits that belong to nothing are set, as J1939 has it."""
+        """The eight bytes; unused bits are set, as J1939 requires."""
         message = self._database.get_message_by_name(name)
         raw = {signal.name: known.get(signal.name, NOT_AVAILABLE) for signal in message.signals}
         return bytes(message.encode(raw, scaling=False, padding=True, strict=False))

@@ -1,6 +1,6 @@
 """Sensors without a CAN bus, fed onto one: an inertial unit of Linux IIO and a receiver behind gpsd become frames.
 
-The frames are those of dbc/springscale_reference.dbc, so that everything behind the bus is the same pipeline.
+The frames are those of dbc/springscale_reference.dbc, so the pipeline behind the bus is the same.
 """
 
 from gateway.bus.feed.feeder import Feeder, FeedState

@@ -58,7 +58,7 @@ class Numbering:
         self._usual_ns: deque[int] = deque([round(1e9 / rate_hz)], maxlen=USUAL_OF)
 
     def of(self, t_ns: I64) -> I64:
-        """Numbers (n,) of samples at these times, rising; a hole counts as what would have filled it."""
+        """Sample numbers (n,) of these rising times; a gap counts as the samples that would have filled it."""
         numbers = np.empty(len(t_ns), np.int64)
         for i, now_ns in enumerate(t_ns.tolist()):
             wait_ns = now_ns - self._last_ns if self._last_ns is not None else 0
@@ -95,7 +95,7 @@ class Feeder:
         self._stopping.set()
 
     def run(self, on_tick: Callable[[FeedState], None] = lambda state: None) -> None:
-        """Feed; on_tick about twice a second. Raises BusError where a device cannot be opened or is gone."""
+        """Feed; on_tick about twice a second. Raises BusError if a device cannot be opened or has gone."""
         threads = [threading.Thread(target=self._read_imu, args=(each,), name=each.name) for each in self._devices]
         threads += [threading.Thread(target=self._read_gps, args=(self._gps,), name="gpsd")] if self._gps else []
         try:
@@ -174,7 +174,7 @@ class Feeder:
         return self._encoder.encode(message, t_ns, {**columns, **more})
 
     def _follow_gravity(self, accel_mps2: F64) -> None:
-        """A slow mean of what the axis that should be up reads."""
+        """A slow mean of the axis that should point up."""
         for z in accel_mps2[:, 2].tolist():
             before = self.state.gravity_mps2
             self.state.gravity_mps2 = z if before != before else before + (z - before) / 500.0  # noqa: PLR0124 # NaN
@@ -192,7 +192,7 @@ class Feeder:
         gps.close()
 
     def _fix(self, fix: Fix, now_ns: I64) -> Frames:
-        """Speed with the kind of fix, none without a speed; and the place."""
+        """Speed with the kind of fix, no frame without a speed; and the position."""
         mode = fix.mode if fix.speed_mps is not None else 0
         told = {"Speed": fix.speed_mps or 0.0, "Fix": float(mode), "Satellites": float(fix.n_satellites)}
         place = {"Latitude": fix.latitude_deg, "Longitude": fix.longitude_deg}
@@ -209,7 +209,7 @@ class Feeder:
             self.state.n_dropped += len(frames)
 
     def _note(self, what: str, fault: str | None) -> None:
-        """Tell a fault, and its end, once."""
+        """Log a fault, and its end, once."""
         if fault != self.state.faults.get(what):
             self._say(fault or f"{what}: works again")
         if fault is None:

@@ -1,7 +1,7 @@
 """A satellite receiver behind gpsd: its JSON reports over TCP (gpsd_json(5)).
 
-A TPV report has ``mode`` (0 and 1 no fix, 2 two dimensions, 3 three), and where there is a fix ``speed`` in m/s,
-``lat`` and ``lon`` in degrees; a SKY report has ``uSat``, the satellites used.
+A TPV report has ``mode`` (0 and 1 no fix, 2 two dimensions, 3 three), and with a fix ``speed`` in m/s, ``lat`` and
+``lon`` in degrees; a SKY report has ``uSat``, the satellites used.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ CONNECT_S: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """One report; speed and place are NaN-free or None. mode as in dbc/springscale_reference.dbc: 0, 2 or 3."""
+    """One report; speed and position are finite or None. mode as in dbc/springscale_reference.dbc: 0, 2 or 3."""
 
     mode: int
     speed_mps: float | None
@@ -39,7 +39,7 @@ class Gpsd:
         self._n_satellites = 0
 
     def read(self, timeout_s: float) -> list[Fix]:
-        """Fixes that came within ``timeout_s``. Raises BusError where gpsd does not answer or hangs up."""
+        """Fixes that came within ``timeout_s``. Raises BusError if gpsd does not answer or hangs up."""
         try:
             if self._socket is None:
                 self._socket = socket.create_connection(self._address, CONNECT_S)
@@ -55,7 +55,7 @@ class Gpsd:
             raise BusError(f"{self.name}: {fault.strerror or fault}") from None
         if not got or len(self._rest) > LONGEST_LINE:
             self.close()
-            raise BusError(f"{self.name}: hung up" if not got else f"{self.name}: sends what is no JSON")
+            raise BusError(f"{self.name}: hung up" if not got else f"{self.name}: sends something that is not JSON")
         *lines, self._rest = (self._rest + got).split(b"\n")
         return [fix for line in lines if (fix := self._fix(line)) is not None]
 
@@ -67,7 +67,7 @@ class Gpsd:
         self._socket, self._rest = None, b""
 
     def _fix(self, line: bytes) -> Fix | None:
-        """None for what is no fix: other reports, and lines that are no JSON."""
+        """None unless it is a fix: other reports, and lines that are not JSON."""
         try:
             report: Any = json.loads(line)
         except ValueError:

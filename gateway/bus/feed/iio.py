@@ -1,9 +1,9 @@
 """An inertial unit of the Linux kernel: Industrial I/O, read through its buffer with its own time stamps.
 
 Documentation/ABI/testing/sysfs-bus-iio and Documentation/driver-api/iio/buffers.rst of the kernel: scan_elements say
-which channels lie in a scan, in which order (_index) and how ([be|le]:[s|u]bits/storagebits[>>shift], _type); each lies
-at a multiple of its own size, and so does a whole scan. (raw + _offset) * _scale is in m/s2 and rad/s. A mount matrix
-turns the chip's axes to the board's. in_timestamp is in nanoseconds of the clock that current_timestamp_clock names.
+which channels a scan contains, in which order (_index) and how ([be|le]:[s|u]bits/storagebits[>>shift], _type); each is
+aligned to its own size, and so is a whole scan. (raw + _offset) * _scale is in m/s2 and rad/s. A mount matrix turns the
+chip's axes to the board's. in_timestamp is in nanoseconds of the clock that current_timestamp_clock names.
 """
 
 import contextlib
@@ -33,7 +33,7 @@ _TYPE: Final = re.compile(r"(be|le):([su])(\d+)/(\d+)(?:X1)?(?:>>(\d+))?\s*$")
 
 @dataclass(frozen=True, slots=True)
 class _Element:
-    """Where one channel lies in a scan, and what its bits mean."""
+    """The position of one channel in a scan, and the meaning of its bits."""
 
     name: str
     dtype: np.dtype[np.generic]
@@ -66,7 +66,7 @@ class _Element:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """One read of a device: t_ns (n,), and m/s2 and rad/s (n, 3) where the device has such a sensor."""
+    """One read of a device: t_ns (n,), and m/s2 and rad/s (n, 3) if the device has such a sensor."""
 
     t_ns: I64
     accel_mps2: F64 | None
@@ -77,7 +77,7 @@ class IioDevice:
     """One device: opened, its buffer enabled, read until closed. turn (3, 3): rows forward, left, up in its axes."""
 
     def __init__(self, folder: Path, turn: F64, rate_hz: float, nodes: Path = NODES) -> None:
-        """Raises ConfigurationError for what is no inertial unit with a buffer."""
+        """Raises ConfigurationError unless it is an inertial unit with a buffer."""
         self.folder = folder
         self.name = self._text("name") or folder.name
         self._node = nodes / folder.name
@@ -98,14 +98,14 @@ class IioDevice:
 
     @property
     def rate_hz(self) -> float:
-        """As the driver tells it, else as it was asked for."""
+        """As the driver reports it, else as requested."""
         for name in ("sampling_frequency", *(f"in_{kind}_sampling_frequency" for kind in self.kinds)):
             with contextlib.suppress(ValueError):
                 return float(self._text(name) or "")
         return self._wanted_hz
 
     def open(self) -> None:
-        """Choose the channels, set the rate and start the buffer. Raises BusError where the kernel refuses."""
+        """Choose the channels, set the rate and start the buffer. Raises BusError if the kernel refuses."""
         try:
             self._write("buffer/enable", "0")
             for each in sorted((self.folder / "scan_elements").glob("*_en")):
@@ -136,7 +136,9 @@ class IioDevice:
             self._write("buffer/enable", "0")
 
     def read(self, timeout_s: float) -> Samples | None:
-        """What came since the last read, in the vehicle's axes; None where nothing did. Raises BusError at its end."""
+        """The samples since the last read, in the vehicle's axes; None if there are none. Raises BusError at its
+        end.
+        """
         if not select.select([self._file], [], [], timeout_s)[0]:
             return None
         try:
@@ -164,7 +166,7 @@ class IioDevice:
         return vehicle
 
     def _mount(self, kind: str) -> F64:
-        """The mount matrix (3, 3); the identity where the driver tells none."""
+        """The mount matrix (3, 3); the identity if the driver has none."""
         text = self._text(f"in_{kind}_mount_matrix") or self._text("in_mount_matrix") or "1,0,0;0,1,0;0,0,1"
         return np.array([[float(x) for x in row.split(",")] for row in text.split(";")])
 
@@ -192,14 +194,14 @@ class IioDevice:
         return elements, at + -at % widest
 
     def _number(self, name: str, what: str, default: float) -> float:
-        """in_accel_x_scale, or in_accel_scale for the three of them."""
+        """in_accel_x_scale, or in_accel_scale for all three."""
         for each in (f"{name}_{what}", f"{name.rpartition('_')[0]}_{what}"):
             if self._has(each):
                 return float(self._text(each) or default)
         return default
 
     def _nearest(self, name: str) -> float:
-        """The wanted rate, or the lowest above it of those there are, else the highest."""
+        """The requested rate, or the lowest available one above it, else the highest."""
         told = self._text(f"{name}_available") or ""
         if not told or told.startswith("["):
             return self._wanted_hz
@@ -217,7 +219,7 @@ class IioDevice:
 
 
 def find_devices(turn: F64, rate_hz: float, sysfs: Path = SYSFS, nodes: Path = NODES) -> Iterator[IioDevice]:
-    """Every inertial unit there is: the first accelerometer and the first gyroscope, which may be one device."""
+    """The default inertial units: the first accelerometer and the first gyroscope, which may be one device."""
     missing = set(KINDS)
     for folder in sorted(sysfs.glob("iio:device*")):
         with contextlib.suppress(ConfigurationError):
@@ -228,7 +230,7 @@ def find_devices(turn: F64, rate_hz: float, sysfs: Path = SYSFS, nodes: Path = N
 
 
 def turned(forward: str, up: str) -> F64:
-    """Rows forward, left, up by the names of the device's axes. Raises ConfigurationError where they are one line."""
+    """Rows forward, left, up by the names of the device's axes. Raises ConfigurationError if they lie on one line."""
     ahead, upward = AXES[forward], AXES[up]
     if abs(float(ahead @ upward)) > 0.5:
         raise ConfigurationError(f"forward {forward} and up {up} are one line: name two axes of the sensor")

@@ -1,7 +1,7 @@
-"""A live CAN interface: the thread that receives, the bounded inbox behind it, and what state the bus is in.
+"""A live CAN interface: the receiving thread, its bounded inbox, and the state of the bus.
 
-An interface's name and the identifiers wanted come in; frames go out in order of arrival (``LiveSource``), with
-every loss counted. Errors of a bus end in waiting and opening it anew, never in a dead thread.
+An interface's name and the wanted identifiers come in; frames go out in order of arrival (``LiveSource``), with every
+loss counted. After a bus error the thread waits and opens the bus again; it never dies.
 """
 
 from gateway.bus.live.around import Around, around_of

@@ -1,7 +1,7 @@
-"""Who else speaks on the bus while a mapped message is missing: every identifier, for two seconds, now and then.
+"""Surveys the bus while a mapped message is missing: every identifier, for two seconds, now and then.
 
-The service listens through filters, so it never hears a sensor that was set to another identifier. A channel that one
-program alone may open, such as a serial adapter, is left alone.
+The service listens through filters, so it never hears a sensor that was set to another identifier. A channel that only
+one program may open, such as a serial adapter, is left alone.
 """
 
 import threading
@@ -28,10 +28,10 @@ EVERY_IDENTIFIER: Final = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTEN
 
 
 class Around:
-    """Looks around in a thread of its own, for as long as a look takes; never sends."""
+    """Surveys the bus in a thread that lives as long as one survey; never sends."""
 
     def __init__(self, open_receiver: OpenReceiver | None) -> None:
-        """``open_receiver`` opens the channel once more, unfiltered; None where that would disturb the first."""
+        """``open_receiver`` opens the channel once more, unfiltered; None if that would disturb the first."""
         self._open = open_receiver
         self._heard: tuple[Heard, ...] = ()
         self._begun_s = -EVERY_S
@@ -40,11 +40,11 @@ class Around:
 
     @property
     def heard(self) -> tuple[Heard, ...]:
-        """Every identifier of the last look; none before the first."""
+        """Every identifier of the last survey; none before the first."""
         return self._heard
 
     def look(self) -> None:
-        """Begin to look around, unless a look is under way or was just taken."""
+        """Begin a survey, unless one is under way or has just ended."""
         is_looking = self._thread is not None and self._thread.is_alive()
         is_early = time.monotonic() - self._begun_s < EVERY_S
         if self._open is None or is_looking or is_early or self._stopping.is_set():
@@ -54,11 +54,11 @@ class Around:
         self._thread.start()
 
     def forget(self) -> None:
-        """What was heard is no longer of interest; the next silence is looked into at once."""
+        """Discard the last survey; the next silence starts one at once."""
         self._heard, self._begun_s = (), -EVERY_S
 
     def stop(self, within_s: float = STOP_WITHIN_S) -> None:
-        """End a look that is under way; a channel that does not open keeps its thread a little longer."""
+        """End a survey under way; a channel that does not open keeps its thread a little longer."""
         self._stopping.set()
         if self._thread is not None:
             self._thread.join(within_s)
@@ -76,7 +76,7 @@ class Around:
 
 
 def around_of(interface: str, channel: str, options: Mapping[str, Any]) -> Around:
-    """For channels that several may listen to: the kernel's, and the in-process one."""
+    """For channels that several programs may open: the kernel's, and the in-process one."""
     if interface == "socketcan":
         return Around(lambda: open_socketcan(channel, EVERY_IDENTIFIER, CAN_FD_BYTES))
     if interface == "virtual":

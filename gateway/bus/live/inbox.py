@@ -1,4 +1,4 @@
-"""The bounded queue between the receive thread and the pipeline: nothing leaves it uncounted."""
+"""The bounded queue between the receive thread and the pipeline: every loss is counted."""
 
 import threading
 import time
@@ -10,8 +10,8 @@ from gateway.records import Frames
 class Inbox:
     """Frames in order of arrival; one thread puts, one drains.
 
-    When it is full, new frames are dropped and counted. With ``waits_for_room`` the putting thread waits
-    instead: right for an in-process bus, whose sender can wait, wrong for a real one.
+    When it is full, new frames are dropped and counted. With ``waits_for_room`` the putting thread waits instead: right
+    for an in-process bus, whose sender can wait, wrong for a real one.
     """
 
     def __init__(self, capacity_frames: int, width: int, *, waits_for_room: bool = False) -> None:
@@ -33,7 +33,7 @@ class Inbox:
         return self._n_waiting
 
     def put(self, frames: Frames) -> None:
-        """Add a burst; what finds no room is dropped and counted."""
+        """Add a burst; frames without room are dropped and counted."""
         with self._changed:
             if self._waits_for_room:
                 self._changed.wait_for(lambda: self._n_waiting < self._capacity or self._is_closed)
@@ -47,7 +47,7 @@ class Inbox:
                 self._changed.notify_all()
 
     def drain(self, timeout_s: float) -> Frames | None:
-        """Everything that waits, at once; None where nothing came within ``timeout_s``."""
+        """All waiting frames at once; None if there are none within ``timeout_s``."""
         deadline = time.monotonic() + timeout_s
         with self._changed:
             while not self._bursts and not self._is_closed:
@@ -59,7 +59,7 @@ class Inbox:
         return join(bursts, self._width) if bursts else None
 
     def close(self) -> None:
-        """Nothing more will come: wakes whoever waits. What is inside can still be drained."""
+        """Close for new frames and wake the waiting thread. The frames inside can still be drained."""
         with self._changed:
             self._is_closed = True
             self._changed.notify_all()

@@ -19,7 +19,7 @@ from gateway.records import EXTENDED_ID
 BURST_FRAMES: Final = 1024
 VIRTUAL_QUEUE_FRAMES: Final = 4096  # an in-process sender waits when it is full
 
-# What makes an interface acknowledge nothing and send nothing, where python-can has a name for it
+# The options that make an interface acknowledge nothing and send nothing, if python-can has a name for it
 _LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
     "slcan": {"listen_only": True},
     "vector": {"listen_only": True},
@@ -54,9 +54,9 @@ class PythonCanReceiver:
         self._fault: Exception | None = None
 
     def receive(self, timeout_s: float) -> Burst:
-        """What has come, waiting up to ``timeout_s`` for a first message. Raises can.CanError or OSError.
+        """The received messages, waiting up to ``timeout_s`` for a first one. Raises can.CanError or OSError.
 
-        What came before a fault is given first.
+        Messages from before a fault are given first.
         """
         messages: list[can.Message] = []
         try:
@@ -68,7 +68,7 @@ class PythonCanReceiver:
         except (OSError, can.CanError) as fault:
             self._fault = fault
         except (ValueError, LookupError) as fault:
-            # python-can's parsers raise what noise makes int() or an index raise
+            # python-can's parsers raise whatever int() or an index raises on noise
             self._fault = can.CanOperationError(
                 f"what the adapter sends cannot be read ({fault}): check its cable and its speed ([bus] options)"
             )
@@ -100,8 +100,8 @@ def open_python_can(
 ) -> PythonCanReceiver:
     """Open a python-can bus for listening, filtered as far as the interface can.
 
-    Raises BusError where its driver or an option is not to be had, can.CanError or OSError where the
-    device is absent or busy.
+    Raises BusError if its driver is missing or an option is wrong, can.CanError or OSError if the device is absent or
+    busy.
     """
     arguments = {**_LISTEN_ONLY.get(interface, {}), **options}
     try:
@@ -116,15 +116,15 @@ def open_python_can(
 
 
 def require_known_interface(interface: str) -> None:
-    """Raise BusError, naming those there are, for an interface python-can does not know."""
+    """Raise BusError, with the names of the known ones, for an interface python-can does not know."""
     if interface not in can.VALID_INTERFACES:
-        raise BusError(f"[bus] interface {interface!r} is unknown; there are {', '.join(sorted(can.VALID_INTERFACES))}")
+        raise BusError(f"[bus] interface {interface!r} is unknown; known are {', '.join(sorted(can.VALID_INTERFACES))}")
 
 
 def what_lacks(interface: str) -> str | None:
-    """Why this interface cannot be used on this computer, and how to mend it; None where nothing is known to lack.
+    """Why this interface cannot be used on this computer, and how to mend it; None if nothing is known to be missing.
 
-    Drivers of adapters are not looked for: only opening the channel would tell.
+    Drivers of adapters are not checked: only opening the channel would show that.
     """
     try:
         require_known_interface(interface)
@@ -141,7 +141,7 @@ def what_lacks(interface: str) -> str | None:
 
 
 def usable_interfaces() -> tuple[str, ...]:
-    """Those that lack nothing we know of, but for the in-process one, which leads to no other program."""
+    """The usable interfaces, except the in-process one, which reaches no other program."""
     return tuple(sorted(name for name in can.VALID_INTERFACES if name != "virtual" and what_lacks(name) is None))
 
 

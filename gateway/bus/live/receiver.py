@@ -1,4 +1,4 @@
-"""What any way of receiving gives: bursts of frames and what else came by."""
+"""The interface of all receivers: bursts of frames and counts of everything else."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ BUS_OFF: Final = "bus_off"
 
 @dataclass(frozen=True, slots=True)
 class Burst:
-    """Frames that came together, in order of arrival, and the counts of what came between them."""
+    """Frames that came together, in order of arrival, and the counts of other events between them."""
 
     frames: Frames
     error_classes: Mapping[str, int] = field(default_factory=dict)
@@ -42,7 +42,7 @@ class Receiver(Protocol):
         ...
 
     def receive(self, timeout_s: float) -> Burst:
-        """What has come, waiting up to ``timeout_s`` for a first frame. Raises OSError or can.CanError."""
+        """The received frames, waiting up to ``timeout_s`` for a first one. Raises OSError or can.CanError."""
         ...
 
     def close(self) -> None:

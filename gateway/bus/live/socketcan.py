@@ -59,9 +59,9 @@ class SocketCanReceiver:
         return self._n_dropped
 
     def receive(self, timeout_s: float) -> Burst:
-        """One burst; empty where nothing came within ``timeout_s``. Raises OSError (ENETDOWN, ENODEV, ...).
+        """One burst; empty if nothing came within ``timeout_s``. Raises OSError (ENETDOWN, ENODEV, ...).
 
-        What came before a fault is given first.
+        Frames from before a fault are given first.
         """
         if self._fault is not None:
             raise self._fault
@@ -75,7 +75,7 @@ class SocketCanReceiver:
         self._socket.close()
 
     def _drain(self) -> tuple[list[bytes], list[bytes]]:
-        """The datagrams that wait, and the kernel's stamp of each (empty where it gave none)."""
+        """The waiting datagrams, and the kernel's stamp of each (empty if it gave none)."""
         receive = self._socket.recvmsg
         datagrams: list[bytes] = []
         stamps: list[bytes] = []
@@ -133,7 +133,7 @@ class SocketCanReceiver:
 def open_socketcan(channel: str, filters: Sequence[IdFilter], width: int) -> SocketCanReceiver:
     """Listen to a SocketCAN interface through kernel filters.
 
-    Raises BusError where this system has no SocketCAN, OSError where the interface is absent or down.
+    Raises BusError if this system has no SocketCAN, OSError if the interface is absent or down.
     """
     try:
         sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
@@ -167,7 +167,7 @@ def packed_filters(filters: Sequence[IdFilter]) -> bytes:
 
 
 def packets_received(channel: str) -> int:
-    """How many the interface has received, whatever our filters let through; 0 where it does not tell."""
+    """Number of frames the interface has received, before our filters; 0 if it does not say."""
     try:
         return int((Path("/sys/class/net") / channel / "statistics" / "rx_packets").read_text())
     except (OSError, ValueError):
@@ -175,7 +175,7 @@ def packets_received(channel: str) -> int:
 
 
 def _stamps_ns(stamps: Sequence[bytes]) -> tuple[I64, int]:
-    """Kernel stamps as ns (n,), and how many frames had none and got this moment instead."""
+    """Kernel stamps as ns (n,), and how many frames had none and got the present time instead."""
     if all(stamps):
         times = np.frombuffer(b"".join(stamps), _TIMESPEC)
         return times["seconds"].astype(np.int64) * NS_PER_S + times["nanoseconds"], 0

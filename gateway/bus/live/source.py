@@ -1,4 +1,4 @@
-"""The live source: a thread that listens to a CAN channel, whatever happens to it, and fills an inbox.
+"""The live source: a thread that listens to a CAN channel, survives its faults, and fills an inbox.
 
 Time is each frame's own: the kernel's stamp on SocketCAN, the driver's elsewhere, the recorded one on an
 in-process bus. A frame without any is stamped on receipt and counted.
@@ -44,7 +44,7 @@ _SYSTEM_REASONS: Final[Mapping[int, str]] = {
 
 
 class SourceState(StrEnum):
-    """How the source stands. A silent bus sleeps; a fault wants a person, or time."""
+    """How the source stands. A silent bus is asleep; a fault needs a person, or time."""
 
     STARTING = "starting"
     RECEIVING = "receiving"
@@ -63,7 +63,7 @@ _EVENTS: Final[Mapping[SourceState, Event]] = {  # that it stops is the service'
 
 @dataclass(frozen=True, slots=True)
 class SourceCounts:
-    """What came and what was lost since the start."""
+    """Frames received and lost since the start."""
 
     frames: int
     dropped_inbox: int
@@ -78,8 +78,8 @@ class SourceCounts:
 class LiveSource:
     """Listens to one channel in a thread of its own until stopped; never sends.
 
-    A channel that is down, removed, or not there yet is tried again and again with growing pauses; the
-    state and its reason say so meanwhile. What kills the thread all the same is kept in ``failure``.
+    A channel that is down, removed, or not there yet is tried again and again with growing pauses; meanwhile the state
+    and its reason say so. An exception that ends the thread all the same is kept in ``failure``.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class LiveSource:
         silence_s: float = 2.0,
         open_receiver: OpenReceiver | None = None,
     ) -> None:
-        """``open_receiver`` stands in for the interface (tests). Raises BusError on an unknown interface."""
+        """``open_receiver`` replaces the interface (tests). Raises BusError on an unknown interface."""
         require_known_interface(interface)
         self._interface, self._channel = interface, channel
         self._silence_s = silence_s
@@ -120,7 +120,7 @@ class LiveSource:
 
     @property
     def state(self) -> SourceState:
-        """How the source stands now."""
+        """The present state of the source."""
         return self._state
 
     @property
@@ -130,17 +130,17 @@ class LiveSource:
 
     @property
     def failure(self) -> BaseException | None:
-        """What killed the receive thread; None while it lives or after a proper stop."""
+        """The exception that ended the receive thread; None while it lives or after a proper stop."""
         return self._failure
 
     def start(self) -> None:
-        """Begin to listen; returns once the channel was opened, or failed to open, a first time."""
+        """Begin to listen; returns once the first attempt to open the channel has succeeded or failed."""
         self._state = SourceState.STARTING
         self._thread.start()
         self._has_tried.wait(START_WAIT_S)
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """End the thread and close the channel. What the inbox holds can still be drained."""
+        """End the thread and close the channel. The frames in the inbox can still be drained."""
         self._stopping.set()
         self.inbox.close()
         if self._thread.ident is not None:
@@ -189,7 +189,7 @@ class LiveSource:
             self._stopping.wait(pause_s)
 
     def _listen(self, receiver: Receiver) -> None:
-        """Receive until stopped; OSError or can.CanError where the channel fails."""
+        """Receive until stopped; OSError or can.CanError if the channel fails."""
         self._receiver = receiver
         heard_s = time.monotonic()
         is_bus_off = False
@@ -229,7 +229,9 @@ class LiveSource:
         self._state, self._reason = state, reason
 
     def _silence(self) -> str:
-        """Why nothing comes: the bus sleeps, or it talks of other things (frames seen since the silence began)."""
+        """Why no frames come: the bus is asleep, or it carries other messages only (frames seen since the silence
+        began).
+        """
         n_seen = self._packets_received(self._channel)
         if self._state is not SourceState.BUS_SILENT:
             self._seen_at_silence = n_seen
@@ -242,7 +244,7 @@ class LiveSource:
 
 
 def system_reason(fault: Exception, channel: str) -> str:
-    """Why ``channel`` cannot be used, in words with what to do where the system's own do not say it."""
+    """Why ``channel`` cannot be used, with what to do if the system's own words do not say it."""
     number = fault.errno if isinstance(fault, OSError) else getattr(fault, "error_code", None)
     reason = _SYSTEM_REASONS.get(number or 0, str(fault) or type(fault).__name__)
     return reason.format(channel=channel)

@@ -1,7 +1,7 @@
 """Bulk reader of Vector's binary logs (.blf): whole containers at once, the objects of a kind as one table.
 
 No specification is published; the layout is the one python-can reads, which follows T. Lorenz' Vector BLF. python-can
-is the truth: a property test holds every frame to it.
+is the reference: a property test compares every frame with it.
 """
 
 from collections.abc import Iterator
@@ -54,7 +54,7 @@ _STORED, _DEFLATED = 0, 2
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """Where a kind of object keeps its frame, and the flag of a remote one. An extension may follow the payload."""
+    """Where each kind of object stores its frame, and the flag of a remote one. An extension may follow the payload."""
 
     body: np.dtype[np.void]
     remote: int
@@ -92,8 +92,8 @@ _MARGIN: Final = _HEADER_BYTES[2] + max(kind.body.itemsize for kind in _KINDS.va
 def read_blf(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
     """The selected frames in order of arrival, in chunks, stamps to the microsecond as every other format's.
 
-    What is damaged is passed over and counted, a file that is cut gives what it holds. Raises LogUnreadableError where
-    it is no BLF at all.
+    Damaged parts are skipped and counted; a truncated file is read as far as it goes. Raises LogUnreadableError if it
+    is no BLF at all.
     """
     with open_log_file(path) as file:
         header = _header(path, file)
@@ -107,12 +107,12 @@ def read_blf(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
 def _header(path: Path, file: BinaryIO) -> np.void:
     head = file.read(_FILE_HEADER.itemsize)
     if len(head) < _FILE_HEADER.itemsize or not head.startswith(b"LOGG"):
-        raise LogUnreadableError(f"{path}: cannot be read as .blf: it does not begin as one")
+        raise LogUnreadableError(f"{path}: cannot be read as .blf: it does not begin like one")
     return cast(np.void, np.frombuffer(head, _FILE_HEADER)[0])
 
 
 def _start_ns(header: np.void) -> int:
-    """The measurement's start; 0, and stamps are relative, where none is written.
+    """The measurement's start; 0, and stamps are relative, if the file has none.
 
     Behind an impossible one no stamp is sound.
     """
@@ -126,13 +126,13 @@ def _start_ns(header: np.void) -> int:
 
 
 def _contents(file: BinaryIO, header: np.void, report: LogReport) -> Iterator[bytes | None]:
-    """What the containers hold, one after the other, None for one that is damaged."""
+    """The contents of the containers, one after the other, None for a damaged one."""
     n_read = _FILE_HEADER.itemsize + len(file.read(max(0, int(header["bytes"]) - _FILE_HEADER.itemsize)))
     try:
         while len(head := file.read(_BASE_BYTES)) == _BASE_BYTES:
             n_bytes, kind = int.from_bytes(head[8:12], "little"), int.from_bytes(head[12:], "little")
             if not (head.startswith(_SIGNATURE) and _BASE_BYTES <= n_bytes <= MOST_BYTES):
-                raise OSError("the file is damaged: where an object should begin there is none")
+                raise OSError("the file is damaged: no object begins where one should")
             body = file.read(n_bytes - _BASE_BYTES)
             n_read += _BASE_BYTES + len(body) + len(file.read(n_bytes % 4))
             yield _inflated(body, report) if kind == _CONTAINER else head + body
@@ -143,7 +143,7 @@ def _contents(file: BinaryIO, header: np.void, report: LogReport) -> Iterator[by
 
 
 def _inflated(body: bytes, report: LogReport) -> bytes | None:
-    """What a container holds, as far as it is there."""
+    """The content of a container, as far as it is there."""
     method = int.from_bytes(body[:2], "little")
     try:
         if method in (_STORED, _DEFLATED):
@@ -166,7 +166,7 @@ class _Reader:
         self._is_torn = False  # what comes next may begin in the middle of an object
 
     def read(self, content: bytes | None) -> Frames:
-        """The wanted frames of the objects that are whole by now."""
+        """The wanted frames of the objects that are complete by now."""
         if content is None:
             self._rest, self._is_torn = b"", True
             return empty_frames(self._width)
@@ -181,7 +181,7 @@ class _Reader:
         return self._frames(text, begins[:n_whole])
 
     def _count_gaps(self, begins: I64, ends: I64) -> None:
-        """Count what lies between objects and is more than padding."""
+        """Count bytes between objects that are more than padding."""
         gaps = begins - np.concatenate(([0], ends[:-1]))[: len(begins)]
         if self._is_torn:
             gaps = gaps[1:]
@@ -206,7 +206,7 @@ class _Reader:
         return in_order(places, parts, self._width)
 
     def _frames_of(self, kind: _Kind, text: U8, at: I64, header_bytes: int) -> tuple[I64, Frames]:
-        """Of objects of one kind the wanted rows, and their frames."""
+        """The wanted rows of objects of one kind, and their frames."""
         bodies = _table(text, at + header_bytes, kind.body)
         can_id = bodies["id"] & np.uint32(0x9FFF_FFFF)
         channel = bodies["channel"].astype(np.int64) - 1  # as python-can counts them, from 0
@@ -237,7 +237,7 @@ class _Reader:
 
 
 def _objects(text: U8, n: int) -> tuple[I64, I64]:
-    """Where the objects of ``text[:n]`` begin and end, in order. The last may end beyond ``n``."""
+    """Begin and end of the objects of ``text[:n]``, in order. The last may end beyond ``n``."""
     begins = np.flatnonzero(text[:n] == _SIGNATURE[0])
     begins = begins[_column(text, begins, "<u4") == int.from_bytes(_SIGNATURE, "little")]
     n_bytes = _column(text, begins + 8, "<u4").astype(np.int64)
@@ -254,7 +254,7 @@ def _objects(text: U8, n: int) -> tuple[I64, I64]:
 
 
 def _column(text: U8, at: I64, number: str) -> NDArray[Any]:
-    """The numbers that begin at ``at`` (n,), wherever that is."""
+    """The numbers that begin at ``at`` (n,), aligned or not."""
     size = np.dtype(number).itemsize
     return np.ndarray(len(text) - size + 1, number, buffer=text, strides=(1,))[at]
 

@@ -1,8 +1,8 @@
 """Bulk reader of candump logs: the wanted frames of a text log as columns, at some 30 million lines a second.
 
-Every ``#`` is found by numpy; the eight bytes before it, one integer, tell the identifier. Lines of wanted
-frames are then read by shape, all lines of a shape at once; whatever has no common shape is read exactly,
-one by one, and counted where it holds no frame. Lines of other identifiers are passed over unread.
+numpy finds every ``#``; the eight bytes before it, read as one integer, give the identifier. Lines of wanted frames are
+then read by shape, all lines of a shape at once; lines without a common shape are read exactly, one by one, and counted
+if they contain no frame. Lines of other identifiers are passed over unread.
 """
 
 from collections.abc import Iterator, Sequence
@@ -38,8 +38,8 @@ def read_candump(
 ) -> Iterator[Frames]:
     """Frames that pass one of ``filters``, of ``channel`` or of all, in order of arrival, in chunks.
 
-    ``width`` is that of the payload rows (8, or 64 for CAN FD). Nothing in the log ends the run: see
-    LogReport. Raises LogUnreadableError where the file cannot be opened.
+    ``width`` is that of the payload rows (8, or 64 for CAN FD). No content of the log ends the run: see LogReport.
+    Raises LogUnreadableError if the file cannot be opened.
     """
     report = LogReport(Path(path)) if report is None else report
     reader = _Reader(filters, channel, width, report)
@@ -58,7 +58,7 @@ class IdPattern:
 
     @classmethod
     def of_filter(cls, id_filter: IdFilter) -> "IdPattern":
-        """Text that every identifier passing the filter has; where single bits are masked, others have it too."""
+        """Text that every identifier passing the filter has; if single bits are masked, others have it too."""
         is_extended = bool(id_filter.can_id & EXTENDED_ID)
         n_digits, all_bits = (8, 0x1FFF_FFFF) if is_extended else (3, 0x7FF)
         text = "" if is_extended else " "
@@ -74,7 +74,7 @@ class IdPattern:
 
 
 class _Reader:
-    """Reads block after block; remembers the shapes it has learned and the lines it has passed."""
+    """Reads block after block; keeps the shapes it has learned and the number of lines read."""
 
     def __init__(self, filters: Sequence[IdFilter], channel: str | None, width: int, report: LogReport) -> None:
         self._filters = filters
@@ -114,7 +114,7 @@ class _Reader:
         return hashes[is_hit & ~is_error] if n_errors else hashes[is_hit]
 
     def _wanted(self, block: LineBlock, hits: I64) -> Frames:
-        """The frames of the hits: by every shape known, then, line by line, by new shapes or exactly."""
+        """The frames of the hits: by every known shape, then, line by line, by new shapes or exactly."""
         places: list[I64] = []
         parts: list[Frames] = []
         for shape in self._shapes:
@@ -173,7 +173,7 @@ class _Reader:
         return self._report.lines + int(np.count_nonzero(block.text[block.start : at] == ord("\n"))) + 1
 
     def _report_frameless(self, block: LineBlock, hashes: I64) -> None:
-        """Count the lines that hold no ``#`` though they are not empty."""
+        """Count the non-empty lines without ``#``."""
         ends = np.flatnonzero(block.text[block.start : block.end] == ord("\n")) + block.start
         has_mark = np.zeros(len(ends), np.bool_)
         has_mark[np.searchsorted(ends, hashes)] = True
@@ -187,7 +187,7 @@ class _Reader:
 
 
 class _Finder:
-    """Looks for a character in a block. What it notes of each byte goes into one buffer, used again and again."""
+    """Looks for a character in a block. Its marks of each byte go into one buffer, used again and again."""
 
     def __init__(self) -> None:
         self._is_found = np.zeros(0, np.bool_)
@@ -199,9 +199,9 @@ class _Finder:
         return np.equal(lines, ord(character), out=self._is_found[: len(lines)])
 
     def marks(self, lines: U8) -> I64:
-        """Where the marks between identifier and payload stand; the two characters of a CAN FD ## are one.
+        """Positions of the marks between identifier and payload; the two characters of a CAN FD ## are one.
 
-        Eight bytes are looked at as one number: where a single one of them is a mark, its logarithm says which.
+        Eight bytes are compared as one number: if exactly one of them is a mark, its logarithm says which.
         """
         is_mark = self.are(lines, "#")
         self._is_found[len(lines) : len(lines) + 8] = False
@@ -221,7 +221,7 @@ def _apart(hashes: I64) -> I64:
 
 
 def _line_around(block: LineBlock, at: int) -> bytes:
-    """The line that holds the byte ``at``, its newline included, as far as LONGEST_LINE on either side."""
+    """The line that contains the byte ``at``, its newline included, as far as LONGEST_LINE on either side."""
     first = max(block.start, at - LONGEST_LINE)
     around = block.text[first : min(block.end, at + LONGEST_LINE)].tobytes()
     begin = around.rfind(b"\n", 0, at - first) + 1

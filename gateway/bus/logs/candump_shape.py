@@ -41,7 +41,7 @@ class LineShape:
 
     @cached_property
     def template(self) -> U8:
-        """The whole line with NULs where digits stand."""
+        """The whole line with NULs in place of digits."""
         time = b"\0" * self.n_seconds + b"." + b"\0" * self.n_fraction
         mark = b"##\0" if self.is_fd else b"#"
         head = b"\n(" + time + b") " + self.channel + b" " + b"\0" * self.n_id + mark
@@ -54,13 +54,13 @@ class LineShape:
 
     @cached_property
     def stamp_weights(self) -> tuple[F64, F64]:
-        """What each digit of the seconds and of the fraction counts, in s and ns. Both sums are exact in a double."""
+        """The weight of each digit of the seconds and of the fraction, in s and ns. Both sums are exact in a double."""
         return _powers_of_ten(self.n_seconds - 1, self.n_seconds), _powers_of_ten(8, self.n_fraction)
 
     def read(self, text: U8, hashes: I64, width: int) -> tuple[Bool, Frames]:
         """Which of the lines around ``hashes`` (n,) have this shape, and the frames of those that do.
 
-        Payload beyond ``width`` bytes is cut off; the length says what the line held.
+        Payload beyond ``width`` bytes is cut off; the length is that of the line.
         """
         n_columns = len(self.template)
         starts = np.ndarray(len(text) - n_columns + 1, f"V{n_columns}", buffer=text, strides=(1,))
@@ -111,7 +111,7 @@ def _powers_of_ten(highest: int, n: int) -> F64:
 
 
 def learn_shape(line: bytes) -> LineShape | None:
-    """The shape of a sound line (its newline included), or None where it needs the exact path."""
+    """The shape of a sound line (its newline included), or None if it needs the exact path."""
     match = _SHAPE.fullmatch(line)
     if match is None:
         return None

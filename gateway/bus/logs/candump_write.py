@@ -18,9 +18,9 @@ _HEX: Final = np.frombuffer(b"0123456789ABCDEF", np.uint8)
 
 
 def write_candump(frames: Frames, channel: str, path: Path | str) -> None:
-    """Write frames as ``candump -L`` does, in the order given; gzip where the name ends in .gz.
+    """Write frames as ``candump -L`` does, in the order given; gzip if the name ends in .gz.
 
-    Stamps have microseconds, as candump's; nanoseconds where any stamp needs them. Raises OSError.
+    Stamps have microseconds, like candump's, or nanoseconds if any stamp needs them. Raises OSError.
     """
     path = Path(path)
     with _open(path) as file:

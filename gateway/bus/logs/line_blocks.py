@@ -19,7 +19,7 @@ MARGIN: Final = 512  # lets a reader look this far around any byte of a block
 class LineBlock:
     """Whole lines: ``text[start:end]``, the last byte a newline, and so is the one before ``start``.
 
-    ``text`` reaches MARGIN bytes beyond either end. It is overwritten when the next block is asked for.
+    ``text`` reaches MARGIN bytes beyond either end. It is overwritten by the next block.
     """
 
     text: U8
@@ -30,8 +30,8 @@ class LineBlock:
 def line_blocks(path: Path, report: LogReport, block_bytes: int = BLOCK_BYTES) -> Iterator[LineBlock]:
     """The file's lines in blocks of at most ``block_bytes``; memory does not grow with the file.
 
-    A line longer than a block (a hole of NULs, usually) is rejected and passed over. A damaged packed
-    stream ends the file there: ``report.ended_early`` says so.
+    A line longer than a block (a hole of NULs, usually) is rejected and passed over. A damaged packed stream ends the
+    file there: ``report.ended_early`` says so.
     """
     buffer = bytearray(b"\n" * (block_bytes + 2 * MARGIN))
     text = np.frombuffer(buffer, np.uint8)

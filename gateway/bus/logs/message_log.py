@@ -20,7 +20,7 @@ from gateway.records import Frames
 
 CHUNK_FRAMES: Final = 4096
 
-# What a python-can reader takes for its header when it is begun anew in the middle of a file
+# The header for a python-can reader that is restarted in the middle of a file
 _TEXT_READERS: Final[Mapping[str, tuple[Callable[[TextIO], MessageReader], tuple[str, ...]]]] = {
     ".asc": (lambda file: can.ASCReader(file, relative_timestamp=False), ("internal events logged\n",)),
     ".csv": (can.CSVReader, ("timestamp,arbitration_id,extended,remote,error,dlc,data\n",)),
@@ -32,9 +32,9 @@ MESSAGE_SUFFIXES: Final = (*_TEXT_READERS, ".db")
 def read_message_log(path: Path, suffix: str, selection: Selection, width: int) -> Iterator[Frames]:
     """The selected frames in order of arrival, in chunks.
 
-    Stamps are good to the microsecond, absolute where the format is (.asc in this machine's local time, as its writers
-    mean it). A text line that cannot be read is rejected and passed over; a damaged database ends with what was
-    readable, and the report says why. Raises LogUnreadableError where not even the beginning can be read.
+    Stamps are good to the microsecond, absolute if the format is (.asc in this machine's local time, as its writers
+    mean it). A text line that cannot be read is rejected and skipped; a damaged database is read up to the damage, and
+    the report says why. Raises LogUnreadableError if not even the beginning can be read.
     """
     report = selection.report
     messages = _messages(path, report) if suffix == ".db" else _text_messages(path, suffix, report)
@@ -71,7 +71,7 @@ def _ours(messages: Iterator[can.Message], selection: Selection) -> Iterator[can
 
 
 class _ResumableLines:
-    """Lines of a text log for a python-can reader, numbered, with lines put in front of what is left."""
+    """Lines of a text log for a python-can reader, numbered, with lines inserted before the rest."""
 
     def __init__(self, file: TextIO) -> None:
         self._file = file
@@ -100,7 +100,7 @@ class _ResumableLines:
 
 
 def _text_messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.Message]:
-    """Messages of a text log; a reader that trips over a line is begun anew behind it."""
+    """Messages of a text log; a reader that fails at a line is restarted behind it."""
     make_reader, header = _TEXT_READERS[suffix]
     with open_log_file(path) as stream:
         text = io.TextIOWrapper(stream, encoding="utf-8", errors="replace")

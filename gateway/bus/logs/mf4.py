@@ -1,4 +1,4 @@
-"""Bulk reader of ASAM's measurement files (.mf4) that hold bus frames, by asammdf: the extra springscale[mdf]."""
+"""Bulk reader of ASAM's measurement files (.mf4) with bus frames, by asammdf: the extra springscale[mdf]."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
@@ -30,8 +30,8 @@ _LENGTHS: Final = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 6
 def read_mf4(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
     """The selected frames in order of time, in chunks, stamps to the microsecond as every other format's.
 
-    A file that is damaged gives what was readable, and the report says so. Raises LogUnreadableError where not even
-    the beginning can be read, or asammdf is not installed.
+    A damaged file is read up to the damage, and the report says so. Raises LogUnreadableError if not even the beginning
+    can be read, or asammdf is not installed.
     """
     report = selection.report
     try:
@@ -54,7 +54,7 @@ def read_mf4(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
 
 @cache
 def _asammdf() -> "Callable[[Path], MDF]":
-    """The library, asked for where it is used: it takes two seconds to import. Raises ImportError."""
+    """The library, imported at its first use: that takes two seconds. Raises ImportError."""
     from asammdf import MDF  # noqa: PLC0415 # an extra
     from asammdf.blocks.mdf_v4 import MDF4  # noqa: PLC0415
 
@@ -84,7 +84,7 @@ class _Group:
             yield from self._piece(first, min(n_at_once, self.n_records - first))
 
     def _piece(self, first: int, n: int) -> Iterator[tuple[NDArray[np.float64], NDArray[Any]]]:
-        """Some records; where they cannot be read at once, those before the damage, then what it raised."""
+        """Some records; if they cannot be read at once, those before the damage, then its exception."""
         try:
             signal = self.mdf.get(self.name, self.number, record_offset=first, record_count=n, raw=True)
         except Exception:
@@ -97,7 +97,7 @@ class _Group:
 
 
 def _groups(mdf: "MDF", selection: Selection, width: int) -> list[Iterator[Frames]]:
-    """The wanted data frames of each group that holds any; remote and error frames are counted."""
+    """The wanted data frames of each group that has any; remote and error frames are counted."""
     start_ns = round(mdf.header.start_time.timestamp() * 1e6) * 1000
     groups = [group for i in range(len(mdf.groups)) if (group := _group(mdf, i)) is not None]
     n_at_once = max(LEAST_RECORDS, CHUNK_RECORDS // max(1, len(groups)))
@@ -112,7 +112,7 @@ def _groups(mdf: "MDF", selection: Selection, width: int) -> list[Iterator[Frame
 
 
 def _group(mdf: "MDF", number: int) -> _Group | None:
-    """The group's CAN frames, None where it holds something else."""
+    """The group's CAN frames, None for a group of another kind."""
     from asammdf.blocks.v4_constants import BUS_TYPE_CAN  # noqa: PLC0415 # as above
 
     group = mdf.groups[number].channel_group
@@ -123,7 +123,7 @@ def _group(mdf: "MDF", number: int) -> _Group | None:
 
 
 class _Fields:
-    """The columns of records, whatever of them a tool has written."""
+    """The columns of records, as far as a tool has written them."""
 
     def __init__(self, records: NDArray[Any], name: str) -> None:
         self._records = records
@@ -131,13 +131,13 @@ class _Fields:
         self._names = frozenset(records.dtype.names or ())
 
     def get(self, field: str) -> NDArray[Any] | None:
-        """One column, None where there is none."""
+        """One column, None if there is none."""
         full = f"{self._name}.{field}"
         return self._records[full] if full in self._names else None
 
     @property
     def can_id(self) -> U32:
-        """Identifiers with EXTENDED_ID; without a word on it, those that 11 bits cannot hold are 29-bit ones."""
+        """Identifiers with EXTENDED_ID; without that information, those beyond 11 bits are 29-bit ones."""
         column = self.get("ID")
         if column is None:
             raise LogUnreadableError("its frames have no identifiers")
@@ -180,7 +180,7 @@ def _data_frames(group: _Group, n_at_once: int, start_ns: int, selection: Select
 
 
 def _in_order_of_time(sources: Sequence[Iterator[Frames]], width: int) -> Iterator[Frames]:
-    """The frames of all sources, each of which comes in order of time itself, merged piece by piece."""
+    """The frames of all sources, each of which is in order of time itself, merged piece by piece."""
     if len(sources) == 1:
         yield from (frames for frames in sources[0] if len(frames))
         return
@@ -201,5 +201,5 @@ def _in_order_of_time(sources: Sequence[Iterator[Frames]], width: int) -> Iterat
 
 
 def _next_frames(source: Iterator[Frames]) -> Frames | None:
-    """The next piece that holds any frame."""
+    """The next piece with any frame."""
     return next((frames for frames in source if len(frames)), None)

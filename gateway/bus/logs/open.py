@@ -32,7 +32,7 @@ OTHER_KINDS: Final = {
     b"LOGG": "a BLF log; name it .blf",
     b"MDF ": "an MDF log; name it .mf4",
 }
-"""What files of other kinds begin with."""
+"""First bytes of files of other kinds."""
 LONGEST_START: Final = max(map(len, OTHER_KINDS))
 
 
@@ -45,8 +45,8 @@ def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames],
     """The map's frames of a log in order of arrival, and a report that fills while they are read.
 
     candump text (.log, .txt, .candump), .blf and .mf4 go through readers that take thousands of frames at once,
-    .asc .trc .csv .db through python-can's; each may be packed. Raises LogUnreadableError where the file is missing
-    or of an unknown kind.
+    .asc .trc .csv .db through python-can's; each may be packed. Raises LogUnreadableError if the file is missing or of
+    an unknown kind.
     """
     return _open(Path(path), signal_map.filters, signal_map.channel, signal_map.payload_width)
 
@@ -85,7 +85,7 @@ def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Mot
 
 
 def _require_no_other_kind(path: Path) -> None:
-    """Text may be damaged; what begins as another kind of file never was a log's text."""
+    """Text may be damaged; a file that begins like another kind never was a text log."""
     try:
         with path.open("rb") as stream:
             start = stream.read(LONGEST_START)
@@ -98,6 +98,6 @@ def _require_no_other_kind(path: Path) -> None:
 
 def _require_file(path: Path) -> None:
     if path.is_dir():
-        raise LogUnreadableError(f"{path}: is a folder, a log file is wanted")
+        raise LogUnreadableError(f"{path}: is a folder, not a log file")
     if not path.exists():
         raise LogUnreadableError(f"{path}: no such file")

@@ -1,4 +1,4 @@
-"""A log file as it was before it was packed: gzip, zstd and xz are inflated on the way, known by their first bytes."""
+"""A log file before it was packed: gzip, zstd and xz are inflated during reading, recognised by their first bytes."""
 
 import io
 import lzma
@@ -40,7 +40,7 @@ class Inflater(Protocol):
 
     @property
     def needs_input(self) -> bool:
-        """Whether nothing more comes without more packed bytes."""
+        """Whether more output needs more packed bytes."""
 
     @property
     def unused_data(self) -> bytes:
@@ -52,7 +52,7 @@ class Inflater(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Packing:
-    """One way to pack: how its members begin, what inflates one, what that raises."""
+    """One way to pack: the first bytes of its members, its inflater, and the inflater's exceptions."""
 
     name: str
     magics: tuple[bytes, ...]
@@ -79,9 +79,9 @@ _LONGEST_MAGIC: Final = max(len(magic) for packing in PACKINGS for magic in pack
 
 
 class InflatedStream(io.RawIOBase):
-    """A packed file inflated, all its members. Unlike a GzipFile it gives all there is before a damage, then raises.
+    """A packed file inflated, all its members. Unlike a GzipFile it gives all data before a damage, then raises.
 
-    Raises EOFError where the stream is cut, OSError where it is damaged.
+    Raises EOFError if the stream is cut, OSError if it is damaged.
     """
 
     def __init__(self, file: BinaryIO, packing: Packing) -> None:
@@ -119,7 +119,7 @@ class InflatedStream(io.RawIOBase):
         super().close()
 
     def _next_member(self) -> bool:
-        """Whether another member follows; zeros and what is none after the last one are padding."""
+        """Whether another member follows; zeros and other bytes after the last one are padding."""
         self._packed = self._inflater.unused_data
         if len(self._packed) < _LONGEST_MAGIC:
             self._packed += self._file.read(PACKED_BYTES)
@@ -130,7 +130,7 @@ class InflatedStream(io.RawIOBase):
 
 
 def open_log_file(path: Path) -> AbstractContextManager[BinaryIO]:
-    """Open for reading, inflating where the content is packed whatever the file is called."""
+    """Open for reading, inflating packed content whatever the file's name."""
     try:
         file = path.open("rb")
     except OSError as fault:
@@ -141,9 +141,9 @@ def open_log_file(path: Path) -> AbstractContextManager[BinaryIO]:
 
 @contextmanager
 def unpacked_path(path: Path) -> Iterator[Path]:
-    """The file itself, or a temporary copy of what is packed in it, for libraries that read here and there in a file.
+    """The file itself, or a temporary unpacked copy, for libraries that need random access.
 
-    Raises EOFError and OSError as InflatedStream does, LogUnreadableError where it cannot be opened.
+    Raises EOFError and OSError as InflatedStream does, LogUnreadableError if it cannot be opened.
     """
     with open_log_file(path) as stream:
         if not isinstance(getattr(stream, "raw", None), InflatedStream):
@@ -156,7 +156,7 @@ def unpacked_path(path: Path) -> Iterator[Path]:
 
 
 def packing_of(content: bytes) -> Packing | None:
-    """How a file that begins so is packed, None where it is not."""
+    """The packing of a file that begins with these bytes, None if it is not packed."""
     return next((packing for packing in PACKINGS if packing.begins(content)), None)
 
 

@@ -1,4 +1,4 @@
-"""What a log reader met on its way: counts, and the lines it could not read, by reason."""
+"""The result of reading a log: counts, and the unreadable lines by reason."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -40,12 +40,12 @@ class RejectedLines:
 
 @dataclass(slots=True)
 class LogReport:
-    """Fills while its reader goes through the log.
+    """Filled while its reader goes through the log.
 
-    ``frames`` counts everything that looks like a frame, of any identifier; ``wanted`` what was handed
-    on. ``other_channel``, ``remote_frames`` and ``out_of_order`` are among the wanted identifiers.
-    ``lines`` stays 0 for binary formats, whose rejects carry no line numbers. ``ended_early`` says why
-    a damaged file could not be read to its end.
+    ``frames`` counts everything that looks like a frame, of any identifier; ``wanted`` the frames given out.
+    ``other_channel``, ``remote_frames`` and ``out_of_order`` are among the wanted identifiers. ``lines`` stays 0 for
+    binary formats, whose rejects carry no line numbers. ``ended_early`` says why a damaged file could not be read to
+    its end.
     """
 
     path: Path
@@ -66,7 +66,7 @@ class LogReport:
         return reason not in self.rejects or len(self.rejects[reason].first_lines) < KEPT_LINE_NUMBERS
 
     def reject(self, reason: LogReject, line: int | None = None, *, n: int = 1) -> None:
-        """Count a refused line, or ``n`` of them where nobody knows their numbers."""
+        """Count a refused line, or ``n`` of them without line numbers."""
         if n == 0:
             return
         if line is not None and self.keeps_lines_of(reason):
@@ -99,9 +99,9 @@ class LogReport:
         }
 
     def remarks(self) -> Iterator[str]:
-        """What a person should know of the reading, a sentence each; nothing where all was well."""
+        """Warnings for people, a sentence each; none if all was well."""
         if self.ended_early:
-            yield f"{self.path}: {self.ended_early}; what lies before was read"
+            yield f"{self.path}: {self.ended_early}; everything before was read"
         for reason, lines in self.rejects.items():
             where = f", first in line {lines.first_lines[0]}" if lines.first_lines else ""
             yield f"{self.path}: left out, {str(reason).replace('_', ' ')}: {lines.count}{where}"
@@ -110,7 +110,7 @@ class LogReport:
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
 
     def require_frames(self) -> None:
-        """After reading: raise LogUnreadableError, saying why, where not one wanted frame was found."""
+        """After reading: raise LogUnreadableError, saying why, if not one wanted frame was found."""
         if self.wanted:
             return
         if self.other_channel:

@@ -1,4 +1,4 @@
-"""What of a table of recorded frames is wanted, and the counts of what is not."""
+"""The wanted frames of a table of recorded ones, and the counts of the others."""
 
 import re
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ class Selection:
         return passes
 
     def rows(self, can_id: U32, channel: I64 | None, is_remote: Bool | None = None) -> I64:
-        """Rows (m,) of the wanted data frames among all (n,), remote ones among them. A format may keep no channel."""
+        """Rows (m,) of the wanted data frames among all (n,), remote ones among them. A format may store no channel."""
         self.report.frames += len(can_id)
         rows = np.flatnonzero(self.passes(can_id))
         if is_remote is not None and is_remote[rows].any():

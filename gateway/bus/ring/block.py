@@ -1,7 +1,7 @@
-"""A block: some minutes of frames as candump text in one gzip member that says, in its head, how long it is.
+"""A block: some minutes of frames as candump text in one gzip member whose head states its length.
 
-RFC 1952 lets a member carry an extra field, which readers of gzip pass over. Ours lets a segment be listed, and its
-whole blocks be told from one that a power cut left unfinished, without inflating anything.
+RFC 1952 lets a member carry an extra field, which readers of gzip ignore. With ours a segment can be listed, and its
+whole blocks distinguished from one that a power cut left unfinished, without inflating anything.
 """
 
 import io
@@ -31,7 +31,7 @@ HEAD_BYTES: Final = len(_FIXED) + _LENGTHS.size + _CONTENT.size
 
 @dataclass(frozen=True, slots=True)
 class BlockHead:
-    """What a block says of itself."""
+    """The content of a block's head."""
 
     n_bytes: int
     n_frames: int
@@ -57,7 +57,7 @@ def packed_block(frames: Frames, channel: str) -> bytes:
 
 
 def read_head(file: BinaryIO) -> BlockHead | None:
-    """The head at the file's position; None where no block of ours begins there."""
+    """The head at the file's position; None if no block of ours begins there."""
     head = file.read(HEAD_BYTES)
     begin = _FIXED + _LENGTHS.pack(4 + _CONTENT.size, _FIELD, _CONTENT.size)
     if len(head) < HEAD_BYTES or not head.startswith(begin):
@@ -72,7 +72,7 @@ def head_of(block: bytes) -> BlockHead:
 
 
 def is_sound(block: bytes) -> bool:
-    """Whether a whole block holds the text that its checksum is of."""
+    """Whether the text of a whole block matches its checksum."""
     try:
         zlib.decompress(block, wbits=31)
     except zlib.error:
@@ -81,7 +81,7 @@ def is_sound(block: bytes) -> bool:
 
 
 def _whole(frames: Frames) -> Frames:
-    """With payload rows as wide as the longest frame says: a signal map keeps no more than it decodes."""
+    """With payload rows as wide as the longest frame: a signal map keeps no more than it decodes."""
     missing = int(frames.length.max(initial=0)) - frames.payload.shape[1]
     if missing <= 0:
         return frames

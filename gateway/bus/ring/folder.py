@@ -1,4 +1,4 @@
-"""The ring on disk: segments in one directory, the oldest let go when a new block needs its room."""
+"""The ring on disk: segments in one directory; the oldest are removed when a new block needs room."""
 
 import errno
 import os
@@ -21,9 +21,9 @@ SECONDS_PER_DAY: Final = 86_400
 
 @dataclass(frozen=True, slots=True)
 class RingLimits:
-    """What the ring may take: bytes on disk and bytes written a day; ``free_bytes`` it leaves to everybody else.
+    """Limits of the ring: bytes on disk and bytes written a day; ``free_bytes`` stay free for everybody else.
 
-    ``block_s`` of frames are written at a time, and lost where the power is cut.
+    ``block_s`` of frames are written at a time, and lost in a power cut.
     """
 
     max_bytes: int
@@ -54,13 +54,13 @@ class RingFolder:
         self.n_bytes_today = 0
 
     def segments(self) -> tuple[Segment, ...]:
-        """What lies there, oldest first, as far as whole blocks reach."""
+        """The segments, oldest first, as far as their whole blocks reach."""
         return self._segments or ()
 
     def open(self, name: str) -> tuple[BinaryIO, int] | None:
-        """A segment to read from and how many of its bytes are whole blocks; None where there is none of that name.
+        """A segment to read from and the bytes of its whole blocks; None if there is none of that name.
 
-        It can be read to its end though the ring lets it go meanwhile. Raises OSError where the disk refuses.
+        It can be read to its end even if the ring removes it meanwhile. Raises OSError if the disk fails.
         """
         segment = next((one for one in self.segments() if one.name == name), None)
         if segment is None:
@@ -72,7 +72,7 @@ class RingFolder:
                 return None
 
     def read(self) -> None:
-        """Look at what lies there, once: what a cut left unfinished is cut off, this day's bytes are counted.
+        """Inspect the directory once: an unfinished block is cut off, this day's bytes are counted.
 
         Raises OSError.
         """
@@ -89,7 +89,7 @@ class RingFolder:
         return self.n_bytes_today + n_bytes > self._limits.max_daily_bytes
 
     def append(self, block: bytes, head: BlockHead) -> None:
-        """One more block, on disk when this returns. Raises OSError; then the next call begins with a new segment."""
+        """One more block, on disk when this returns. Raises OSError; the next call then begins a new segment."""
         try:
             self.read()
             with opened_folder(self.directory) as folder:
@@ -135,7 +135,7 @@ class RingFolder:
             raise OSError(errno.ENOSPC, "less room is left on the disk than [record] free_mb")
 
     def _let_go(self, folder: int, most_bytes: int) -> None:
-        """Remove the oldest until no more than so many bytes lie there."""
+        """Remove the oldest until at most so many bytes remain."""
         while (kept := self.segments()) and sum(segment.n_bytes for segment in kept) > most_bytes:
             if self._growing is not None and kept[0].name == self._growing.name:
                 self.close()
@@ -159,7 +159,7 @@ class RingFolder:
 
 
 def _write_all(file: BinaryIO, block: bytes) -> None:
-    """A raw file may take less than it is given. Raises OSError."""
+    """A raw file may write less than it is given. Raises OSError."""
     rest = memoryview(block)
     while rest:
         rest = rest[file.write(rest) :]

@@ -33,7 +33,7 @@ class RingLog:
         clock_s: Callable[[], float] = time.time,
         retry_s: float = RETRY_S,
     ) -> None:
-        """``channel`` is the name the frames get in the log, as far as a candump line can hold it."""
+        """``channel`` is the frames' channel name in the log, as far as a candump line allows it."""
         self._folder = RingFolder(directory, limits, clock_s)
         self._channel = "".join("_" if char.isspace() or not char.isprintable() else char for char in channel) or "can"
         self._block_s = limits.block_s
@@ -52,7 +52,7 @@ class RingLog:
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """Write what is held, if the disk takes it, and end."""
+        """Write the frames in memory, if the disk accepts them, and end."""
         with self._changed:
             self._is_stopping = True
             self._changed.notify_all()
@@ -62,7 +62,7 @@ class RingLog:
             log_event(Event.RECORD_REFUSED, level=logging.WARNING, fault=fault, n_frames_held=self._n_held)
 
     def put(self, frames: Frames) -> None:
-        """Take frames to be written; what finds no room is counted. Never waits for the disk."""
+        """Accept frames for writing; frames without room are counted. Never waits for the disk."""
         if not len(frames):
             return
         with self._changed:
@@ -77,7 +77,7 @@ class RingLog:
                 self._changed.notify_all()
 
     def segments(self) -> tuple[Segment, ...]:
-        """What can be fetched, oldest first."""
+        """The segments that can be fetched, oldest first."""
         return tuple(segment for segment in self._folder.segments() if segment.n_blocks)
 
     def open(self, name: str) -> tuple[BinaryIO, int] | None:
@@ -85,7 +85,7 @@ class RingLog:
         return self._folder.open(name)
 
     def status(self) -> RecordStatus:
-        """How it goes; from any thread."""
+        """The present state; from any thread."""
         segments = self.segments()
         return RecordStatus(
             n_frames_written=self._n_written,
@@ -115,14 +115,14 @@ class RingLog:
             self._tell(f"the recorder died: {failure!r}")
 
     def _look(self) -> None:
-        """What lies there from earlier runs can be fetched before the first block is due."""
+        """Segments of earlier runs can be fetched before the first block is due."""
         try:
             self._folder.read()
         except OSError as refusal:
             self._tell(self._told(refusal))
 
     def _wait_for_block(self) -> bool:
-        """Until a block is due or it is time to stop; False where nothing is left to do."""
+        """Wait until a block is due or it is time to stop; False if nothing is left to do."""
         with self._changed:
             while not self._is_stopping and self._n_held < BLOCK_FRAMES:
                 left_s = self._held_since_s + self._block_s - time.monotonic() if self._held else None
@@ -132,7 +132,7 @@ class RingLog:
             return bool(self._held)
 
     def _write_held(self) -> None:
-        """Bring a block to disk; where that is refused it stays held, and the next try waits a while."""
+        """Write a block to disk; if that fails it stays in memory, and the next try waits a while."""
         with self._changed:
             parts = list(self._held)
         frames = join(parts, parts[0].payload.shape[1])
@@ -153,7 +153,7 @@ class RingLog:
             self._n_dropped += 0 if is_written else len(frames)
 
     def _write(self, frames: Frames) -> bool:
-        """False where the day has had its bytes. Raises OSError."""
+        """False if the day's bytes are used up. Raises OSError."""
         block = packed_block(frames, self._channel)
         if self._folder.is_over_day(len(block)):
             self._tell("the day's bytes are used up: [record] max_daily_mb")

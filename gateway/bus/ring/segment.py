@@ -1,4 +1,4 @@
-"""Segments: files of whole blocks, numbered in the order in which they were begun, whatever the clock said."""
+"""Segments: files of whole blocks, numbered in the order of their creation, whatever the clock said."""
 
 import os
 import re
@@ -74,15 +74,15 @@ def open_segment(folder: int, name: str, *, for_writing: bool = False) -> Binary
 
 
 def create_segment(folder: int, name: str) -> BinaryIO:
-    """A new file in an open directory, unbuffered. Raises OSError, where one is there already too."""
+    """A new file in an open directory, unbuffered. Raises OSError, also if the file exists already."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     return os.fdopen(os.open(name, flags, 0o640, dir_fd=folder), "wb", buffering=0)
 
 
 def mended_segment(folder: int, name: str, *, is_newest: bool) -> tuple[Segment, int]:
-    """What a segment holds by the heads of its blocks, and how many bytes behind them had to be cut off.
+    """A segment's content by the heads of its blocks, and the number of bytes cut off behind them.
 
-    Of the newest, which a power cut may have met, the last block is looked at whole. Raises OSError.
+    In the newest segment, where a power cut may have struck, the last block is checked whole. Raises OSError.
     """
     with open_segment(folder, name) as file:
         heads = list(_heads(file))

@@ -1,4 +1,6 @@
-"""A live channel into one log file, for who has no service there: in whole blocks, so that a cut one is readable."""
+"""A live channel into one log file, for people without a service there: in whole blocks, so that a cut one is
+readable.
+"""
 
 import threading
 import time

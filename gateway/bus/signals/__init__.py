@@ -1,7 +1,7 @@
-"""The signal map and what it does: which message and signal is which motion, in which unit and with which sign.
+"""The signal map: which message and signal carries which motion, in which unit and with which sign.
 
-A map with its DBC files comes in (``load_signal_map``); a ``Decoder`` turns frames into SI samples in ISO 8855 axes
-and counts what it refuses, an ``Encoder`` goes the other way for the simulator. Units end at this border.
+A map with its DBC files comes in (``load_signal_map``); a ``Decoder`` turns frames into SI samples in ISO 8855 axes and
+counts what it refuses, an ``Encoder`` does the inverse for the simulator. Units end at this border.
 """
 
 from gateway.bus.signals.bit_field import Coding

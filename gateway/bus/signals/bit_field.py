@@ -1,4 +1,6 @@
-"""Where a signal lies in a payload, and how its bits become a number: for whole columns of frames at once."""
+"""The position of a signal in a payload, and the conversion of its bits to a number: for whole columns of frames at
+once.
+"""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,7 +17,7 @@ _FLOATS = {16: (np.uint16, np.float16), 32: (np.uint32, np.float32), 64: (np.uin
 
 
 class Coding(StrEnum):
-    """How raw bits stand for a number."""
+    """Encodings of a number as raw bits."""
 
     UNSIGNED = "unsigned"
     SIGNED = "signed"
@@ -40,7 +42,7 @@ class BitField:
 
     @cached_property
     def bytes_and_shifts(self) -> tuple[tuple[int, int], ...]:
-        """Every byte the field touches and how far left it moves in the raw number (negative: right)."""
+        """Every byte of the field and its left shift in the raw number (negative: right)."""
         if self.is_big_endian:
             first_bit = self.start // 8 * 8 + 7 - self.start % 8
             end_bit = first_bit + self.length
@@ -50,7 +52,7 @@ class BitField:
 
     @property
     def n_bytes(self) -> int:
-        """Bytes a payload needs to hold the field."""
+        """Bytes that a payload needs to contain the field."""
         return self.bytes_and_shifts[-1][0] + 1
 
     @property
@@ -69,7 +71,7 @@ class BitField:
         return raw & np.uint64((1 << self.length) - 1)
 
     def numbers(self, bits: U64) -> F64:
-        """Bits (n,) as the numbers they stand for, before scale and offset."""
+        """Bits (n,) as numbers, before scale and offset."""
         if self.coding is Coding.FLOAT:
             as_integer, as_float = _FLOATS[self.length]
             with np.errstate(invalid="ignore"):  # a signalling NaN is a NaN all the same

@@ -1,4 +1,4 @@
-"""CAN databases through cantools, reduced to what decoding needs. The only room's corner that knows cantools."""
+"""CAN databases through cantools, reduced to what decoding needs. The only module of the room that imports cantools."""
 
 import difflib
 import io

@@ -1,6 +1,6 @@
 """Frames to motion: the one decoder, for whole columns at once, used by bulk readers and the live service alike.
 
-cantools is the truth for the bits: a property test holds every number to it.
+cantools is the reference for the bits: a property test compares every number with it.
 """
 
 from collections import Counter
@@ -18,7 +18,7 @@ __all__ = ["Decoder", "Rejected", "SignalCounts"]
 
 @dataclass(frozen=True, slots=True)
 class SignalCounts:
-    """What became of the frames that could carry one signal."""
+    """Outcomes of the frames that can carry one signal."""
 
     samples: int
     rejected: Mapping[Rejected, int]
@@ -41,7 +41,7 @@ class Decoder:
     def decode(self, frames: Frames) -> Motion:
         """One row for every frame of a mapped message, in order of arrival; other frames are passed over.
 
-        All signals of a frame share its row. What a frame does not validly carry is NaN.
+        All signals of a frame share its row. NaN if a frame does not validly carry a sample.
         """
         message_of = np.full(len(frames), -1, np.int16)
         for i, message in enumerate(self._messages):
@@ -93,6 +93,8 @@ class _MessageReader:
             self._rejected[signal].update(refused)
 
     def count(self, counters: Mapping[Signal, F64], ours: I64, frames: Frames, rows: I64) -> None:
-        """Message counters of the same frames into the same rows; what is too short to tell is no sample either."""
+        """Message counters of the same frames into the same rows; a frame too short for its counter gives no sample
+        either.
+        """
         for signal, field in self._counters.items():
             counters[signal][ours] = field.bits(frames.payload[rows])

@@ -14,7 +14,7 @@ _J1939_UNUSED = 0xFF  # SAE J1939: bits nobody sends are 1, "not available"
 class Encoder:
     """Writes the messages of a signal map.
 
-    A sample is rounded to the nearest step and held to what the bits can carry, as a sensor saturates.
+    A sample is rounded to the nearest step and limited to the range of the bits, as a sensor saturates.
     """
 
     def __init__(self, signal_map: SignalMap) -> None:
@@ -24,9 +24,9 @@ class Encoder:
     def encode(self, message: str, t_ns: I64, samples: Mapping[str, F64]) -> Frames:
         """Frames of one message at the times (n,); ``samples`` (n,) by DBC signal name, in units of the DBC.
 
-        Signals not given are 0 in the DBC's unit (all bits set where the map is J1939). Multiplexers and
+        Missing signals are 0 in the DBC's unit (all bits set if the map is J1939). Multiplexers and
         the signals of ``valid_when`` take the value under which the mapped signals count, unless given.
-        Raises KeyError for a message or signal the map does not know.
+        Raises KeyError for a message or signal that the map does not contain.
         """
         mapped = self._messages[message]
         payload = self._blank(mapped, len(t_ns))
@@ -56,7 +56,7 @@ def _conditions(message: MappedMessage) -> dict[BitField, int]:
 
 
 def physical_bits(field: BitField, physical: F64) -> U64:
-    """Raw bits (n,) that stand closest to ``physical`` (n,), in the unit of the DBC."""
+    """Raw bits (n,) closest to ``physical`` (n,), in the unit of the DBC."""
     numbers = (np.asarray(physical, np.float64) - field.offset) / field.scale
     if field.coding is Coding.FLOAT:
         as_float = {16: np.float16, 32: np.float32, 64: np.float64}[field.length]

@@ -1,4 +1,6 @@
-"""What a signal map says, resolved: which frames carry our signals, where their bits lie, what makes them valid."""
+"""A resolved signal map: which frames carry our signals, the position of their bits, the conditions of their
+validity.
+"""
 
 import hashlib
 import math
@@ -20,7 +22,7 @@ CAN_FD_BYTES = 64
 class IdFilter:
     """Frames with ``can_id & mask`` equal to ours, as SocketCAN filters them.
 
-    Both numbers hold EXTENDED_ID, so that a 29-bit identifier never passes for an 11-bit one.
+    Both numbers contain EXTENDED_ID, so that a 29-bit identifier never equals an 11-bit one.
     """
 
     can_id: int
@@ -34,7 +36,7 @@ class IdFilter:
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """A field of the same message and the raw bits it must hold: a multiplexer, or one entry of valid_when."""
+    """A field of the same message and its required raw bits: a multiplexer, or one entry of valid_when."""
 
     field: BitField
     allowed_bits: tuple[int, ...]
@@ -44,8 +46,8 @@ class Condition:
 class MappedSignal:
     """One of our signals: SI = (number x scale + offset) x to_si; the factor carries unit and sign.
 
-    ``minimum`` and ``maximum`` are SI, NaN where nothing limits. ``rejects_j1939_codes`` is true where
-    SAE J1939-71 reserves the highest raw numbers for "error" and "not available". ``counter`` counts the frames.
+    ``minimum`` and ``maximum`` are SI, NaN if there is no limit. ``rejects_j1939_codes`` is true if SAE J1939-71
+    reserves the highest raw numbers for "error" and "not available". ``counter`` counts the frames.
     """
 
     signal: Signal
@@ -67,14 +69,14 @@ class MappedSignal:
 
     @property
     def traits(self) -> SensorTraits:
-        """What the rooms beyond the bus need to know of it."""
+        """What the other rooms need to know about it."""
         modulus = 0 if self.counter is None else 1 << self.counter.length
         return SensorTraits(self.latency_s, self.minimum, self.maximum, self.resolution, modulus)
 
 
 @dataclass(frozen=True, slots=True)
 class MappedMessage:
-    """A message that carries at least one of our signals; its frames hold exactly ``length`` bytes.
+    """A message that carries at least one of our signals; its frames have exactly ``length`` bytes.
 
     ``frame_id`` is the database's own, with EXTENDED_ID. ``fields`` are all its signals by their DBC names.
     """
@@ -91,8 +93,7 @@ class MappedMessage:
 class SignalMap:
     """A signal map and its databases, resolved.
 
-    ``channel`` filters log files (a live channel comes from the service's configuration); None takes
-    every channel.
+    ``channel`` filters log files (a live channel comes from the service's configuration); None accepts every channel.
     """
 
     name: str
@@ -113,24 +114,24 @@ class SignalMap:
 
     @cached_property
     def id(self) -> str:
-        """Another one where any of our signals is read otherwise."""
+        """Another identity if any of our signals is read differently."""
         read = repr((self.j1939, [(message.id_filter, message.signals) for message in self.messages]))
         return hashlib.sha256(read.encode()).hexdigest()[:16]
 
     @cached_property
     def filters(self) -> tuple[IdFilter, ...]:
-        """The identifiers to ask the kernel for."""
+        """The identifiers to request from the kernel."""
         return tuple(message.id_filter for message in self.messages)
 
     @property
     def payload_width(self) -> int:
-        """Bytes a frame's row must hold: 8, or 64 where a mapped message needs CAN FD."""
+        """Bytes of a frame's row: 8, or 64 if a mapped message needs CAN FD."""
         longest = max((message.length for message in self.messages), default=0)
         return CLASSIC_BYTES if longest <= CLASSIC_BYTES else CAN_FD_BYTES
 
 
 def id_name(can_id: int) -> str:
-    """An identifier as candump writes it: three digits, or eight where it has 29 bits."""
+    """An identifier as candump writes it: three digits, or eight if it has 29 bits."""
     number = can_id & ~EXTENDED_ID
     return f"{number:08X}" if can_id & EXTENDED_ID else f"{number:03X}"
 

@@ -40,7 +40,7 @@ Accepted = int | float | str
 
 
 class Entry(Protocol):
-    """What a map says of one signal (SignalEntry of the file)."""
+    """A map's entry for one signal (SignalEntry of the file)."""
 
     @property
     def signal(self) -> str: ...
@@ -139,7 +139,7 @@ def _unit_factor(where: str, signal: Signal, entry: Entry, named: DatabaseSignal
 
 
 def _valid_range(where: str, entry: Entry, named: DatabaseSignal, to_si: float) -> tuple[float, float]:
-    """Least and greatest valid SI: the entry's word, else the database's, else what the bits can carry."""
+    """Least and greatest valid SI: of the entry, else of the database, else of the bits."""
     low, high = named.field.physical_range
     if named.minimum is not None and named.maximum is not None and named.minimum < named.maximum:
         low, high = float(named.minimum), float(named.maximum)
@@ -169,7 +169,7 @@ def _condition(where: str, name: str, allowed: Accepted | list[Accepted], messag
 
 
 def _allowed_bits(where: str, allowed: Accepted, signal: DatabaseSignal) -> int:
-    """The raw bits that stand for a physical number, or for a named choice of the database."""
+    """The raw bits of a physical number, or of a named choice of the database."""
     field = signal.field
     if isinstance(allowed, str):
         if allowed not in signal.choices:

@@ -1,4 +1,4 @@
-"""One signal out of the payloads of its message: SI samples, and why the others are none."""
+"""One signal from the payloads of its message: SI samples, and why the others are rejected."""
 
 from collections.abc import Iterator
 from enum import StrEnum
@@ -26,7 +26,7 @@ class Rejected(StrEnum):
 
 
 class SampleReader:
-    """Reads one mapped signal. What can never happen (an integer that is no number) is not looked for."""
+    """Reads one mapped signal. Impossible faults (an integer that is not a number) are not checked."""
 
     def __init__(self, mapped: MappedSignal) -> None:
         self._mapped = mapped
@@ -38,7 +38,7 @@ class SampleReader:
         self._can_leave_range = reach[0] < self._low or reach[1] > self._high
 
     def read(self, payload: U8) -> tuple[F64, dict[Rejected, int]]:
-        """Samples (n,) of payloads (n, width), NaN where rejected, and how many for each reason.
+        """Samples (n,) of payloads (n, width), NaN if rejected, and how many for each reason.
 
         A sample with several faults counts for the first of them.
         """
@@ -82,8 +82,8 @@ def is_j1939_code(field: BitField, bits: U64) -> Bool:
     """Which raw bits (n,) are no measurement by SAE J1939-71.
 
     From 8 bits on, a most significant byte above 0xFA is a reserved code, an error or "not available"
-    (8 bits: 0xFB to 0xFF, 16 bits: 0xFB00 to 0xFFFF, ...). From 2 to 7 bits the two highest codes mean
-    error and not available. A single bit has no code to spare.
+    (8 bits: 0xFB to 0xFF, 16 bits: 0xFB00 to 0xFFFF, ...). From 2 to 7 bits the two highest codes mean error and not
+    available. A single bit has no code to spare.
     """
     if field.length >= 8:
         return np.asarray(bits >> np.uint64(field.length - 8) > J1939_LAST_VALID_BYTE)

@@ -1,4 +1,4 @@
-"""Signal maps: the TOML file that tells which DBC signals are ours, checked and resolved against its databases."""
+"""Signal maps: the TOML file that names our signals in a DBC, checked and resolved against its databases."""
 
 from importlib.resources import files
 from pathlib import Path
@@ -23,20 +23,21 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class SignalEntry(BaseModel):
-    """[signals.NAME]: where one of our signals comes from."""
+    """[signals.NAME]: the source of one of our signals."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     message: str = Field(description="name of the message in the DBC")
     signal: str = Field(description="name of the signal in that message")
-    sign: Literal[-1, 1] = Field(1, description="-1 where the device counts against our axis (ISO 8855)")
+    sign: Literal[-1, 1] = Field(1, description="-1 if the device counts against our axis (ISO 8855)")
     unit: str | None = Field(None, description="unit of the DBC's physical values; overrides the DBC's own")
-    latency_s: float = Field(0.0, ge=0.0, le=10.0, description="how late the device sends what it measured")
+    latency_s: float = Field(0.0, ge=0.0, le=10.0, description="delay between measurement and sending")
     valid_when: dict[str, Accepted | list[Accepted]] = Field(
         default_factory=dict, description="signals of the same message and the values under which this one counts"
     )
     counter: str | None = Field(
-        None, description="signal of the same message that counts its frames: late frames are then told from lost ones"
+        None,
+        description="signal of the same message that counts its frames: it distinguishes late frames from lost ones",
     )
     minimum: Finite | None = Field(None, description="least valid value in SI; overrides the DBC's range")
     maximum: Finite | None = Field(None, description="greatest valid value in SI; overrides the DBC's range")
@@ -56,7 +57,7 @@ class SignalMapFile(BaseModel):
 def load_signal_map(path: Path | str, read: Read = Path.read_bytes) -> SignalMap:
     """Read and resolve a signal map; ``springscale:NAME`` is one of those that come with the package.
 
-    ``read`` sees to the signatures where they are required (files.signed); what comes with the package needs none.
+    ``read`` checks required signatures (files.signed); files of the package need none.
 
     Raises SignalMapError naming the file, the key, what is wrong with it and how to mend it.
     """
@@ -92,9 +93,9 @@ def shipped_databases() -> tuple[Path, ...]:
 
 
 def shipped_map(name: str) -> Path:
-    """Path of a signal map that comes with the package. Raises SignalMapError naming those there are."""
+    """Path of a signal map that comes with the package. Raises SignalMapError naming the available ones."""
     if name not in shipped_maps():
-        raise SignalMapError(f"{SHIPPED_PREFIX}{name}: no such map; there are {', '.join(shipped_maps())}")
+        raise SignalMapError(f"{SHIPPED_PREFIX}{name}: no such map; known are {', '.join(shipped_maps())}")
     return Path(str(files("gateway.dbc") / f"{name}.toml"))
 
 

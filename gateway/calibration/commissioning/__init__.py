@@ -1,9 +1,8 @@
-"""A calibration made on the vehicle itself: what a fitter types, and the fit in a process of its own.
+"""A calibration made on the vehicle itself: the fitter's answers, and the fit in a process of its own.
 
-``doubts_of`` asks about what is unlikely of it, ``vehicle_table`` makes of it the vehicle as a campaign states it. A
-``Job`` names batches and what to make of them;
-``python -m gateway.calibration.commissioning.work FOLDER`` does it with low priority and bounded memory and leaves a
-``Result``. Who decides what is done when is the service (gateway.service.commissioning).
+``doubts_of`` asks about unlikely answers, ``vehicle_table`` turns them into the vehicle of a campaign. A ``Job`` names
+batches and a task; ``python -m gateway.calibration.commissioning.work FOLDER`` does it with low priority and bounded
+memory and leaves a ``Result``. The service decides what is done when (gateway.service.commissioning).
 """
 
 from gateway.calibration.commissioning.answers import OF_THE_LINE, vehicle_table

@@ -1,4 +1,4 @@
-"""The vehicle that follows from what a fitter typed, and from what its line says of all its vehicles."""
+"""The vehicle from the fitter's answers, and from the figures common to its line."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -23,7 +23,7 @@ OF_THE_LINE: Final = (
     "front_wheel_limit_kg",
     "rear_wheel_limit_kg",
 )
-"""What the vehicles of a line share beside what a fit inherits: taken from it where nothing else is said."""
+"""Figures common to a line besides what a fit inherits: used unless others are stated."""
 
 _VEHICLE: Final = TypeAdapter(Vehicle)
 
@@ -31,7 +31,7 @@ NO_LINE: Final[Mapping[str, Any]] = MappingProxyType({})
 
 
 def vehicle_table(said: VehicleAnswers, name: str, of_the_line: Mapping[str, Any] = NO_LINE) -> Vehicle:
-    """[vehicle] of a campaign; ``name`` where none was typed. Raises CampaignError in words for people."""
+    """[vehicle] of a campaign; ``name`` if none was typed. Raises CampaignError in words for people."""
     if (said.empty_mass_kg is None) != (said.empty_front_share_pct is None):
         raise CampaignError("empty_mass_kg and empty_front_share_pct belong together: give both or neither")
     typed = {name: answer for name, answer in asdict(said).items() if answer is not None and name != "division_kg"}

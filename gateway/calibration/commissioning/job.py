@@ -1,4 +1,4 @@
-"""What the service asks of the process that fits, and what that finds: two JSON files in a folder of their own."""
+"""The service's jobs for the process that fits, and their results: two JSON files in a folder of their own."""
 
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -28,14 +28,16 @@ class Drive(_Table):
 
 
 class Job(_Table):
-    """Look at the drives, and fit them too where ``is_fit``; ``like`` are files of sister vehicles or of their line."""
+    """Inspect the drives, and also fit them if ``is_fit``; ``like`` are files of vehicles of the same model or of their
+    line.
+    """
 
     vehicle: Vehicle
     drives: tuple[Drive, ...] = Field(min_length=1)
     settings: dict[str, Any]
     like: tuple[Path, ...] = ()
     is_fit: bool = True
-    goal_std_share: float = Field(gt=0.0, description="of the largest payload: the standard deviation that is aimed at")
+    goal_std_share: float = Field(gt=0.0, description="of the largest payload: the standard deviation that is the goal")
     most_memory_mb: float = Field(gt=0.0)
     command: str
 
@@ -50,12 +52,12 @@ class Found(_Table):
 
 
 class Learned(_Table):
-    """How well loads would be weighed with what is known now: standard deviations over the loads it may carry."""
+    """The accuracy reached so far: standard deviations over the loads the vehicle may carry."""
 
     payload_std_kg: float
     front_share_std_pct: float
     needed_std_kg: float = Field(
-        description="what is aimed at, or where another hour of such driving would help no more"
+        description="the goal, or the value that another hour of such driving would no longer improve"
     )
 
     @property
@@ -65,12 +67,12 @@ class Learned(_Table):
 
     @property
     def share(self) -> float:
-        """0..1 of what is to be learned."""
+        """0 to 1 of the goal."""
         return min(1.0, self.needed_std_kg / self.payload_std_kg)
 
 
 class Result(_Table):
-    """What came of a job. ``fault`` says in words why there is no calibration; its text is that of the file."""
+    """The result of a job. ``fault`` says in words why there is no calibration; its text is that of the file."""
 
     findings: tuple[Found, ...] = ()
     refusal: str | None = None
@@ -85,7 +87,7 @@ class Result(_Table):
 
 
 def to_file(table: BaseModel, path: Path) -> None:
-    """For the folder of a job, which nobody needs after a power cut."""
+    """For the folder of a job, which is worthless after a power cut."""
     path.write_text(table.model_dump_json(), encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""Whether enough was driven: what is known of the vehicle against what is needed, not how long it took."""
+"""Whether the driving is sufficient: the accuracy reached compared with the goal, not the time driven."""
 
 import math
 from typing import Final
@@ -23,10 +23,10 @@ EVERY: Final = 6  # of the loads that it may carry: enough to average over what 
 
 
 def learned_by(outcome: Outcome, vehicle: Vehicle, goal_std_share: float) -> Learned:
-    """What the empty drives of ``outcome`` taught, as the service will state it, and what is needed.
+    """The accuracy after the empty drives of ``outcome``, as the service will state it, and the accuracy needed.
 
-    Needed is the goal, a share of the largest payload; or what another hour of the same would leave, less a tenth:
-    where that is more, only loads would help, and driving on is in vain.
+    Needed is the goal, a share of the largest payload; or, if it is larger, the accuracy after another hour of the same
+    driving plus a tenth: then only known loads would help, and driving on is in vain.
     """
     if outcome.cross_spectrum is None:
         raise CalibrationImpossibleError("the drives carry no cross-spectral calibration")

@@ -1,8 +1,8 @@
-"""Whether what a fitter typed can be: held against what road vehicles are like, and against the line's other vehicles.
+"""Whether a fitter's answers are plausible: compared with ordinary road vehicles, and with the line's other vehicles.
 
-    doubts_of(answers, line) -> what to ask the fitter, each with the answer that was probably meant
+    doubts_of(answers, line) -> questions for the fitter, each with the answer that was probably meant
 
-Nothing has been driven here: what a drive says of the same answers is in ``gateway.calibration.contradicted``.
+These checks use no drive; ``gateway.calibration.contradicted`` compares the same answers with a drive.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -18,9 +18,10 @@ from gateway.errors import CampaignError
 from gateway.stated import VehicleAnswers
 from gateway.stated.doubt import Doubt, DoubtKind
 
-# What vehicles with two axles are like. Chosen so that makers' figures of these lie inside: Smart fortwo 1.87 m and 880
-# kg, Fiat 500, VW Golf 2.62 m and 1300 kg, Land Rover Defender 2.59 m and 2400 kg, VW Caddy, Ford Transit, Mercedes
-# Sprinter 4.33 m and 2400 kg, Hummer EV 3.44 m and 4100 kg, trucks of 7.5 t (4.2 m, 4 t) and 18 t (6 m, 8 t), coaches.
+# Ordinary figures of vehicles with two axles. Chosen so that makers' figures of these lie inside: Smart fortwo 1.87 m
+# and 880 kg, Fiat 500, VW Golf 2.62 m and 1300 kg, Land Rover Defender 2.59 m and 2400 kg, VW Caddy, Ford Transit,
+# Mercedes Sprinter 4.33 m and 2400 kg, Hummer EV 3.44 m and 4100 kg, trucks of 7.5 t (4.2 m, 4 t) and 18 t (6 m, 8 t),
+# coaches.
 WHEELBASE_M: Final = (1.6, 7.5)
 MASS_PER_WHEELBASE2: Final = (110.0, 380.0)  # kg/m2, empty, driver and tank as in service
 FRONT_SHARE_PCT: Final = (36.0, 70.0)  # empty: 38 with the engine behind the rear axle, up to 65 in a van
@@ -33,7 +34,7 @@ MOST_HEIGHT_M: Final = 3.0  # above the floor: 4 m is the legal height
 UNSPRUNG_SHARE: Final = (0.025, 0.15)  # of the empty vehicle, one axle's wheels, brakes and half its links
 LEAST_SPRUNG: Final = 0.75  # of the empty vehicle
 
-# What sisters have in common; shelves and a tail lift make up for a tenth. Chosen.
+# Figures that vehicles of a line share; shelves and a tail lift account for a tenth. Chosen.
 MOST_MASS_OFF: Final = 0.12
 MOST_AXLE_OFF: Final = 0.18
 MOST_TRACK_OFF: Final = 0.05
@@ -64,12 +65,12 @@ _SLIPPED: Final[Mapping[tuple[str, ...], tuple[float, ...]]] = MappingProxyType(
         ("rear_axle_limit_kg",): _MASS_SLIPS,
     }
 )
-"""Answers that are typed together, and the factors from what was typed to what was probably meant."""
+"""Answers that are typed together, and the factors from the typed to the probably meant number."""
 
 
 @dataclass(frozen=True, slots=True)
 class LineFacts:
-    """What a line's file says of its vehicles; None where it does not say."""
+    """A figure of a line's vehicles from its file; None if it has none."""
 
     sprung_kg: float | None = None
     wheelbase_m: float | None = None
@@ -82,7 +83,7 @@ _ANSWERS: Final = TypeAdapter(VehicleAnswers)
 
 
 def doubts_of(said: VehicleAnswers, line: LineFacts = NO_LINE) -> tuple[Doubt, ...]:
-    """What is unlikely; with the answers that leave no doubt where one slip of the pen explains it all."""
+    """Unlikely answers; with the answers that leave no doubt if one slip explains all."""
     found = tuple(_checked(said, line))
     meant = _meant(said, line) if found else {}
     return tuple(one.model_copy(update={"meant": meant}) for one in found) if meant else found
@@ -94,7 +95,7 @@ def _checked(said: VehicleAnswers, line: LineFacts) -> Iterator[Doubt]:
 
 
 def _meant(said: VehicleAnswers, line: LineFacts) -> dict[str, Any]:
-    """The answers after which no doubt is left; empty where no single slip explains it."""
+    """The answers after which no doubt is left; empty if no single slip explains it."""
     for changed in _candidates(said):
         try:
             fresh = _ANSWERS.validate_python(asdict(replace(said, **changed)))
@@ -171,7 +172,7 @@ def _beside_its_line(said: VehicleAnswers, line: LineFacts) -> Iterator[Doubt]:
 
 
 def _sprung_kg(said: VehicleAnswers) -> float | None:
-    """None where the axle weights leave no body, which ``vehicle_table`` refuses."""
+    """None if the axle weights leave no body, which ``vehicle_table`` refuses."""
     if said.empty_mass_kg is not None:
         return said.empty_mass_kg
     weights = AxleWeights(

@@ -1,7 +1,7 @@
 """The process that inspects and fits: ``python -m gateway.calibration.commissioning.work FOLDER``.
 
-Lowest priority, one thread, bounded memory: weighing goes on beside it. What goes wrong with the drives is part of the
-result; a process that leaves no result was ended from outside, or ran out of memory.
+Lowest priority, one thread, bounded memory, so that weighing goes on at the same time. Faults of the drives are part of
+the result; a process without a result was ended from outside, or ran out of memory.
 """
 
 import contextlib
@@ -30,7 +30,7 @@ BYTES_PER_MB: Final = 1_000_000
 
 
 def main(folder: Path) -> None:
-    """Do the job that lies in ``folder``."""
+    """Do the job in ``folder``."""
     begun_s = time.monotonic()
     job = Job.model_validate_json((folder / JOB).read_bytes())
     _take_little(job.most_memory_mb)
@@ -47,7 +47,7 @@ def main(folder: Path) -> None:
 
 
 def done(path: Path, job: Job) -> Result:
-    """What comes of it. Raises SpringscaleError where nothing can be told at all."""
+    """What comes of it. Raises SpringscaleError if it cannot write any result."""
     campaign = _campaign(path, job)
     inspection = inspect_kept(campaign, tuple(_drives(job)), BatchSettings(**job.settings))
     looked = Result(findings=findings_of(_findings(inspection)), refusal=inspection.refusal)
@@ -111,7 +111,9 @@ def _take_little(most_memory_mb: float) -> None:
 
 
 def _most_memory_mb() -> float:
-    """Held so far, by Linux's own account; 0 elsewhere. What getrusage tells is the service's where that held more."""
+    """Memory in use so far, by Linux's own account; 0 elsewhere. getrusage reports the service's memory if that was
+    more.
+    """
     with contextlib.suppress(OSError):
         found = re.search(r"^VmHWM:\s+(\d+) kB$", Path("/proc/self/status").read_text("ascii", "replace"), re.MULTILINE)
         if found:

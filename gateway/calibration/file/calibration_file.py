@@ -36,7 +36,7 @@ class CalibrationFile(Part):
     cross_spectrum: CrossSpectrumCalibration | None = None
     ratio_index: RatioIndexCalibration | None = None
     line: LinePart | None = Field(
-        None, description="what sister vehicles told before it was driven; null: its own drives are all that it knows"
+        None, description="prior from vehicles of the same line; null: its own drives are the only data"
     )
     expected_errors: dict[str, ExpectedErrorsPart] = Field(
         default_factory=dict, description="by estimator: errors on runs left out of the fit"
@@ -58,7 +58,7 @@ class CalibrationFile(Part):
 
     @property
     def id(self) -> str:
-        """sha256 of the canonical JSON of everything in the file but the id itself: what estimates name."""
+        """sha256 of the canonical JSON of everything in the file but the id itself; estimates name it."""
         return content_id(self.model_dump(mode="json"))
 
     def to_json(self) -> str:
@@ -67,7 +67,7 @@ class CalibrationFile(Part):
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
     def for_core(self) -> CalibratedVehicle:
-        """What the estimators need of it. Raises as :meth:`require_known` does."""
+        """The calibrations that the estimators need. Raises as :meth:`require_known` does."""
         self.require_known()
         return CalibratedVehicle(
             id=self.id,
@@ -80,7 +80,7 @@ class CalibrationFile(Part):
         )
 
     def require_known(self) -> None:
-        """Raises CalibrationFileError where the model has other parameters, or a regression other terms, today."""
+        """Raises CalibrationFileError if today's model has other parameters, or a regression other terms."""
         if self.cross_spectrum and self.cross_spectrum.names not in (PARAMETERS, PARAMETERS + ROLL_PARAMETERS):
             raise CalibrationFileError(
                 "the cross_spectrum part was fitted with another vehicle model than this springscale has: "
@@ -95,7 +95,7 @@ class CalibrationFile(Part):
 
     @property
     def estimators(self) -> tuple[str, ...]:
-        """Estimators that this file holds a calibration for; the service runs the first unless told otherwise."""
+        """Estimators that this file has a calibration for; the service runs the first by default."""
         held = {"cross_spectrum": self.cross_spectrum, "ratio_index": self.ratio_index}
         return tuple(name for name, part in held.items() if part is not None)
 
@@ -110,7 +110,7 @@ def content_id(content: dict[str, Any]) -> str:
 def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> CalibrationFile:
     """Reads; checks version, hash and shape.
 
-    ``read`` sees to the signature where one is required (files.signed).
+    ``read`` checks the signature if one is required (files.signed).
 
     Raises CalibrationFileError saying what to do.
     """
@@ -149,7 +149,7 @@ def matches_its_id(content: Content) -> bool:
 
 
 def read_content(path: Path, read: Read) -> Content:
-    """A file's JSON object. Raises CalibrationFileError where it is none."""
+    """A file's JSON object. Raises CalibrationFileError if it is none."""
     try:
         content = json.loads(read(path).decode("utf-8"))
     except FileNotFoundError:

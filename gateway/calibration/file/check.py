@@ -1,4 +1,4 @@
-"""Is a calibration file what it says, and do the logs still lie there that it was made from?"""
+"""Whether a calibration file is intact, and whether the logs it was made from are unchanged."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -27,7 +27,7 @@ class Check:
 
 
 def check_against_campaign(file: CalibrationFile, campaign: Campaign) -> tuple[Check, ...]:
-    """Logs, loads and campaign file against what the calibration says it was made from."""
+    """Logs, loads and campaign file compared with the calibration's record of them."""
     return (_campaign_file(file, campaign), *(_run(run, campaign) for run in file.provenance.runs))
 
 
@@ -52,8 +52,8 @@ def _run(run: RunPart, campaign: Campaign) -> Check:
         return Check(
             what,
             Verdict.FAULT,
-            f"{log}: calibrated as {run.payload_kg:g} kg and {run.front_share_pct:.4g} %, "
-            f"the campaign says {stated.payload_kg:g} kg and {campaign.front_share_pct(stated):.4g} %",
+            f"{log}: calibrated as {run.payload_kg:g} kg and {run.front_share_pct:.4g} %, the campaign says "
+            f"{stated.payload_kg:g} kg and {campaign.front_share_pct(stated):.4g} %",
         )
     return Check(what, Verdict.GOOD, f"{log}")
 

@@ -1,7 +1,7 @@
-"""What a calibration file found out, as figures, and in what two files differ.
+"""The fitted figures of a calibration file, and the differences between two files.
 
-A figure has a standard deviation and the unit that its name ends in. Stated facts are compared as they stand, fitted
-figures in combined standard deviations.
+A figure has a standard deviation and the unit that its name ends in. Stated facts are compared directly, fitted figures
+in combined standard deviations.
 """
 
 import math
@@ -34,7 +34,7 @@ class Figure:
     is_positive: bool = False
 
     def distance(self, other: "Figure") -> float:
-        """How far apart two such figures are, in standard deviations of their difference; inf where both are exact."""
+        """Distance of two such figures, in standard deviations of their difference; inf if both are exact."""
         if self.is_positive and other.is_positive:
             apart = math.log(self.centre / other.centre)
             combined = math.hypot(self.std / self.centre, other.std / other.centre)
@@ -59,7 +59,7 @@ def figures_of(file: CalibrationFile) -> dict[str, tuple[Figure, ...]]:
 
 
 def _half_car(part: CrossSpectrumCalibration) -> tuple[Figure, ...]:
-    """A parameter held as a logarithm comes with its standard deviation of first order."""
+    """A parameter stored as a logarithm comes with its standard deviation of first order."""
     stds = np.sqrt(np.diag(part.covariance))
     figures = []
     for name, entry, std in zip(part.names, part.parameters.tolist(), stds.tolist(), strict=True):
@@ -69,11 +69,11 @@ def _half_car(part: CrossSpectrumCalibration) -> tuple[Figure, ...]:
 
 
 def _regression(part: RegressionModel) -> tuple[Figure, ...]:
-    """Constant and coefficients of the terms as they are, in the target's unit: comparable whatever the scaling.
+    """Constant and coefficients of the unscaled terms, in the target's unit: comparable whatever the scaling.
 
     The file has them of columns scaled to [-1, 1] by lows l and highs h:
-    b_0 + sum b_i (2 x_i - h_i - l_i) / (h_i - l_i). With T for the step from these b to those of x,
-    Var = s^2 T (X'X)^-1 T'.
+    b_0 + sum b_i (2 x_i - h_i - l_i) / (h_i - l_i). With T for the step from these b to those of x, Var = s^2 T
+    (X'X)^-1 T'.
     """
     span = part.highs - part.lows
     to_raw = np.diag(np.r_[1.0, 2.0 / span])
@@ -86,9 +86,9 @@ def _regression(part: RegressionModel) -> tuple[Figure, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One place where two files differ. ``n_std``: in combined standard deviations; None for a plain fact.
+    """One difference between two files. ``n_std``: in combined standard deviations; None for a plain fact.
 
-    ``one`` and ``other`` are as in the files; None where that file does not have the place.
+    ``one`` and ``other`` are as in the files; None if that file does not have the place.
     """
 
     where: str
@@ -104,7 +104,7 @@ def differences(one: CalibrationFile, other: CalibrationFile) -> tuple[Differenc
 
 
 def _plain(one: CalibrationFile, other: CalibrationFile) -> Iterator[Difference]:
-    """Of a part that one file lacks, such as the line that the other inherited from, the first fact stands for all."""
+    """If one file lacks a whole part, such as the line that the other inherited from, its first fact represents all."""
     mine, its = (file.model_dump(mode="json") for file in (one, other))
     lacked = {name for name in mine if (mine[name] is None) != (its[name] is None)}
     ours, theirs = dict(_leaves(mine)), dict(_leaves(its))

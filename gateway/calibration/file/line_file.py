@@ -42,8 +42,8 @@ class LineFile(Part):
     line: LinePart
     expected_errors: ExpectedErrorsPart | None = Field(
         None,
-        description="root mean square, of siblings left out in turn, each calibrated by one empty drive of its own and "
-        "what the others tell; null: none was left out",
+        description="root mean square, of siblings left out in turn, each calibrated by one empty drive of its own "
+        "and the others as prior; null: none was left out",
     )
     warnings: tuple[str, ...] = ()
 

@@ -1,4 +1,6 @@
-"""What a calibration inherited from sister vehicles, as the file holds it; a line file holds the same."""
+"""The prior that a calibration inherited from vehicles of its line, as stored in its file; a line file stores the
+same.
+"""
 
 from typing import Annotated, Final, Self
 
@@ -16,7 +18,7 @@ NAMES: Final = PARAMETERS + ROLL_PARAMETERS
 
 
 class EvidencePart(Part):
-    """What members' drives say of the line's mean: the inverse of a covariance, and that times the mean."""
+    """The members' information on the line's mean: the inverse of a covariance, and that times the mean."""
 
     names: tuple[str, ...]
     information: F64
@@ -32,14 +34,14 @@ class EvidencePart(Part):
 
     @classmethod
     def of(cls, information: F64, pull: F64, names: tuple[str, ...]) -> Self:
-        """Of those ``names`` (n,) of which something is known, from information (n, n) and pull (n,)."""
+        """Of the ``names`` (n,) with information, from information (n, n) and pull (n,)."""
         known = np.flatnonzero(np.any(information != 0.0, axis=1))
         return cls(
             names=tuple(names[i] for i in known), information=information[np.ix_(known, known)], pull=pull[known]
         )
 
     def spread(self, names: tuple[str, ...]) -> tuple[F64, F64]:
-        """Information (n, n) and pull (n,) of all ``names``, zero where nothing is known."""
+        """Information (n, n) and pull (n,) of all ``names``, zero for unknown ones."""
         at = [names.index(name) for name in self.names]
         information, pull = np.zeros((len(names), len(names))), np.zeros(len(names))
         information[np.ix_(at, at)] = self.information
@@ -48,7 +50,7 @@ class EvidencePart(Part):
 
 
 class LinePart(Part):
-    """What the calibrations of several vehicles say of the next one of their line; see calibration.line.Line."""
+    """The prior for the next vehicle of a line from the calibrations of several; see calibration.line.Line."""
 
     members: tuple[str, ...] = Field(min_length=1, description="ids of the calibrations it was made of")
     wheelbase_m: float = Field(gt=0.0)
@@ -57,15 +59,15 @@ class LinePart(Part):
     half_car: EvidencePart
     roll: EvidencePart | None = Field(description="null: no member read a roll rate")
     scatter_std: dict[str, Annotated[float, Field(gt=0.0, allow_inf_nan=False)]] = Field(
-        description="of the difference between two vehicles: shares of what is positive, else in the unit that ends "
-        "the name; what is not named here is each vehicle's own"
+        description="of the difference between two vehicles: relative for positive quantities, else in the unit that "
+        "ends the name; unnamed ones are each vehicle's own"
     )
     n_siblings: int = Field(ge=0, description="how many vehicles the scatter was estimated from; 0: the defaults")
     seen: Seen
     limits: Limits
 
     def require_known(self) -> None:
-        """Raises CalibrationFileError where the model has other parameters today."""
+        """Raises CalibrationFileError if today's model has other parameters."""
         unknown = set(self.half_car.names) - set(PARAMETERS)
         unknown |= set(self.roll.names if self.roll else ()) - set(ROLL_PARAMETERS)
         if unknown:
@@ -76,7 +78,7 @@ class LinePart(Part):
 
     @property
     def scatter(self) -> F64:
-        """``scatter_std`` (n,) in the order of NAMES, 0 where none is named."""
+        """``scatter_std`` (n,) in the order of NAMES, 0 if not named."""
         ordered = np.zeros(len(NAMES))
         for name, std in self.scatter_std.items():
             if name in INDEX:  # another model's name is refused by ``require_known``

@@ -1,4 +1,4 @@
-"""The tables of the calibration file that only it has; vehicle and estimators stand in it as the core's own records."""
+"""The tables that only the calibration file has; it contains vehicle and estimators as the core's own records."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -14,21 +14,21 @@ class Part(BaseModel):
 
 
 class SeenPart(Part):
-    """What the identification runs covered, and those of its line: the ranges of validity."""
+    """The ranges that the identification runs covered, and those of its line: the ranges of validity."""
 
     payload_kg: tuple[float, float]
     front_share_pct: tuple[float, float]
     speed_mps: tuple[float, float]
     sensor_rate_hz: tuple[float, float] | None = Field(
-        description="how often the slower of accelerometer and gyro sent; null: not known"
+        description="lower sending rate of accelerometer and gyro; null: not known"
     )
     roughness_mps2: tuple[float, float] | None = Field(
-        description="of the roads: vertical acceleration, root mean square from 1 to 15 Hz, brought to 80 km/h"
+        description="of the roads: vertical acceleration, root mean square from 1 to 15 Hz, scaled to 80 km/h"
     )
 
 
 class RunPart(Part):
-    """One known-load drive: where its numbers come from."""
+    """One known-load drive: the source of its numbers."""
 
     number: int
     log: str

@@ -1,4 +1,4 @@
-"""Whether a calibration file's numbers can be those of a vehicle: its hash tells only that nobody changed them."""
+"""Whether a calibration file's numbers are plausible for a vehicle: its hash only proves that they are unchanged."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ LEAST_EIGENVALUE: Final = 1e-12  # of a covariance scaled to ones on its diagona
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """A row of the table: which field, given by its path in the file, and what must hold of it."""
+    """A row of the table: a field, by its path in the file, and its condition."""
 
     path: str
     must_be: str
@@ -19,9 +19,9 @@ class Bound:
 
 
 def absurd(file: Any) -> str | None:
-    """The first field whose number can be no vehicle's, its value and what it must be; None where all are sound.
+    """The first field whose number is impossible for a vehicle, its value and its condition; None if all are sound.
 
-    A field that this file does not hold, or holds as null, is not looked at.
+    A field that is absent from this file, or null, is not checked.
     """
     with np.errstate(all="ignore"):
         for bound in BOUNDS:

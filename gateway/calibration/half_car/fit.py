@@ -4,8 +4,8 @@
     fit_cross_spectrum(runs, vehicle) -> the same, and what the other runs taught without each run
 
 The parameters are those most probable given all runs together, under priors any road vehicle
-would meet. Leaving out one run at a time then shows how far the intervals must be widened to be
-true of loads that calibration has not seen.
+would meet. Leaving out one run at a time then shows how far the intervals must be widened to be valid for loads that
+calibration has not seen.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -64,9 +64,9 @@ _STARTS: Final = ((0.0, 0.0), (0.4, 0.3), (-0.4, -0.3))  # log springs, log damp
 
 @dataclass(frozen=True, slots=True)
 class CrossSpectrumFit:
-    """The calibration, and by run number what all other runs teach; empty where too few to leave one out.
+    """The calibration, and by run number the calibration from all other runs; empty if too few to leave one out.
 
-    The errors (n,) are those of every batch of a run left out, weighed by the others; None where none could be.
+    The errors (n,) are those of every batch of a run left out, weighed by the others; None if there are none.
     """
 
     calibration: CrossSpectrumCalibration
@@ -88,8 +88,8 @@ def fit_cross_spectrum(
 ) -> CrossSpectrumFit:
     """Fit the half-car to ``runs``; one empty run is enough, then with the warning ``springs_from_priors``.
 
-    ``inherited`` is what vehicles of the same line tell; it takes the place of what is usual of any vehicle.
-    ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError where no run holds enough
+    ``inherited`` is the prior from vehicles of the same line; it replaces the prior of any vehicle.
+    ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError if no run has enough
     steady driving.
     """
     usual = inherited.usual if inherited else None
@@ -107,8 +107,8 @@ def fit_cross_spectrum(
     calibration = taught(known, _from_priors(known, prior, shifts, step))
     if not isfinite(calibration.misfit_limit):
         raise CalibrationImpossibleError(
-            "hardly two stretches were driven at one speed, so that nothing tells whether the half-car fits: drive at "
-            "an even speed"
+            "hardly two stretches were driven at one speed, so the fit of the half-car cannot be tested: drive at an "
+            "even speed"
         )
     calibration = replace(calibration, directions=_directions(calibration, vehicle, runs))
     untested = calibration if inherited else _untested(calibration)
@@ -177,7 +177,7 @@ def _counted(progress: Callable[[int, int], None] | None, n_steps: int) -> Calla
 def _from_priors(
     known: Sequence[KnownSpectra], prior: Prior, shifts: Sequence[tuple[float, float]], step: Callable[[], None]
 ) -> Found:
-    """The most probable of what is found from each start: the posterior need not have one peak."""
+    """The most probable of the results from each start: the posterior may have several peaks."""
     return fit_vehicle(known, prior, [prior.start(*shift) for shift in shifts], step)
 
 
@@ -186,8 +186,8 @@ def _left_out_in_turn(
 ) -> Iterator[tuple[KnownSpectra, list[KnownSpectra], F64]]:
     """Each run, all others, and a start (p,) for their fit in which that run had no part.
 
-    Every second run is of one half, the rest of the other: the start is what the half without the run has found from
-    the priors. That costs a quarter of trying all of _STARTS for every run, and comes out at the same peak.
+    Every second run is of one half, the rest of the other: the start is the result, from the priors, of the half
+    without the run. That costs a quarter of trying all of _STARTS for every run, and reaches the same peak.
     """
     starts = [_from_priors(half, prior, shifts, step).x for half in (known[1::2], known[::2])]
     for i, one in enumerate(known):
@@ -195,7 +195,7 @@ def _left_out_in_turn(
 
 
 def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
-    """What the known runs taught, its intervals not yet tested on any run left out."""
+    """The calibration from the known runs, its intervals not yet tested on any run left out."""
     seen = seen_by(known, found.x)
     reading = seen[0].spectra.reading
     runs = [k.run for k in known]

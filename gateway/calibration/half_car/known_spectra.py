@@ -28,8 +28,8 @@ class KnownSpectra:
     """A run's spectra and likelihood with its true load.
 
     ``whittle`` is of vertical acceleration and pitch rate. With a roll rate, ``rolling`` is of all three sensors,
-    :meth:`brought` makes ``whittle`` what it would be on the centre line, and :meth:`stroking` lets friction go by how
-    fast each axle's springs move.
+    :meth:`brought` makes ``whittle`` that of a sensor on the centre line, and :meth:`stroking` makes friction depend on
+    each axle's stroke speed.
     """
 
     def __init__(self, run: KnownRun, vehicle: Vehicle, spectra: CrossSpectra) -> None:
@@ -41,11 +41,13 @@ class KnownSpectra:
 
     @property
     def rolling(self) -> Whittle:
-        """Of all three sensors as they read."""
+        """Of all three sensors as measured."""
         return self._whittle(self.spectra.within(ROLL_BAND_HZ))
 
     def brought(self, theta: F64) -> "KnownSpectra":
-        """The same run seen from the centre line, with the sensor where theta (n,) of a vehicle that rolls has it."""
+        """The same run seen from the centre line, with the sensor at its place in theta (n,) of a vehicle that
+        rolls.
+        """
         one = copy(self)
         reading = replace(self.spectra.reading, mount=mount_of(theta))
         spectra = _spectra_of(self.run, reading)
@@ -55,7 +57,7 @@ class KnownSpectra:
         return one
 
     def stroking(self, theta: F64, usual_mps: tuple[float, float]) -> "KnownSpectra":
-        """The same run with how much faster than usual the axles of a half-car theta (p,) stroke."""
+        """The same run with the axles' stroke speeds relative to the usual ones, by a half-car theta (p,)."""
 
         def told(spectra: CrossSpectra) -> CrossSpectra:
             usual = replace(spectra, reading=replace(spectra.reading, usual_stroke_mps=usual_mps))
@@ -66,31 +68,35 @@ class KnownSpectra:
         return one
 
     def log_stroke_speeds(self, theta: F64) -> F64:
-        """(2,) logarithm of how fast (m/s) front and rear axle of a half-car theta (p,) stroke, over all segments."""
+        """(2,) logarithm of the stroke speed (m/s) of front and rear axle of a half-car theta (p,), over all
+        segments.
+        """
         spectra = self.whittle.spectra
         every = log_stroke_speeds(spectra, theta, self.run.load, self.whittle.ground)
         return np.asarray(np.average(every, axis=0, weights=spectra.n_segments[:, 0]), float)
 
     def at(self, theta: F64) -> Point:
-        """The half-car's parameters theta (p,) with the run's load, where this was noted to lie."""
+        """The half-car's parameters theta (p,) with the run's load at its stated position."""
         if self.run.payload_left_m and len(self._roll):
             return self.placed(np.r_[theta, self._roll], 0.0)
         return Point.of(theta, self.run.load)
 
     def placed(self, theta: F64, moment_off_kgm: float) -> Point:
-        """All parameters theta (n,) of a vehicle that rolls, the payload's moment about the centre line so far off."""
+        """All parameters theta (n,) of a vehicle that rolls, with this error of the payload's moment about the centre
+        line.
+        """
         moment_kgm = self.run.payload_kg * (self.run.payload_left_m or 0.0) + moment_off_kgm
         cg_left_m = self.empty_share * float(theta[INDEX["empty_left_m"]]) + moment_kgm / self.total_kg
         return Point.of(theta, self.run.load, cg_left_m)
 
     @property
     def moment_std_kgm(self) -> float:
-        """How sure the payload's moment about the centre line is."""
+        """Precision of the payload's moment about the centre line."""
         return self.run.payload_kg * self.run.payload_left_std_m + LEAST_MOMENT_STD_KGM
 
     @property
     def total_kg(self) -> float:
-        """Of all that is sprung."""
+        """Of the whole sprung mass."""
         return self._vehicle.empty_mass_kg + self.run.payload_kg
 
     @property
@@ -105,16 +111,15 @@ class KnownSpectra:
 def known_spectra(
     runs: Sequence[KnownRun], vehicle: Vehicle, *, with_roll: bool = False, usual: Usual | None = None
 ) -> list[KnownSpectra]:
-    """Those of ``runs`` that hold enough steady driving, their usual amplitude the median of all unless given.
+    """The spectra of the ``runs`` with enough steady driving, their usual amplitude the median of all unless given.
 
-    ``with_roll`` reads the roll rate too, where every run has one. Raises CalibrationImpossibleError where no run holds
-    enough.
+    ``with_roll`` reads the roll rate too, if every run has one. Raises CalibrationImpossibleError if no run has enough.
     """
     reading = Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT, with_roll=with_roll)
     read = [(run, spectra) for run in runs if (spectra := _spectra_of(run, reading)) is not None]
     if not read:
         raise CalibrationImpossibleError(
-            "no run holds enough steady driving with both sensors for the cross-spectral estimator: drive at least a "
+            "no run has enough steady driving with both sensors for the cross-spectral estimator: drive at least a "
             "minute at speed, and map both"
         )
     if usual is None:

@@ -1,4 +1,4 @@
-"""Batches of runs, or of vehicles, left out of a fit and weighed by what it taught: what they show of it."""
+"""Batches of runs, or of vehicles, left out of a fit and weighed by it: the errors they show."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,8 +30,8 @@ LEAST_PART: Final = 0.25  # of the usual variance: a campaign of one road and on
 
 @dataclass(frozen=True, slots=True)
 class RunError:
-    """One left-out run: mean error (3,) of payload (kg), front share (%) and lateral place (m; NaN where unknown), the
-    variances (3,) predicted for it without any error of the model, and how far its load lies beyond the others.
+    """One left-out run: mean error (3,) of payload (kg), front share (%) and lateral place (m; NaN if unknown), the
+    variances (3,) predicted for it without model error, and its load's distance beyond the others.
     """
 
     error: F64
@@ -48,7 +48,7 @@ class ModelError:
 
 
 def model_error(runs: Sequence[RunError], empty_mass_kg: float) -> ModelError:
-    """What these runs show; without any, what other vans showed."""
+    """The model error by these runs; without any, that of other vans."""
     usual = np.array([USUAL_PAYLOAD_SHARE * empty_mass_kg, USUAL_FRONT_SHARE_PCT, USUAL_CG_LEFT_M]) ** 2
     stds, grown = [], []
     for i, variance in enumerate(usual):
@@ -66,16 +66,16 @@ def model_error(runs: Sequence[RunError], empty_mass_kg: float) -> ModelError:
 
 MISFIT_MARGIN: Final = 3.0
 SCORE_MARGIN: Final = 1.5
-"""For other roads and loads than those of calibration. Chosen; `benchmarks.accuracy sensitivity` tells what they do."""
+"""For other roads and loads than those of calibration. Chosen; `benchmarks.accuracy sensitivity` shows their effect."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeftOut:
-    """A batch of a run that the others weighed, as the service weighs it but for what such batches are to show.
+    """A batch of a run weighed by the others, as the service weighs it except for the model error that such batches
+    estimate.
 
-    error (d,) is of payload (kg), front share (%) and, where roll shows it, the lateral place (m; NaN where nobody
-    noted where the payload lay). reach is how far the load lies beyond the others'. The misfit is NaN where the run
-    itself lies beyond.
+    error (d,) is of payload (kg), front share (%) and, with a roll rate, the lateral place (m; NaN if the payload's was
+    not stated). reach is the load's distance beyond the others'. The misfit is NaN if the run itself lies beyond.
     """
 
     run: int
@@ -115,7 +115,7 @@ def left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) ->
 
 
 def limits_shown_by(errors: Sequence[LeftOut], misfit_limit: float, empty_mass_kg: float) -> Limits:
-    """What these ask for; ``misfit_limit`` is what the fit of all asks for."""
+    """The limits from these; ``misfit_limit`` is the limit from the fit of all."""
     of_model = model_error(
         [_of_run(list(batches)) for _, batches in groupby(errors, lambda one: one.run)], empty_mass_kg
     )
@@ -129,7 +129,7 @@ def limits_shown_by(errors: Sequence[LeftOut], misfit_limit: float, empty_mass_k
 
 
 def _of_run(batches: Sequence[LeftOut]) -> RunError:
-    """Batches of one run are one witness: their own errors average out, what the calibration left open does not.
+    """Batches of one run are correlated: their own errors average out, errors of the calibration do not.
 
     The day and the sensor are those of the campaign, which had no time to change.
     """

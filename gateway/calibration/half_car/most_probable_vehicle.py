@@ -1,4 +1,4 @@
-"""The most probable vehicle: its half-car, and where a roll rate was read, how it rolls."""
+"""The most probable vehicle: its half-car, and with a roll rate its roll parameters."""
 
 from collections.abc import Callable, Sequence
 from math import exp
@@ -20,10 +20,10 @@ TURNS: Final = 3  # the sensor's place is found by the second; how fast axles st
 def fit_vehicle(
     known: Sequence[KnownSpectra], prior: Prior, starts: Sequence[F64], step: Callable[[], None] = lambda: None
 ) -> Found:
-    """The most probable parameters (n,) of all known runs together, of what is found from each of ``starts`` (n,).
+    """The most probable parameters (n,) of all known runs together, the best result from ``starts`` (n,).
 
-    ``step`` is called after each. For how half-car and roll take turns, see rolling_fit. How fast axles stroke waits
-    for the second turn: before the first nobody knows the vehicle that tells it.
+    ``step`` is called after each. For the alternation of half-car and roll see rolling_fit. Stroke speeds enter in the
+    second turn: before the first, the vehicle that predicts them is unknown.
     """
     tried = []
     for start in starts:
@@ -41,10 +41,10 @@ def fit_vehicle(
 
 
 def seen_by(known: Sequence[KnownSpectra], theta: F64) -> Sequence[KnownSpectra]:
-    """The runs as a half-car is held against them.
+    """The runs as the half-car is fitted to them.
 
-    If theta (n,) knows how the vehicle rolls, from the centre line, and with how fast each axle strokes: over what is
-    usual, which is the median of the runs where they do not say.
+    If theta (n,) has roll parameters, seen from the centre line, and with each axle's stroke speed relative to the
+    usual one: the median of the runs if they do not state it.
     """
     if not has_roll(theta):
         return known

@@ -1,9 +1,9 @@
-"""What any road vehicle's suspension is like, before it has been driven: weak log-normal priors.
+"""The prior of any road vehicle's suspension before its first drive: weak log-normal priors.
 
 Body bounce near 1.3 Hz, damping near 0.3 of critical, tyres about ten times stiffer than springs,
 unsprung mass about 6 % of the sprung per axle, radius of gyration in pitch about 0.46 wheelbase
-(T. D. Gillespie, Fundamentals of Vehicle Dynamics, ch. 5). docs/campaign.md holds the unsprung share
-against measured cars.
+(T. D. Gillespie, Fundamentals of Vehicle Dynamics, ch. 5). docs/campaign.md compares the unsprung share with measured
+cars.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,9 @@ EMPTY_LEFT_STD_M: Final = 0.02  # driver, tank, sliding door; chosen
 SLACK: Final = 0.03
 SLOPE_STD_PER_KN: Final = 0.05
 BEND_STD_PER_KN: Final = 0.1
-"""Of each bend. The one at no added load repeats the slope but where a load relieves the axle; their priors add up."""
+"""Of each bend. The one at no added load repeats the slope except where a load relieves the axle; their priors add
+up.
+"""
 DAMPER_FRICTION, DAMPER_FRICTION_STD = 0.1, 0.3  # shares of the rate at the usual amplitude
 SPRING_FRICTION, SPRING_FRICTION_STD = 0.03, 0.05
 TRACK_OFFSET_M: Final = 0.03
@@ -72,7 +74,7 @@ _ROLL_STD: Final = {
 class Prior:
     """A Gaussian over the parameter vector: mean (p,) and precision (p, p), the inverse of its covariance.
 
-    How a vehicle rolls is independent of how it heaves and pitches.
+    Roll parameters are independent of heave and pitch parameters.
     """
 
     mean: F64
@@ -80,7 +82,7 @@ class Prior:
 
     @classmethod
     def independent(cls, mean: F64, std: F64) -> "Prior":
-        """Of parameters that know nothing of each other: mean and std (p,)."""
+        """Of independent parameters: mean and std (p,)."""
         return cls(mean, np.diag(std**-2.0))
 
     @property
@@ -96,18 +98,18 @@ class Prior:
 
     @property
     def upright(self) -> "Prior":
-        """Of how the vehicle heaves and pitches."""
+        """Of heave and pitch."""
         n = len(PARAMETERS)
         return Prior(self.mean[:n], self.precision[:n, :n])
 
     @property
     def roll(self) -> "Prior":
-        """Of how it rolls; empty where that is not asked."""
+        """Of roll; empty if that is not estimated."""
         n = len(PARAMETERS)
         return Prior(self.mean[n:], self.precision[n:, n:])
 
     def beside(self, roll: "Prior") -> "Prior":
-        """Of all parameters: this one of how the vehicle heaves and pitches, ``roll`` of how it rolls."""
+        """Of all parameters: this prior for heave and pitch, ``roll`` for roll."""
         return Prior(np.r_[self.mean, roll.mean], block_diag(self.precision, roll.precision))
 
     def start(self, log_springs: float, log_dampers: float) -> F64:
@@ -120,9 +122,9 @@ class Prior:
 
 
 def can_roll(vehicle: Vehicle) -> bool:
-    """Whether enough is known of a vehicle to make use of a roll rate: its track, and where the sensor sits.
+    """Whether the vehicle's data suffice to use a roll rate: its track, and the sensor's position.
 
-    An unknown lever arm cannot be read off the roll itself: suspension mounts and the body bring roll into the
+    An unknown lever arm cannot be estimated from the roll itself: suspension mounts and the body bring roll into the
     acceleration that no lever arm of the sensor explains (docs/method.md).
     """
     return vehicle.track_width_m is not None and vehicle.sensor_left_std_m <= MOST_OFFSET_STD_M
@@ -190,17 +192,17 @@ def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
 
 
 class Inherited(Protocol):
-    """What vehicles of the same line say before a fit starts (calibration.line)."""
+    """The prior from vehicles of the same line before a fit starts (calibration.line)."""
 
     @property
     def usual(self) -> Usual:
-        """How much its vehicles usually moved."""
+        """The usual movement of its vehicles."""
 
     def prior_of(self, vehicle: Vehicle, *, with_roll: bool) -> Prior:
         """Of one of its vehicles that has not been driven yet."""
 
     def on(self, calibration: CrossSpectrumCalibration, *, is_tested: bool) -> CrossSpectrumCalibration:
-        """``calibration`` of one of its vehicles, valid where the line is, with the line's limits.
+        """``calibration`` of one of its vehicles, valid in the line's ranges, with the line's limits.
 
-        Where runs of its own that were left out ``is_tested``, its limits are the wider of both.
+        If left-out runs of its own have tested it (``is_tested``), its limits are the wider of both.
         """

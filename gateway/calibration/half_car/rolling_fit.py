@@ -1,12 +1,12 @@
-"""How a vehicle rolls, learned beside how it heaves and pitches, and never at its expense.
+"""Roll parameters, fitted beside heave and pitch without affecting them.
 
-The half-car is fitted to what the sensors would read on the centre line (core.cross_spectrum.model.mount); for that it
-must be known where they sit. Roll is fitted to all three sensors with the half-car as found. Each needs the other,
-so that they take turns (most_probable_vehicle).
+The half-car is fitted to what the sensors would measure on the centre line (core.cross_spectrum.model.mount); for that
+their position must be known. Roll is fitted to all three sensors with the half-car as found. Each needs the other, so
+they alternate (most_probable_vehicle).
 
 A model of roll is cruder than one of heave: tyres slip sideways, axles turn about points that nobody measured. Fitted
 together, its errors would bend dampers and tyres of the half-car by several standard deviations (measured:
-docs/adr/roll-takes-turns.md). Taking turns, what roll gets wrong stays in roll.
+docs/adr/roll-takes-turns.md). With this alternation, errors of the roll model stay in the roll parameters.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ def fit_roll(known: Sequence[KnownSpectra], upright: Found, prior: Prior, start:
     """The most probable parameters (n,) of a vehicle that rolls, its half-car as ``upright`` has it.
 
     ``prior`` and ``start`` (n - p,) are of the roll parameters alone. Each run's payload also has a moment about the
-    centre line that nobody noted exactly (kg m), which is found and forgotten.
+    centre line that is known only roughly (kg m), which is estimated and discarded.
     """
     m, r = len(start), len(known)
     seen = [(one, one.rolling) for one in known]
@@ -62,7 +62,7 @@ def fit_roll(known: Sequence[KnownSpectra], upright: Found, prior: Prior, start:
 
 
 def _moves(seen: Sequence[tuple[KnownSpectra, Whittle]], theta: F64, found: Found) -> F64:
-    """(m, p) by how much the roll parameters move with each of the half-car's: -C I_rp."""
+    """(m, p) change of the roll parameters with each of the half-car's: -C I_rp."""
     m = len(theta) - _N
     across = np.zeros((len(found.x), _N))
     for i, ((one, rolling), off) in enumerate(zip(seen, found.x[m:].tolist(), strict=True)):
@@ -74,7 +74,7 @@ def _moves(seen: Sequence[tuple[KnownSpectra, Whittle]], theta: F64, found: Foun
 
 
 def _curvature(one: KnownSpectra, rolling: Whittle, theta: F64, moment_off_kgm: float, free: range) -> Curvature:
-    """Of one run's three sensors, for the ``free`` entries of theta and then for the moment that is off."""
+    """Of one run's three sensors, for the ``free`` entries of theta and then for the error of the moment."""
     n, k = len(theta), len(free)
     whole = rolling.curvature(one.placed(theta, moment_off_kgm), [*free, n + 2])
     chain = np.eye(k + 1)  # of the parameters and the place by the parameters and the moment

@@ -1,9 +1,9 @@
-"""Looks at the drives of a campaign before anything is fitted to them, and says what is wrong in words for a fitter.
+"""Inspects the drives of a campaign before any fit, and says what is wrong in words for a fitter.
 
 Drives cut in two come in (``SplitRun``: batches, facts of the rows and of the log); an ``Inspection`` goes out: a
-verdict with findings for every run, findings of all runs together, and why no calibration is possible, if so. Logs,
-rows, axes and signs, and loads are asked in this order; a fault keeps its run out of the calibration.
-``explained`` holds the words and the advice for every kind of finding, docs/findings.md is made from it.
+verdict with findings for every run, findings about all runs together, and the reason if no calibration is possible.
+Logs, rows, axes and signs, and loads are checked in this order; a fault excludes its run from the calibration.
+``explained`` contains the words and the advice for every kind of finding; docs/findings.md is made from it.
 """
 
 from gateway.calibration.inspection.campaign import Inspection, inspect_campaign

@@ -1,8 +1,8 @@
-"""Axes, signs, units and places of the two inertial sensors, read from how they move together.
+"""Axes, signs, units and positions of the two inertial sensors, from the correlation of their signals.
 
-A half-car such as any road vehicle (the priors' centre, nothing fitted) says which phase and which
-size the pitch rate has beside the vertical acceleration, for a sensor anywhere along the vehicle.
-Its agreement with the measured cross-spectra is their normalised inner product,
+A typical half-car (the priors' centre, nothing fitted) predicts the phase and the size of the pitch rate relative to
+the vertical acceleration, for a sensor anywhere along the vehicle. Its agreement with the measured cross-spectra is
+their normalised inner product,
 
     Re sum n S_ga conj(M_ga) / sqrt(sum n |S_ga|^2 sum n |M_ga|^2),
 
@@ -49,16 +49,16 @@ LEAST_SEGMENTS: Final = 20  # for a place; a sign needs fewer
 BELIEVED_AGREEMENT: Final = 0.92  # then the speed's unit is not asked for
 UNIT_GAIN: Final = 0.04
 SPEED_MISREAD: Final = {
-    "it reads in km/h what the signal map takes for m/s": 3.6,
-    "it reads in m/s what the signal map takes for km/h": 1.0 / 3.6,
-    "it reads in km/h what the signal map takes for mph": 1.609344,
-    "it reads in mph what the signal map takes for km/h": 1.0 / 1.609344,
+    "its numbers are km/h, but the signal map says m/s": 3.6,
+    "its numbers are m/s, but the signal map says km/h": 1.0 / 3.6,
+    "its numbers are km/h, but the signal map says mph": 1.609344,
+    "its numbers are mph, but the signal map says km/h": 1.0 / 1.609344,
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """The best agreement (-1..1) over all sensor positions, where that is, and the size of the pitch rate there.
+    """The best agreement (-1..1) over all sensor positions, its position, and the size of the pitch rate there.
 
     ``scale`` is the measured pitch rate over the half-car's, both beside the vertical acceleration.
     """
@@ -69,12 +69,12 @@ class Agreement:
 
 
 def reading_of(vehicle: Vehicle, speed_misread: float = 1.0) -> Reading:
-    """How spectra are taken; a speed that reads ``speed_misread`` times too high has its delays corrected."""
+    """Settings of the spectra; a speed that reads ``speed_misread`` times too high has its delays corrected."""
     return Reading(vehicle.wheelbase_m * speed_misread, BAND_HZ, N_SEGMENT)
 
 
 def mended(spectra: CrossSpectra, factor: float) -> CrossSpectra:
-    """As if one of the two signals had been multiplied by ``factor``, seen as pitch rate beside acceleration."""
+    """As if one of the two signals had been multiplied by ``factor``, seen as pitch rate relative to acceleration."""
     size = abs(factor)
     return replace(
         spectra,
@@ -95,7 +95,7 @@ def mean_coherence(spectra: CrossSpectra) -> float:
 def agreement(spectra: CrossSpectra, load: Load, vehicle: Vehicle) -> Agreement:
     """The best over sensor positions from 1.5 m ahead of the front axle to 1.5 m behind the rear one.
 
-    ``load`` is what the half-car carries.
+    ``load`` is the half-car's load.
     """
     positions_m = np.arange(-BEYOND_AXLES_M, vehicle.wheelbase_m + BEYOND_AXLES_M + STEP_M / 2.0, STEP_M)
     matrix = _half_cars(spectra, load, vehicle, positions_m)
@@ -122,7 +122,7 @@ def _half_cars(spectra: CrossSpectra, load: Load, vehicle: Vehicle, positions_m:
 
 @dataclass(frozen=True, slots=True)
 class Phases:
-    """How well the vehicle explains the phases with the pitch rate as it is, and with it turned over."""
+    """Agreement of the phases with the pitch rate as it is, and with it inverted."""
 
     upright: Agreement
     turned: Agreement
@@ -134,19 +134,19 @@ class Phases:
 
     @property
     def likely(self) -> Agreement:
-        """With the sign that the data speak for."""
+        """With the sign that the data support."""
         return self.turned if self.is_turned else self.upright
 
     @property
     def is_turned(self) -> bool:
-        """True where the pitch rate fits only when turned over."""
+        """True if the pitch rate fits only when inverted."""
         return self.turned.best > self.upright.best + REVERSED_BY
 
 
 def phases(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Phases:
-    """Both signs of the pitch rate beside the usual half-car.
+    """Both signs of the pitch rate compared with the typical half-car.
 
-    It carries the load stated or none, whichever explains more: a load noted wrong shall not look like a wrong axis.
+    It carries the stated load or none, whichever explains more: a wrongly stated load must not look like a wrong axis.
     """
     loads = dict.fromkeys([run.load, Load(0.0, vehicle.empty_front_share_pct)])
     upright, turned = (
@@ -173,8 +173,8 @@ def likeliest_speed(as_read: Phases, misread: Mapping[str, Phases]) -> tuple[str
 def apart_findings(spectra: CrossSpectra, seen: Phases) -> Iterator[Finding]:
     """Do the two sensors move together as one body does?
 
-    Amidships heave and pitch are nearly independent where the speed varies, so a low coherence alone proves
-    nothing: there the phases and the size must at least be a vehicle's.
+    Amidships heave and pitch are nearly independent if the speed varies, so a low coherence alone proves nothing: there
+    the phases and the size must at least match a vehicle's.
     """
     coherence, likely = mean_coherence(spectra), seen.likely
     is_vehicle = likely.best >= LEAST_AGREEMENT and USUAL_SCALE[0] <= likely.scale <= USUAL_SCALE[1]
@@ -184,7 +184,7 @@ def apart_findings(spectra: CrossSpectra, seen: Phases) -> Iterator[Finding]:
 
 
 def phase_findings(seen: Phases, speed_misread: str | None) -> Iterator[Finding]:
-    """Unit of the speed, unit and sign of the pitch rate beside a vertical acceleration that is right."""
+    """Unit of the speed, unit and sign of the pitch rate, if the vertical acceleration is right."""
     if speed_misread is not None:
         text = f"phases agree with the vehicle's by {seen.best:.2f} if {speed_misread}, by far less as it is"
         yield finding_of(Kind.SPEED_UNIT, Severity.FAULT, text)
@@ -207,7 +207,7 @@ def _scale_findings(seen: Agreement) -> Iterator[Finding]:
 
 
 def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Iterator[Finding]:
-    """Where the sensor sits by this run alone, beside where the campaign says; signs and units being right."""
+    """The sensor's position by this run alone, compared with the campaign's; signs and units being right."""
     if spectra.n_total < LEAST_SEGMENTS:
         return
     position_m, std_m = fitted_position_m(spectra, run, vehicle)

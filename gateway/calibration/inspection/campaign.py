@@ -1,4 +1,4 @@
-"""What the runs of a campaign say of each other: loads that teach enough, speeds and roads that compare."""
+"""Findings about all runs of a campaign: whether loads suffice, and whether speeds and roads are comparable."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -32,28 +32,28 @@ class Inspection:
         return tuple(one for one, verdict in zip(self.split, self.verdicts, strict=True) if verdict.is_usable)
 
     def excusing(self, kind: Kind) -> "Inspection":
-        """Without what it says of the campaign as a whole of this ``kind``."""
+        """Without its findings of this ``kind`` about the campaign as a whole."""
         return replace(self, findings=tuple(one for one in self.findings if one.kind is not kind))
 
     @property
     def refusal(self) -> str | None:
-        """Why no calibration is worth its name; None where the usable runs carry one."""
+        """Why no valid calibration is possible; None if the usable runs allow one."""
         stated = [one for one in self.split if one.has_identification]
         left = [one for one in self.usable if one.has_identification]
         if not stated:
             return (
-                "no run is meant for identification: identification_fraction or the runs' split leave nothing "
-                "to calibrate from"
+                "no run is meant for identification: identification_fraction or the runs' split leave nothing to "
+                "calibrate from"
             )
         if not left:
             return "no run can be used"
         if len(_payloads_kg(left)) == 1 < len(_payloads_kg(stated)):
-            return f"faults leave runs with {left[0].identification.payload_kg:g} kg alone, which is no scale"
+            return f"faults leave only runs with {left[0].identification.payload_kg:g} kg, which is no scale"
         return None
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a calibration file has to remember of all this."""
+        """The warnings that a calibration file records."""
         return tuple(self._warnings())
 
     def _warnings(self) -> Iterator[str]:
@@ -79,7 +79,7 @@ TOGETHER: Final = 0.97  # correlation of payload and share above which they are 
 def inspect_campaign(
     drives: Sequence[SplitRun], vehicle: Vehicle, settings: BatchSettings
 ) -> tuple[tuple[RunVerdict, ...], tuple[Finding, ...]]:
-    """A verdict for every run in the order given, and what is to say of the campaign as a whole."""
+    """A verdict for every run in the order given, and the findings about the campaign as a whole."""
     verdicts = {one.identification.number: inspect_run(one, vehicle, settings) for one in drives}
     for number, finding in (
         *_same_drives(drives),
@@ -145,7 +145,7 @@ def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Findin
             text = f"the sensors send {rate_hz:.3g} times a second, in the median run {usual_hz:.3g} times"
             yield number, finding_of(Kind.RATE_DIFFERS, Severity.FAULT, text)
         if abs(speed_mps / usual_mps - 1.0) > SPEED_DIFFERS_BY:
-            text = f"{speed_mps:.1f} m/s in the mean, the median run {usual_mps:.1f} m/s"
+            text = f"mean of {speed_mps:.1f} m/s, the median run {usual_mps:.1f} m/s"
             yield number, finding_of(Kind.SPEED_DIFFERS, Severity.NOTE, text)
         if shakes_mps2 * SMOOTHER_BY < usual_mps2:
             text = f"vertical acceleration scatters by {shakes_mps2:.2g} m/s2, in the median run by {usual_mps2:.2g}"
@@ -153,7 +153,7 @@ def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Findin
 
 
 def load_findings(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[Finding]:
-    """Do these loads and places tell payload from front share, and both from chance?"""
+    """Whether these loads and positions separate payload from front share, and both from chance."""
     if not runs:
         return
     loads = sorted({(run.payload_kg, round(run.front_share_pct, 2)) for run in runs})

@@ -30,7 +30,7 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.SAME_DRIVE: Explained(
             Topic.DRIVE,
             (Severity.FAULT,),
-            "two runs are the same piece of the same log, so one of them tells nothing new or something wrong",
+            "two runs are the same piece of the same log, so one of them adds nothing or is wrong",
             "name the right log for each run, or pieces of it that do not overlap",
         ),
         Kind.TOO_SHORT: Explained(
@@ -43,7 +43,7 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             Topic.DRIVE,
             (Severity.FAULT,),
             "every batch of the identification part was rejected, for the reasons named",
-            "docs/reasons.md tells what each reason asks for; drive this load again",
+            "docs/reasons.md says what to do about each reason; drive this load again",
         ),
         Kind.BATCHES_LOST: Explained(
             Topic.DRIVE,
@@ -72,19 +72,19 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.SPEED_FROZEN: Explained(
             Topic.SPEED,
             (Severity.FAULT, Severity.WARNING),
-            "the speed repeats one number while the vehicle shakes as it does when driven",
+            "the speed is constant while the vehicle shakes as it does when driven",
             "restart the receiver; check its antenna and valid_when in the signal map",
         ),
         Kind.SPEED_OUTSIDE_GATE: Explained(
             Topic.SPEED,
             (Severity.FAULT,),
-            "too much of the drive is slower or faster than batches may be",
+            "too much of the drive is slower or faster than batches allow",
             "drive on an open road; check the unit of speed in the signal map",
         ),
         Kind.SPEED_UNIT: Explained(
             Topic.SPEED,
             (Severity.FAULT,),
-            "the rear axle follows the front one at another speed than the log says",
+            "the rear axle follows the front one at another speed than that in the log",
             "check the unit of speed in the signal map, and wheelbase_m",
         ),
         Kind.SPEED_DIFFERS: Explained(
@@ -96,14 +96,14 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.LOAD_BEYOND_RANGE: Explained(
             Topic.LOADS,
             (Severity.WARNING,),
-            "a load lies far beyond payload_range_kg, which errors are stated in percent of and plans keep within",
+            "a load lies far beyond payload_range_kg, which is the base of errors in percent and the limit of plans",
             "check payload_kg; if it is right, set payload_range_kg to what the vehicle may carry",
         ),
         Kind.ONE_LOAD_ONLY: Explained(
             Topic.LOADS,
             (Severity.WARNING,),
-            "all runs carry the same load: a zero point for the physical model, nothing for the ratio index",
-            "drive at least once more with a known load, better three times",
+            "all runs carry the same load: a zero point for the physical model, no information for the ratio index",
+            "drive at least one more known load, better three",
         ),
         Kind.LOADS_ALIKE: Explained(
             Topic.LOADS,
@@ -120,7 +120,7 @@ EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.LOAD_AND_SHARE_TOGETHER: Explained(
             Topic.LOADS,
             (Severity.WARNING,),
-            "payload and front share go up and down together, so the ratio index cannot tell one from the other",
+            "payload and front share are correlated, so the ratio index cannot separate them",
             "drive the same load at another place",
         ),
         Kind.LOADS_SWAPPED: Explained(

@@ -1,11 +1,11 @@
-"""What the known-load drives say of themselves before anything is fitted to them: a verdict a run."""
+"""Findings about the known-load drives before any fit: a verdict a run."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Kind(StrEnum):
-    """What a finding is about. docs/calibration.md has the table."""
+    """The subject of a finding. docs/calibration.md has the table."""
 
     LOG_UNREADABLE = "log_unreadable"
     LOG_DAMAGED = "log_damaged"
@@ -57,7 +57,7 @@ class Kind(StrEnum):
 
 
 class Severity(StrEnum):
-    """How much a finding weighs: a fault makes its run unusable, a warning wants a look, a note is to know."""
+    """The severity of a finding: a fault makes its run unusable, a warning needs attention, a note is information."""
 
     FAULT = "fault"
     WARNING = "warning"
@@ -74,7 +74,7 @@ class Finding:
     advice: str
 
     def to_json(self) -> dict[str, str]:
-        """As ``calibrate --json`` and the report's numbers hold it."""
+        """As in ``calibrate --json`` and the report's numbers."""
         return {"kind": str(self.kind), "severity": str(self.severity), "text": self.text, "advice": self.advice}
 
 
@@ -88,7 +88,7 @@ class RunVerdict:
 
     @property
     def is_usable(self) -> bool:
-        """False where a fault keeps the run out of the calibration."""
+        """False if a fault excludes the run from the calibration."""
         return all(finding.severity is not Severity.FAULT for finding in self.findings)
 
 
@@ -103,7 +103,7 @@ class Topic(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """A kind in words; ``means`` and ``advice`` are parts of sentences, as a table holds them.
+    """A kind in words; ``means`` and ``advice`` are parts of sentences, for use in a table.
 
     severities are those it may have, the gravest first.
     """

@@ -1,9 +1,9 @@
-"""Are the loads of a campaign file those that were driven? Each run weighed by what the others teach.
+"""Are the loads of a campaign file those that were driven? Each run weighed by a calibration from the others.
 
-A half-car is fitted to all runs as labelled. Two runs that trade their loads must explain all runs
-better, by far, before they are called swapped; a single run is doubted where all runs would be explained far better
-if its load were free, and the others by themselves weigh it elsewhere. Evidence is the natural logarithm of how much
-more probable the drives become, at the calibration's own small weight of evidence.
+A half-car is fitted to all runs as labelled. Two runs are called swapped only if exchanging their loads explains all
+runs far better; a single run is doubted if all runs would be explained far better with its load free, and the others by
+themselves find another weight. Evidence is the natural logarithm of the factor by which the drives become more
+probable, at the calibration's own small weight of evidence.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,8 +33,8 @@ FEW_RUNS: Final = 4  # so few can bend the fit to their labels: pairs are tried 
 STRAINED_MISFIT: Final = 4.0  # 1 is perfect, true labels have stayed below 3
 LEAST_OTHERS: Final = 3  # to weigh a run by
 DOUBT_EVIDENCE: Final = 16.0
-"""Of 84 sound runs of 14 simulated vans 3 exceed it (15 exceed 5, by 6.8 in the mean), and none of these lies beyond
-DOUBT_STDS too, so that fewer than one sound run in 28 is doubted (95 %). A label wrong by 60 kg reaches 18.
+"""Of 84 sound runs of 14 simulated vans 3 exceed it (15 exceed 5, by 6.8 on average), and none of these lies beyond
+DOUBT_STDS too, so fewer than one sound run in 28 is doubted (95 %). A label wrong by 60 kg reaches 18.
 """
 DOUBT_STDS: Final = 4.0  # of what the others state: where they extrapolate they may err, and say so
 DOUBT_PAYLOAD_SHARE: Final = 0.02  # of the empty mass: less is no mistake of a label
@@ -42,9 +42,10 @@ DOUBT_FRONT_SHARE: Final = 0.01
 
 
 def compare_loads(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[tuple[int, Finding]]:
-    """Run numbers with what is to say of their loads: pairs that are swapped, and runs that the others contradict.
+    """Run numbers with findings about their loads: pairs that are swapped, and runs that the others contradict.
 
-    What explains most is set aside and the others are asked again: a wrong label makes its neighbours look wrong too.
+    The strongest explanation is set aside and the others are tested again: a wrong label makes its neighbours look
+    wrong too.
     """
     try:
         known = known_spectra(runs, vehicle)
@@ -81,9 +82,9 @@ class _Labelled:
         return np.array([[k.whittle.cost(point) for point in points] for k in self.known])
 
     def swapped_pair(self) -> tuple[int, int, float] | None:
-        """The pair whose exchange explains the drives best, with its evidence; None where none does by enough.
+        """The pair whose exchange explains the drives best, with its evidence; None if none does by enough.
 
-        Where enough other runs are there to weigh both, these must agree: one wrong label improves by many exchanges.
+        If enough other runs remain to weigh both, these must agree: one wrong label improves by many exchanges.
         """
         costs = self.costs()
         own = np.diag(costs)
@@ -99,7 +100,7 @@ class _Labelled:
         return next((one for one in evident if self._is_confirmed(one[0], one[1])), None)
 
     def _is_confirmed(self, i: int, j: int) -> bool:
-        """False where the runs besides these two weigh one of them nearer to its own label than to the other's."""
+        """False if the other runs weigh one of them nearer to its own label than to the other's."""
         if len(self.known) - 2 < LEAST_OTHERS:
             return True
         return all(self._is_nearer(one, other, (i, j)) for one, other in ((i, j), (j, i)))
@@ -113,11 +114,11 @@ class _Labelled:
         return exchanged < own
 
     def _is_strained(self) -> bool:
-        """True where no half-car explains some run with its label."""
+        """True if no half-car explains some run with its label."""
         return any(k.whittle.misfit(k.at(self.fitted.x)) > STRAINED_MISFIT for k in self.known)
 
     def doubted(self) -> tuple[int, Point] | None:
-        """The run whose load the others contradict most, and what they weigh it at; None where they contradict none."""
+        """The run whose load the others contradict most, and the weight they find; None if they contradict none."""
         if len(self.known) <= LEAST_OTHERS:
             return None
         evidence = [self._evidence_against(k) for k in self.known]
@@ -129,7 +130,7 @@ class _Labelled:
         return None
 
     def _evidence_against(self, one: KnownSpectra) -> float:
-        """By how much more probable all drives would be if this run's load were free, the vehicle fitted anew.
+        """Gain in log probability of all drives if this run's load were free, with the vehicle fitted again.
 
         A score test asks it of the slopes at the labels, without another search: half of g' S^-1 g, with g the
         slope towards the load and S its information after the vehicle's parameters have moved along
@@ -181,7 +182,7 @@ def _swap_findings(all_runs: _Labelled, i: int, j: int, evidence: float) -> Iter
 
 
 def _weighed(all_runs: _Labelled, i: int, left_out: Sequence[int]) -> str:
-    """What the runs that are not left out weigh run i at, in words; nothing where too few are left."""
+    """The weight that the other sound runs find for run i, in words; empty if too few are left."""
     if len(all_runs.known) - len(left_out) < LEAST_OTHERS:
         return ""
     point, _ = all_runs.weighed_by_others(i, left_out)

@@ -1,4 +1,4 @@
-"""What reading a drive's log says before any of its rows is looked at: can it be read, and is it this drive's alone?"""
+"""Findings about a drive's log before its rows are inspected: is it readable, and is it used for this drive only?"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,11 +13,11 @@ from gateway.records import Batch, Signal
 
 @dataclass(frozen=True, slots=True)
 class LogFacts:
-    """How the log of a run was read.
+    """The result of reading a run's log.
 
-    ``duration_s`` is of the whole log, ``span_ns`` the first and last stamp of the run's piece of it, None where
-    that piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it, ``silent`` why
-    a mapped signal has no valid sample.
+    ``duration_s`` is of the whole log, ``span_ns`` the first and last stamp of the run's piece of it, None if that
+    piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it, ``silent`` why a
+    mapped signal has no valid sample.
     """
 
     sha256: str = ""
@@ -61,11 +61,11 @@ def _is_same_drive(one: LogFacts, other: LogFacts) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class SplitRun:
-    """One drive's two parts, either of which may hold no batch, with the facts of its rows and of its log.
+    """One drive's two parts, either of which may have no batch, with the facts of its rows and of its log.
 
-    has_identification is False where the campaign keeps the whole drive for validation. Only what identifies can spoil
-    a calibration, so facts, batches and run are of that part alone, and of validation only where there is no other:
-    judging a calibration shall not change it.
+    has_identification is False if the campaign keeps the whole drive for validation. Only the identification part can
+    spoil a calibration, so facts, batches and run are of that part alone, and of validation only if there is no other:
+    the data that judge a calibration must not change it.
     """
 
     identification: KnownRun

@@ -1,6 +1,6 @@
-"""The roll rate beside the other two sensors: is it there, is it one, and in its unit?
+"""The roll rate compared with the other two sensors: is it present, is it a roll rate, and in which unit?
 
-Shares and ratios are of the band in which the body moves. What is usual was measured on 54 recorded drives of a
+Shares and ratios are of the band in which the body moves. The usual values were measured on 54 recorded drives of a
 multi-body simulator, two of a real car, and 47 of gateway/sim: three vans scattered, loads to either side, mounts
 turned by a few degrees, town to motorway.
 """
@@ -60,10 +60,10 @@ class RollSpectra:
         return float(np.mean(np.abs(m[PITCH, ROLL]) ** 2 / np.maximum(auto, np.finfo(float).tiny)))
 
     def lever_m(self, low_hz: float, high_hz: float) -> float:
-        """How far left of where the body rolls about the acceleration seems to be measured, by these frequencies.
+        """Apparent distance of the acceleration's measurement left of the roll axis, by these frequencies.
 
         Re sum S_ap / sum S_pp, p the roll acceleration j 2 pi f times the roll rate. For a load amidships it has the
-        sign of the sensor's place; a load to one side makes heave and roll go together, and moves it.
+        sign of the sensor's place; a load to one side correlates heave and roll, and shifts it.
         """
         at = self._within(low_hz, high_hz)
         to_acceleration = 2j * np.pi * self.freq_hz[at]
@@ -76,7 +76,7 @@ class RollSpectra:
 
 
 def roll_spectra_of(batches: Sequence[Batch], n_segment: int = N_SEGMENT) -> RollSpectra | None:
-    """Over all segments in which the three sensors are known; None where there are fewer than six, or no roll rate."""
+    """Over all segments in which the three sensors are known; None if there are fewer than six, or no roll rate."""
     matrix, n_segments, freq_hz = np.zeros((3, 3, n_segment // 2 + 1), np.complex128), 0, np.empty(0)
     for batch in batches:
         if batch.roll_rate_radps is None:
@@ -103,7 +103,7 @@ def lost_findings(batches: Sequence[Batch]) -> Iterator[Finding]:
 
 
 def exchanged(batches: Sequence[Batch]) -> tuple[Batch, ...]:
-    """As if the map gave each of the two rates where the other belongs."""
+    """As if the map exchanged the two rates."""
     return tuple(
         replace(batch, pitch_rate_radps=batch.roll_rate_radps, roll_rate_radps=batch.pitch_rate_radps)
         for batch in batches
@@ -112,7 +112,7 @@ def exchanged(batches: Sequence[Batch]) -> tuple[Batch, ...]:
 
 
 def roll_findings(spectra: RollSpectra) -> Iterator[Finding]:
-    """Axis and unit of the roll rate beside a pitch rate that is right."""
+    """Axis and unit of the roll rate, if the pitch rate is right."""
     if spectra.pitch_coherence > ALIKE:
         text = f"its coherence with pitch_rate is {spectra.pitch_coherence:.2f}"
         yield finding_of(Kind.ROLL_RATE_AXIS, Severity.FAULT, text)
@@ -132,13 +132,13 @@ def roll_findings(spectra: RollSpectra) -> Iterator[Finding]:
 
 
 def unmapped_roll_findings(entry: str | None) -> Iterator[Finding]:
-    """Of a signal map without a roll rate; ``entry`` is what it could hold, None where names do not tell."""
+    """For a signal map without a roll rate; ``entry`` is a possible entry, None if no name suggests one."""
     found = f"the signal map could hold {entry}" if entry else "the pitch rate's message names none"
     yield finding_of(Kind.ROLL_RATE_UNMAPPED, Severity.NOTE, found)
 
 
 def offset_findings(vehicle: Vehicle) -> Iterator[Finding]:
-    """A sensor whose place to the side nobody measured."""
+    """A sensor whose lateral position nobody measured."""
     std_m = vehicle.sensor_left_std_m
     if std_m > HARDLY_KNOWN_M:
         text = f"sensor_offset_left_m is {vehicle.sensor_left_m:g} ± {Z95 * std_m:.2g} m (95 %)"

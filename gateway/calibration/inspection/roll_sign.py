@@ -1,10 +1,10 @@
-"""Has the roll rate the sign that the signal map gives it? Asked of all runs together: they share one map.
+"""Has the roll rate the sign that the signal map gives it? Tested for all runs together: they share one map.
 
-Above its own resonances the body moves as forces along the centre line make it, so that the acceleration goes with the
-roll acceleration as if it were measured y_s - b y_cg to the left: y_s the sensor's place, y_cg the centre of gravity's,
-b > 0. Both places are stated by the campaign, never measured here, and each tells the sign where it stands out of the
-scatter: a sensor well off the centre line, or loads well to one side. Otherwise, or where the two contradict each
-other, the sign is not told.
+Above its own resonances the body moves as forces along the centre line make it, so the acceleration follows the roll
+acceleration as if it were measured y_s - b y_cg to the left: y_s the sensor's place, y_cg the centre of gravity's, b >
+0. The campaign states both places, nobody measures them here; each gives the sign if it exceeds the scatter: a sensor
+well off the centre line, or loads well to one side. Otherwise, or if the two contradict each other, the sign stays
+unknown.
 
 Measured on 54 recorded drives of a multi-body simulator and 47 of gateway/sim: b is 0.6 to 2.7; put right by b = 1.7
 the lever arm is 0.5 to 1.5 times y_s for a sensor 0.15 m or more off the centre line, with a scatter of 0.05 m from run
@@ -34,7 +34,7 @@ LEAST_RATIO: Final = 0.4  # of the lever arm and the sensor's place
 
 @dataclass(frozen=True, slots=True)
 class Rolled:
-    """One run: the lever arm that its spectra show, and where its centre of gravity lies left of the centre line."""
+    """One run: the lever arm from its spectra, and the position of its centre of gravity left of the centre line."""
 
     lever_m: float
     cg_left_m: float
@@ -44,14 +44,14 @@ class Rolled:
 
 @dataclass(frozen=True, slots=True)
 class RollSign:
-    """1 where the roll rate's sign is right, -1 where it is turned, 0 where the drives do not tell; and why."""
+    """1 if the roll rate's sign is right, -1 if it is inverted, 0 if the drives do not show it; and why."""
 
     sign: int
     why: str
 
 
 def roll_sign_of(runs: Sequence[KnownRun], vehicle: Vehicle) -> RollSign | None:
-    """What these runs say together; None where none has a roll rate."""
+    """The combined evidence of these runs; None if none has a roll rate."""
     seen = [rolled for run in runs if (rolled := _rolled(run, vehicle)) is not None]
     if not seen:
         return None
@@ -63,7 +63,7 @@ def roll_sign_of(runs: Sequence[KnownRun], vehicle: Vehicle) -> RollSign | None:
         return RollSign(0, f"{told[0].why}, but {told[1].why}: one of them is stated wrong")
     offset_m, std_m = vehicle.sensor_left_m, vehicle.sensor_left_std_m
     sits = f"the sensor sits {offset_m:g} ± {Z95 * std_m:.2g} m left of the centre line"
-    return RollSign(0, f"{sits}, and no load is known to lie far enough to one side")
+    return RollSign(0, f"{sits}, and no load is known to be far enough to one side")
 
 
 def _rolled(run: KnownRun, vehicle: Vehicle) -> Rolled | None:
@@ -76,7 +76,7 @@ def _rolled(run: KnownRun, vehicle: Vehicle) -> Rolled | None:
 
 
 def _by_sensor(runs: Sequence[Rolled], vehicle: Vehicle) -> RollSign | None:
-    """The lever arm, less what the loads do to it, beside the sensor's stated place."""
+    """The lever arm without the loads' effect, compared with the sensor's stated position."""
     offset_m = vehicle.sensor_left_m
     if abs(offset_m) < max(LEAST_OFFSET_M, LEAST_SCORE * vehicle.sensor_left_std_m):
         return None
@@ -92,7 +92,7 @@ def _by_sensor(runs: Sequence[Rolled], vehicle: Vehicle) -> RollSign | None:
 
 
 def _by_loads(runs: Sequence[Rolled]) -> RollSign | None:
-    """How the lever arm goes with where the loads are stated to lie."""
+    """The dependence of the lever arm on the loads' stated positions."""
     stated = [run for run in runs if run.is_stated]
     if len(stated) < 2:
         return None

@@ -1,4 +1,4 @@
-"""What the decoded rows of a drive say before they are cut into batches: rates, gaps, means, speeds."""
+"""Findings about the decoded rows of a drive before they are cut into batches: rates, gaps, means, speeds."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -23,12 +23,12 @@ UNIT_TOLERANCE: Final = 0.15
 STEADY_SHARE: Final = 0.2  # scatter over mean below which that mean is gravity and no acceleration
 SHAKING_MPS2: Final = 0.2  # a vehicle at rest with its engine running stays below
 MISREAD_AS_MPS2: Final = {  # what gravity then reads, over 9.81
-    "it reads in g what the signal map takes for m/s2": 1.0 / STANDARD_GRAVITY_MPS2,
-    "it reads in m/s2 what the signal map takes for g": STANDARD_GRAVITY_MPS2,
-    "it reads in mg what the signal map takes for m/s2": 1000.0 / STANDARD_GRAVITY_MPS2,
-    "it reads in mg what the signal map takes for g": 1000.0,
-    "it reads in m/s2 what the signal map takes for mg": STANDARD_GRAVITY_MPS2 / 1000.0,
-    "it reads in g what the signal map takes for mg": 1.0 / 1000.0,
+    "its numbers are g, but the signal map says m/s2": 1.0 / STANDARD_GRAVITY_MPS2,
+    "its numbers are m/s2, but the signal map says g": STANDARD_GRAVITY_MPS2,
+    "its numbers are mg, but the signal map says m/s2": 1000.0 / STANDARD_GRAVITY_MPS2,
+    "its numbers are mg, but the signal map says g": 1000.0,
+    "its numbers are m/s2, but the signal map says mg": STANDARD_GRAVITY_MPS2 / 1000.0,
+    "its numbers are g, but the signal map says mg": 1.0 / 1000.0,
 }
 
 
@@ -49,20 +49,20 @@ class Stream:
 
 @dataclass(frozen=True, slots=True)
 class RowFacts:
-    """What one drive's rows say; ``streams`` has every mapped signal that weighs."""
+    """Facts about one drive's rows; ``streams`` has every mapped signal that an estimate uses."""
 
     duration_s: float = 0.0
     streams: Mapping[Signal, Stream] = field(default_factory=dict)
 
     def mean(self, signal: Signal) -> float:
-        """NaN where there is no sample."""
+        """NaN without a sample."""
         return self.streams[signal].mean if signal in self.streams else nan
 
 
 def row_facts(motion: Motion, traits: Traits) -> RowFacts:
     """Facts of the rows in any order; low, middle and high of a stream are its 5, 50 and 95 % quantiles.
 
-    A journey's signals are left out: nothing is asked of them here, and where a vehicle was is nobody's business.
+    A journey's signals are left out: they need no check here, and the vehicle's positions are private.
     """
     motion = motion.weighing
     duration_s = float(np.ptp(motion.t_ns)) / NS_PER_S if len(motion) else 0.0
@@ -95,7 +95,7 @@ def _stream(motion: Motion, signal: Signal, trait: SensorTraits) -> Stream:
 
 
 def unmapped_findings(facts: RowFacts) -> Iterator[Finding]:
-    """Signals that no log can hold because the map has no place for them; every mapped one has a stream."""
+    """Signals without a place in the map, which no log can therefore contain; every mapped one has a stream."""
     if not facts.streams:
         return
     if Signal.SPEED not in facts.streams and Signal.WHEEL_SPEED not in facts.streams:
@@ -132,14 +132,14 @@ def rate_findings(
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """By what vertical acceleration must be multiplied to be what it should be; whether its axis is vertical at all."""
+    """The factor that would correct the vertical acceleration; whether its axis is vertical at all."""
 
     factor: float = 1.0
     is_axis_sound: bool = True
 
 
 def gravity_findings(facts: RowFacts) -> tuple[Mended, list[Finding]]:
-    """Does vertical acceleration carry +9.81 m/s2, and if not, what does it carry?"""
+    """Whether the vertical acceleration shows +9.81 m/s2, and what it shows otherwise."""
     stream = facts.streams.get(Signal.VERTICAL_ACCELERATION)
     if stream is None or stream.n < 2 or abs(stream.mean - STANDARD_GRAVITY_MPS2) <= GRAVITY_TOLERANCE_MPS2:
         return Mended(), []
@@ -161,7 +161,7 @@ def gravity_findings(facts: RowFacts) -> tuple[Mended, list[Finding]]:
 
 
 def _carries_gravity_instead(facts: RowFacts) -> bool:
-    """Gravity in what is mapped as pitch rate, whatever unit it was taken for."""
+    """Gravity in the signal mapped as pitch rate, whatever unit the map says."""
     rate = facts.streams.get(Signal.PITCH_RATE)
     if rate is None or not rate.std < STEADY_SHARE * abs(rate.mean):
         return False

@@ -1,4 +1,4 @@
-"""One known-load drive inspected: what its rows, its batches and its cross-spectra say, as a verdict."""
+"""Inspection of one known-load drive: its rows, its batches and its cross-spectra, as a verdict."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from enum import StrEnum
@@ -108,7 +108,7 @@ _PITCH_IS_NONE: Final = frozenset({Kind.PITCH_RATE_AXIS, Kind.PITCH_RATE_UNIT})
 def _axes_findings(
     batches: Sequence[Batch], spectra: CrossSpectra, drive: SplitRun, vehicle: Vehicle, acceleration: Mended
 ) -> tuple[list[Finding], float]:
-    """What is wrong with the pitch rate and the speed's unit, and how well the phases agree with a vehicle's."""
+    """Findings about the pitch rate and the speed's unit, and the agreement of the phases with a vehicle's."""
     as_read = phases(spectra, drive.run, vehicle)
     if apart := list(apart_findings(spectra, as_read)):
         return apart, as_read.best
@@ -120,7 +120,7 @@ def _axes_findings(
 
 
 def _swapped_finding(drive: SplitRun, vehicle: Vehicle, acceleration: Mended, agreement: float) -> Finding | None:
-    """Said where the roll rate is a sound pitch rate, and the pitch rate then a sound roll rate."""
+    """Reported if the roll rate is a sound pitch rate, and the pitch rate then a sound roll rate."""
     batches = exchanged(drive.batches)
     spectra, roll = cross_spectra_of(batches, reading_of(vehicle)), roll_spectra_of(batches)
     if spectra is None or roll is None or any(roll_findings(roll)):
@@ -169,7 +169,7 @@ def _excitation_findings(
 
 
 def _speed_findings(drive: SplitRun, settings: BatchSettings) -> Iterator[Finding]:
-    """Speed missing, frozen or outside the gate: a fault where that alone leaves no batch, else a warning."""
+    """Speed missing, frozen or outside the gate: a fault if that alone leaves no batch, else a warning."""
     if _is_standing(drive, settings):
         text = "the speed reads 0 from beginning to end, the vehicle shakes as it does when driven"
         yield finding_of(Kind.SPEED_FROZEN, Severity.FAULT, text)
@@ -198,17 +198,17 @@ def _needed_s(settings: BatchSettings) -> float:
 
 
 def _is_standing(drive: SplitRun, settings: BatchSettings) -> bool:
-    """True where a whole batch could have been driven, and was to all appearance, but the speed stays at 0."""
+    """True if a whole batch could have been driven, and apparently was, but the speed stays at 0."""
     return drive.facts.duration_s >= _needed_s(settings) and stands_still_but_shakes(drive.facts)
 
 
 def _is_too_short(drive: SplitRun, settings: BatchSettings) -> bool:
-    """True where not even the longest stretch of the drive, or of the part that identifies, makes one batch."""
+    """True if not even the longest stretch of the drive, or of its identification part, makes one batch."""
     return all(batch.duration_s < _needed_s(settings) for batch in drive.batches)
 
 
 def _speeds(drive: SplitRun, settings: BatchSettings) -> str:
-    """Which speeds there were, and whether another unit would bring them inside the gate."""
+    """The speeds that occurred, and whether another unit would bring them inside the gate."""
     speed = drive.facts.streams.get(Signal.SPEED)
     if speed is None:
         return ""
@@ -242,7 +242,7 @@ def _unsteady_findings(drive: SplitRun) -> Iterator[Finding]:
 
 
 def _batch_findings(drive: SplitRun, settings: BatchSettings, *, has_fault: bool) -> Iterator[Finding]:
-    """Whether anything is left to identify from; said in general only where nothing else says why not."""
+    """Whether anything is left for identification; reported in general only if nothing else says why not."""
     batches = drive.identification.batches
     if not drive.has_identification:
         return
@@ -250,7 +250,7 @@ def _batch_findings(drive: SplitRun, settings: BatchSettings, *, has_fault: bool
         if _is_standing(drive, settings):
             return
         longest_s = max((batch.duration_s for batch in batches), default=0.0)
-        text = f"of the {drive.facts.duration_s:.0f} s driven the longest unbroken stretch that identifies lasts "
+        text = f"of the {drive.facts.duration_s:.0f} s driven the longest unbroken stretch for identification lasts "
         text += f"{longest_s:.0f} s, a batch needs {_needed_s(settings):.0f} s"
         yield finding_of(Kind.TOO_SHORT, Severity.FAULT, text)
     elif all(batch.rejected for batch in batches):

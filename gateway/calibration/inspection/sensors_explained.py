@@ -12,12 +12,12 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             Topic.SENSORS,
             (Severity.FAULT, Severity.WARNING),
             "the signal map does not name this signal",
-            "add it to the signal map: every estimator wants the speed, cross_spectrum wants both sensors",
+            "add it to the signal map: every estimator needs the speed, cross_spectrum needs both sensors",
         ),
         Kind.SENSOR_SILENT: Explained(
             Topic.SENSORS,
             (Severity.FAULT, Severity.WARNING),
-            "the signal map names this signal, and the log holds no valid sample of it",
+            "the signal map names this signal, and the log has no valid sample of it",
             "check message, signal and valid_when in the signal map, and that the log is of this bus",
         ),
         Kind.RATE_LOW: Explained(
@@ -29,8 +29,8 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.RATE_DIFFERS: Explained(
             Topic.SENSORS,
             (Severity.FAULT,),
-            "the sensors sample at another rate than in most runs, so that other vibration folds into what they send",
-            "drive all runs at one rate of the device, the one that it is to weigh at",
+            "the sensors' sampling rate differs from that in most runs, so other vibration aliases into their signals",
+            "drive all runs at one rate of the device, the one that it will weigh at",
         ),
         Kind.JITTER: Explained(
             Topic.SENSORS,
@@ -39,7 +39,10 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
             "let the interface stamp frames as they arrive, not the program that stores them",
         ),
         Kind.GAPS: Explained(
-            Topic.SENSORS, (Severity.WARNING,), "frames are missing", "check wiring, bus load and what the logger drops"
+            Topic.SENSORS,
+            (Severity.WARNING,),
+            "frames are missing",
+            "check wiring, bus load and frames dropped by the logger",
         ),
         Kind.SENSOR_STUCK: Explained(
             Topic.SENSORS,
@@ -56,13 +59,13 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.CHANNELS_SWAPPED: Explained(
             Topic.SENSORS,
             (Severity.FAULT,),
-            "what is mapped as pitch rate carries gravity, and what is mapped as acceleration does not",
+            "the signal mapped as pitch rate shows gravity, and the one mapped as acceleration does not",
             "exchange message and signal of vertical_acceleration and pitch_rate in the signal map",
         ),
         Kind.ACCELERATION_SIGN: Explained(
             Topic.SENSORS,
             (Severity.FAULT,),
-            "vertical acceleration reads about -9.81 m/s2 in the mean: its axis points down",
+            "the mean of the vertical acceleration is about -9.81 m/s2: its axis points down",
             "turn sign of vertical_acceleration in the signal map (z up reads +9.81 at rest)",
         ),
         Kind.ACCELERATION_UNIT: Explained(
@@ -74,7 +77,7 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.ACCELERATION_AXIS: Explained(
             Topic.SENSORS,
             (Severity.FAULT,),
-            "vertical acceleration does not carry gravity: the axis lies level, or the device has removed gravity",
+            "vertical acceleration does not show gravity: the axis is level, or the device has removed gravity",
             "map the axis that reads 9.81 m/s2 at rest, or let the device send gravity",
         ),
         Kind.PITCH_RATE_BIAS: Explained(
@@ -86,7 +89,7 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.PITCH_RATE_UNIT: Explained(
             Topic.SENSORS,
             (Severity.FAULT,),
-            "the pitch rate is far too large or too small beside the vertical acceleration",
+            "the pitch rate is far too large or too small for the vertical acceleration",
             "check the unit of pitch_rate in the signal map (deg/s or rad/s) and the scale in the DBC",
         ),
         Kind.PITCH_RATE_AXIS: Explained(
@@ -110,10 +113,10 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.ROLL_RATE_UNMAPPED: Explained(
             Topic.SENSORS,
             (Severity.NOTE,),
-            "no roll rate is mapped: where a load lies to the side, and so the load of each wheel, is not told, and "
-            "with a sensor off the centre line such a load passes for more or less payload",
-            "add roll_rate to the signal map, if the device sends it: where a load lies to the side and the load of "
-            "each wheel are then told, and the payload suffers less from it",
+            "no roll rate is mapped: the lateral position of a load and the load of each wheel stay unknown, and with "
+            "a sensor off the centre line a load to one side changes the estimated payload",
+            "add roll_rate to the signal map, if the device sends it: it gives the lateral position of a load and the "
+            "load of each wheel, and reduces their effect on the payload",
         ),
         Kind.ROLL_RATE_LOST: Explained(
             Topic.SENSORS,
@@ -124,13 +127,13 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.ROLL_RATE_AXIS: Explained(
             Topic.SENSORS,
             (Severity.FAULT,),
-            "what is mapped as roll rate is no roll rate: it is the pitch rate over again, or hardly moves beside it",
+            "the signal mapped as roll rate is not one: it repeats the pitch rate, or hardly moves",
             "map the rate about the axis that points forward",
         ),
         Kind.ROLL_RATE_UNIT: Explained(
             Topic.SENSORS,
             (Severity.FAULT,),
-            "the roll rate is far too large or too small beside the pitch rate",
+            "the roll rate is far too large or too small for the pitch rate",
             "check the unit of roll_rate in the signal map (deg/s or rad/s), the scale in the DBC, and that its axis "
             "points forward",
         ),
@@ -143,21 +146,21 @@ SENSORS_EXPLAINED: Final[Mapping[Kind, Explained]] = MappingProxyType(
         Kind.ROLL_RATE_SIGN_UNTOLD: Explained(
             Topic.SENSORS,
             (Severity.NOTE,),
-            "these drives do not tell whether the roll rate's sign is right",
-            "watch it as a bend to the left begins, where it goes up; or drive a load well to one side, with its "
+            "these drives do not show whether the roll rate's sign is right",
+            "watch it as a bend to the left begins: it goes up; or drive a load well to one side, with its "
             "payload_left_m",
         ),
         Kind.SENSOR_POSITION: Explained(
             Topic.SENSORS,
             (Severity.FAULT, Severity.WARNING),
-            "the spectra put the sensor elsewhere than sensor_position_m says",
+            "the spectra place the sensor elsewhere than sensor_position_m says",
             "measure again from the front axle, check wheelbase_m and the speed's unit, or widen sensor_position_std_m",
         ),
         Kind.SENSOR_OFFSET_UNKNOWN: Explained(
             Topic.SENSORS,
             (Severity.NOTE,),
-            "how far beside the centre line the sensor sits is hardly known; off it, roll is taken for heave as soon "
-            "as a load lies to one side too",
+            "the sensor's distance from the centre line is hardly known; off it, roll looks like heave as soon as a "
+            "load lies to one side too",
             "measure it with a tape: sensor_offset_left_m in the campaign file, and its standard deviation",
         ),
         Kind.COARSE_RESOLUTION: Explained(

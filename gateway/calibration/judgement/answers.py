@@ -1,4 +1,4 @@
-"""Answered batches as columns, and how their errors compare with the intervals they came with."""
+"""Weighed batches as columns, and their errors compared with their intervals."""
 
 import math
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ LEVELS: Final = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answers:
-    """Answered batches of one set, for one quantity: everything (n,) in its unit; ``half95`` halves the interval."""
+    """Weighed batches of one set, for one quantity: everything (n,) in its unit; ``half95`` halves the interval."""
 
     run: I64
     true: F64
@@ -59,7 +59,7 @@ def standardised(answers: Answers, dof: float | None) -> F64:
 
 
 def observed_coverage(answers: Answers, dof: float | None) -> F64:
-    """Share, and its lower and upper 95 % limit (k, 3), of intervals of each of LEVELS that hold the truth."""
+    """Share, and its lower and upper 95 % limit (k, 3), of intervals of each of LEVELS that contain the truth."""
     reach = np.abs(standardised(answers, dof))
     rows = []
     for level in LEVELS:

@@ -1,4 +1,4 @@
-"""What a report of a calibration or an evaluation is made of: estimates held against known loads, by set."""
+"""The content of a report on a calibration or an evaluation: estimates compared with known loads, by set."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -50,13 +50,15 @@ class Judgement:
 
     @property
     def unseen(self) -> Part | None:
-        """The set that tells most of loads yet to come: runs left out, else validation."""
+        """The set that predicts later loads best: runs left out, else validation."""
         return next((part for part in (Part.LEFT_OUT, Part.VALIDATION, Part.ALL) if part in self.tables), None)
 
 
 @dataclass(frozen=True, slots=True)
 class Assessment:
-    """A calibration file and how it did. ``outcome`` is how it came about; None where a file is only evaluated."""
+    """A calibration file and its accuracy. ``outcome`` is the run of the calibration; None if a file is only
+    evaluated.
+    """
 
     title: str
     file: CalibrationFile
@@ -66,9 +68,9 @@ class Assessment:
 
 
 def stated_budget(judgement: Judgement, vehicle: Vehicle) -> tuple[BudgetLine, ...]:
-    """Where the error that the service states comes from, over batches weighed as it weighs; empty where none was.
+    """The sources of the error that the service states, over batches weighed as it weighs; empty if none was.
 
-    Runs left out are no such batches: they are known to have the shape of the other known loads.
+    Runs left out are not such batches: their shape is known to be that of the other known loads.
     """
     part = next((one for one in (Part.VALIDATION, Part.ALL, Part.IDENTIFICATION) if one in judgement.tables), None)
     posteriors = [one.estimate.posterior for one in judgement.tables[part].judged] if part else []
@@ -78,7 +80,7 @@ def stated_budget(judgement: Judgement, vehicle: Vehicle) -> tuple[BudgetLine, .
 
 
 def assess_calibration(campaign: Campaign, outcome: Outcome) -> Assessment:
-    """Every estimator judged on runs left out, on what it was fitted to and on the validation part."""
+    """Every estimator judged on runs left out, on the data of its fit and on the validation part."""
     file, vehicle, calibrated = outcome.file, campaign.vehicle, outcome.file.for_core()
     judgements = []
     for estimator in file.estimators:
@@ -101,8 +103,8 @@ def assess_evaluation(campaign: Campaign, file: CalibrationFile, part: Part, tab
 def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:
     """Every identification batch with its estimate by a calibration from the other runs.
 
-    Empty where fewer than three runs leave nothing to learn from. By how much intervals are widened, and which
-    loads count as seen, stays as of all runs: the errors are those of a new load, the coverage is a little kinder.
+    Empty if fewer than three runs leave nothing to fit. The widening of intervals and the range of known loads stay as
+    of all runs: the errors are those of a new load, the coverage is slightly optimistic.
     """
     whole = outcome.file.for_core()
     if estimator == "ratio_index":

@@ -1,4 +1,5 @@
-"""Do 95 % intervals hold the truth 95 times in 100? A share with its own interval, batches of one run being alike.
+"""Whether 95 % intervals contain the truth 95 times in 100. A share with its own interval, batches of one run being
+correlated.
 
 Batches of one run share load, road and speed, so they are no independent tries: the interval is that
 of as many independent tries as would scatter like the runs' own shares (E. L. Korn and B. I. Graubard,
@@ -24,9 +25,9 @@ IDEAL_SCORE: Final = 5.86
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """Share (0..1) of n intervals that held the truth, with the 95 % limits of that share.
+    """Share (0..1) of n intervals that contain the truth, with the 95 % limits of that share.
 
-    n_effective is how many independent tries the n are worth.
+    n_effective is the number of independent trials that the n are worth.
     """
 
     n: int
@@ -38,12 +39,12 @@ class Coverage:
 
 
 def interval_scores(true: F64, low: F64, high: F64) -> F64:
-    """(n,) scores of 95 % intervals, in the unit of what they hold: their width, and 40 times what the truth lies
+    """(n,) scores of 95 % intervals, in the unit of the quantity: their width, and 40 times the distance of the truth
     outside.
 
-    It is least, in the mean, for the interval that is right (R. L. Winkler, J. Am. Stat. Assoc. 67 (1972) 187-191;
-    T. Gneiting and A. E. Raftery, J. Am. Stat. Assoc. 102 (2007) 359-378, section 6.2): coverage alone is the better
-    the wider the interval, this punishes both too narrow and too wide ones.
+    Its mean is least for the correct interval (R. L. Winkler, J. Am. Stat. Assoc. 67 (1972) 187-191;
+    T. Gneiting and A. E. Raftery, J. Am. Stat. Assoc. 102 (2007) 359-378, section 6.2): coverage alone favours wide
+    intervals, this score penalises both too narrow and too wide ones.
     """
     outside = np.maximum(low - true, 0.0) + np.maximum(true - high, 0.0)
     scores: F64 = (high - low) + MISS_COSTS * outside
@@ -51,9 +52,9 @@ def interval_scores(true: F64, low: F64, high: F64) -> F64:
 
 
 def coverage_of(covered: Sequence[bool], cluster: Sequence[Hashable]) -> Coverage:
-    """Pooled over all; ``cluster`` (n,) tells which tries belong together.
+    """Pooled over all; ``cluster`` (n,) says which trials belong together.
 
-    Raises ValueError for fewer than two clusters: nothing tells how they scatter.
+    Raises ValueError for fewer than two clusters: their scatter is unknown.
     """
     labels, member = np.unique([str(label) for label in cluster], return_inverse=True)
     n, n_clusters = len(covered), len(labels)
@@ -67,9 +68,9 @@ def coverage_of(covered: Sequence[bool], cluster: Sequence[Hashable]) -> Coverag
 
 
 def _effective(residual: F64, member: np.ndarray, n_clusters: int, share: float) -> float:
-    """p (1 - p) over the variance of p between clusters, less what Student's t takes for their number.
+    """p (1 - p) over the variance of p between clusters, less Student's t correction for their number.
 
-    Never more than n. Where all tries agree no scatter can be seen: each cluster then counts as one.
+    Never more than n. If all trials agree no scatter is visible: each cluster then counts as one.
     """
     n = len(residual)
     if share in (0.0, 1.0):

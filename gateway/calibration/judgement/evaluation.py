@@ -1,4 +1,4 @@
-"""The error table of equation (12): estimates against what was weighed."""
+"""The error table of equation (12): estimates compared with weighed loads."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ TARGETS: Final[tuple[Target, ...]] = get_args(Target)
 
 
 class Comparison(NamedTuple):
-    """A quantity's truth beside its estimate and the 95 % interval [low, high]: kg or percent, NaN where unknown."""
+    """A quantity's truth, its estimate and the 95 % interval [low, high]: kg or percent, NaN if unknown."""
 
     true: float
     estimated: float
@@ -33,7 +33,7 @@ class Comparison(NamedTuple):
 
     @property
     def is_covered(self) -> bool | None:
-        """Whether the interval holds the truth; None where there is no interval."""
+        """Whether the interval contains the truth; None if there is no interval."""
         return self.low <= self.true <= self.high if self.low <= self.high else None
 
 
@@ -41,8 +41,8 @@ class Comparison(NamedTuple):
 class Judged:
     """One batch of a known run: what was estimated, and what was true.
 
-    cg_left_m is where the sprung mass had its centre of gravity left of the centre line, NaN where nobody noted it;
-    unsprung is what calibration found.
+    cg_left_m is the sprung mass's centre of gravity left of the centre line, NaN if not stated; unsprung is what
+    calibration found.
     """
 
     run: int
@@ -62,7 +62,7 @@ class Judged:
 
     @property
     def cg_left(self) -> Comparison:
-        """The centre of gravity's place beside the centre line in m, truth and estimate."""
+        """The centre of gravity's lateral position in m, truth and estimate."""
         return Comparison(self.cg_left_m, self.estimate.cg_left.number, *self.estimate.cg_left.interval95)
 
     @property
@@ -73,11 +73,11 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class TargetErrors:
-    """(12) for one quantity: in percent of its range, and in ``unit``. None where nothing was answered.
+    """(12) for one quantity: in percent of its range, and in ``unit``. None without an estimate.
 
-    In ``mean_abs_pct_with_misses`` a rejected batch scores as if it had answered mid-range;
-    ``mean_abs_pct_of_gross`` is of payload alone, in percent of the loaded vehicle's mass. ``half_width_pct`` is the
-    mean of half the 95 % intervals, ``interval_score_pct`` that of their scores (judgement.coverage).
+    In ``mean_abs_pct_with_misses`` a rejected batch scores as if it had answered mid-range; ``mean_abs_pct_of_gross``
+    is of payload alone, in percent of the loaded vehicle's mass. ``half_width_pct`` is the mean of half the 95 %
+    intervals, ``interval_score_pct`` that of their scores (judgement.coverage).
     """
 
     unit: Literal["kg", "pp"]
@@ -118,7 +118,7 @@ class TargetErrors:
 class Errors:
     """(12) over complete batches: pieces shorter than a window at the end of a run are no batches and not counted.
 
-    cg_left is None where no place beside the centre line was noted, wheels where their loads are not known.
+    cg_left is None if no lateral position was stated, wheels if their loads are not known.
     """
 
     n_batches: int
@@ -267,12 +267,12 @@ def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: st
 
 
 def _beside_known(found: Estimate) -> Estimate:
-    """Known loads were placed by the stated front share of the empty vehicle: its error is in both and drops out."""
+    """Known loads are placed by the stated front share of the empty vehicle: its error is in both and cancels."""
     return found if found.posterior is None else found.answered(found.posterior.without(Source.EMPTY_SHARE))
 
 
 def _noted_cg_left_m(run: KnownRun, vehicle: Vehicle) -> float:
-    """An empty vehicle's is the one that the campaign states; NaN for a load nobody placed."""
+    """An empty vehicle's is the one that the campaign states; NaN for a load without a stated position."""
     if run.payload_kg > 0.0 and run.payload_left_m is None:
         return nan
     return cg_left_m(vehicle, run.payload_kg, run.payload_left_m or 0.0)

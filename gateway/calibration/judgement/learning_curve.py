@@ -1,7 +1,7 @@
-"""How much a calibration learns from how few known loads: which runs to pretend with, and what came of it.
+"""The accuracy of a calibration with few known loads: the subsets of runs to try, and their results.
 
-Runs that were driven are left out, and what is calibrated on the rest is held against them. Every trial
-calibrates from nothing but its own runs, as ``springscale calibrate --runs`` would.
+Runs are left out, and the calibration from the rest is compared with them. Every trial calibrates from its own runs
+only, as ``springscale calibrate --runs`` would.
 """
 
 from collections.abc import Callable, Sequence
@@ -68,9 +68,9 @@ class Score:
 class Trial:
     """One estimator calibrated on the runs ``numbers``, scored on two sets of batches it has not seen.
 
-    ``left_out``: every batch of the other runs, so loads that calibration never saw; None where no run
-    is left out. ``validation``: the later part of all runs, so the calibrated loads are among them;
-    None where the campaign holds no such part. ``refused`` says why these runs carry no calibration.
+    ``left_out``: every batch of the other runs, so loads that calibration never saw; None if no run is left out.
+    ``validation``: the later part of all runs, so the calibrated loads are among them; None if the campaign has no such
+    part. ``refused`` says why these runs allow no calibration.
     """
 
     numbers: tuple[int, ...]
@@ -84,7 +84,7 @@ class Trial:
 class Spread:
     """A score over several trials: mean, standard deviation and worst of their mean errors, in percent (12).
 
-    rejected_share is of all their batches. Figures are None where no trial gave one.
+    rejected_share is of all their batches. Figures are None if no trial gave one.
     """
 
     n_trials: int
@@ -105,7 +105,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Rung:
-    """What one estimator reaches with ``n_runs`` known loads, over the subsets tried."""
+    """The accuracy of one estimator with ``n_runs`` known loads, over the subsets tried."""
 
     n_runs: int
     estimator: str
@@ -238,8 +238,8 @@ def curve_of(
 ) -> LearningCurve:
     """The same for runs that were read already, as ``Outcome.split`` of a calibration holds them.
 
-    Sizes are 2, 3, 4, 6 and 10 as far as there are runs, all runs, and all but one: the most that leave
-    a run to judge by.
+    Sizes are 2, 3, 4, 6 and 10 if there are so many runs, all runs, and all but one: the most that leave a run to judge
+    by.
     """
     runs = [one.identification for one in split]
     if len(runs) < SIZES[1]:
@@ -262,7 +262,7 @@ def curve_of(
 
 
 def trial_of(split: Sequence[SplitRun], vehicle: Vehicle, numbers: tuple[int, ...], estimator: str) -> Trial:
-    """Calibrate on the identification parts of the runs ``numbers`` and judge what that did not see."""
+    """Calibrate on the identification parts of the runs ``numbers`` and judge by the other data."""
     chosen = [one for one in split if one.identification.number in numbers]
     left_out = [one for one in split if one.identification.number not in numbers]
     try:
@@ -285,9 +285,9 @@ def _score(judged: Sequence[Judged], vehicle: Vehicle) -> Score | None:
 
 
 def calibrated_on(runs: Sequence[KnownRun], vehicle: Vehicle, estimator: str) -> CalibratedVehicle:
-    """What ``springscale calibrate`` would find on these runs for one estimator.
+    """The result of ``springscale calibrate`` on these runs for one estimator.
 
-    Raises CalibrationImpossibleError where they carry no calibration.
+    Raises CalibrationImpossibleError if they allow no calibration.
     """
     with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
     if not with_batches:

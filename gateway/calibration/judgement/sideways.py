@@ -1,4 +1,4 @@
-"""Errors of where the load lies sideways, and of the loads of single wheels that follow from it."""
+"""Errors of the load's lateral position, and of the wheel loads derived from it."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -18,7 +18,7 @@ WHEELS: Final = ("front_left", "front_right", "rear_left", "rear_right")
 
 @dataclass(frozen=True, slots=True)
 class CgLeftErrors:
-    """Of the centre of gravity's place beside the centre line, in m. None where nothing was answered."""
+    """Of the centre of gravity's lateral position, in m. None without an estimate."""
 
     mean_abs_m: float | None
     bias_m: float | None
@@ -35,7 +35,7 @@ class CgLeftErrors:
 
 @dataclass(frozen=True, slots=True)
 class WheelErrors:
-    """Of the four wheels' loads in percent of the gross weight. None where they are not known."""
+    """Of the four wheels' loads in percent of the gross weight. None if they are not known."""
 
     mean_abs_pct_of_gross: float | None
     max_abs_pct_of_gross: float | None
@@ -46,7 +46,7 @@ class WheelErrors:
 
 
 def cg_left_errors(compared: F64) -> CgLeftErrors | None:
-    """Of rows (n, 4): true, estimated, low and high of the 95 % interval. None where no truth is known."""
+    """Of rows (n, 4): true, estimated, low and high of the 95 % interval. None if no truth is known."""
     told = compared[np.isfinite(compared[:, 0])]
     if not len(told):
         return None
@@ -67,7 +67,7 @@ def cg_left_errors(compared: F64) -> CgLeftErrors | None:
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What a batch was told to have carried, beside what was estimated; the place is NaN where nobody noted it."""
+    """The stated load of a batch and its estimate; the position is NaN if not stated."""
 
     payload_kg: float
     front_share_pct: float
@@ -78,8 +78,8 @@ class Carried:
     def wheels_off_pct(self, vehicle: Vehicle) -> F64:
         """(4,) errors of the wheels' loads in percent of the gross weight; NaN where either is unknown.
 
-        How the axles divide a sideways moment no campaign says, nor some what is unsprung: the truth takes both as the
-        estimate does, so that their errors are in neither.
+        A campaign does not state how the axles divide a sideways moment, and some do not state the unsprung masses: the
+        truth takes both from the estimate, so their errors are in neither.
         """
         roll_share = Quantity(self.estimate.roll_share_front, 0.0)
         truth = exactly(self.payload_kg, self.front_share_pct, self.cg_left_m)
@@ -90,7 +90,7 @@ class Carried:
 
 
 def wheel_errors(carried: Sequence[Carried], vehicle: Vehicle) -> WheelErrors | None:
-    """Over all batches whose wheels' loads are known, in truth and by the estimate; None where there is none."""
+    """Over all batches whose wheel loads are known, in truth and by the estimate; None if there is none."""
     off_pct = np.array([one.wheels_off_pct(vehicle) for one in carried]).reshape(-1, len(WHEELS))
     known = np.abs(off_pct[np.isfinite(off_pct).all(axis=1)])
     return WheelErrors(float(np.mean(known)), float(np.max(known))) if known.size else None

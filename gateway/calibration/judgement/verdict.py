@@ -1,6 +1,6 @@
-"""Fit for use or not: rules over the errors, none of them looking at a load's name.
+"""Fit for use or not: rules over the errors; none of them depends on a load's name.
 
-docs/calibration.md lists them. A calibration is as good as the worst rule says of it.
+docs/calibration.md lists them. A calibration is as good as its worst rule.
 """
 
 import math
@@ -60,7 +60,7 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """One estimator's reasons, as many as there are rules that apply."""
+    """One estimator's reasons, one for each applicable rule."""
 
     estimator: str
     reasons: tuple[Reason, ...]
@@ -72,9 +72,9 @@ class Verdict:
 
 
 def verdicts_of(assessment: Assessment, expected: Expected | None = None) -> tuple[Verdict, ...]:
-    """A verdict for every estimator judged, first that of the one which the service runs unless told otherwise.
+    """A verdict for every estimator judged, first that of the one which the service runs by default.
 
-    ``expected`` is what the half-car states of itself over all the loads that the vehicle carries.
+    ``expected`` is the half-car's own prediction over all the loads that the vehicle carries.
     """
     in_order = sorted(assessment.judgements, key=lambda one: ESTIMATOR_NAMES.index(one.estimator))
     return tuple(_verdict(assessment, one, expected) for one in in_order)
@@ -96,7 +96,7 @@ def _verdict(assessment: Assessment, judgement: Judgement, expected: Expected | 
 def _errors_and_intervals(judgement: Judgement) -> Iterator[Reason]:
     part = judgement.unseen
     if part is None:
-        text = "Nothing was held back to judge by: fewer than three runs and no validation part."
+        text = "No data were kept aside to judge by: fewer than three runs and no validation part."
         yield Reason("unseen", Grade.RESERVED, text)
         return
     table = judgement.tables[part]
@@ -111,13 +111,15 @@ def _errors_and_intervals(judgement: Judgement) -> Iterator[Reason]:
 
 
 def _inherited(assessment: Assessment) -> Iterator[Reason]:
-    """What sister vehicles tell of loads is believed, but no load of its own has shown it yet."""
+    """The loads' effect is inherited from other vehicles of its line and accepted, but no load of its own has confirmed
+    it yet.
+    """
     file = assessment.file
     if file.line is None or len({run.payload_kg for run in file.provenance.runs}) > 1:
         return
     text = (
-        f"Only one load was driven: what others do was inherited from {counted(len(file.line.members), 'vehicle')} of "
-        "its line. One known load, weighed, shows that it holds here."
+        "Only one load was driven: the effect of others was inherited from "
+        f"{counted(len(file.line.members), 'vehicle')} of its line. One known load, weighed, confirms it for this one."
     )
     yield Reason("inherited", Grade.RESERVED, text)
 
@@ -142,7 +144,7 @@ def _error(errors: Errors, part: Part, target: Target) -> Reason:
 
 
 def _coverage(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[Reason]:
-    """By the limits of the coverage, for a few runs tell little; nothing where there are fewer than two."""
+    """By the limits of the coverage, for a few runs say little; empty if there are fewer than two."""
     covered = [(hit, one.run) for one in judged if (hit := one.compared(target).is_covered) is not None]
     if len({run for _, run in covered}) < 2:
         return
@@ -157,16 +159,17 @@ def _coverage(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[
 
 
 def _half_width(width: Width | None) -> Iterator[Reason]:
-    """Intervals that are true and hold nearly every load are of no use."""
+    """Intervals that are valid but include nearly every load are of no use."""
     if width is not None:
         grade = Grade.FIT if width.is_fit else Grade.RESERVED if width.is_of_use else Grade.UNFIT
         yield Reason(f"{width.target}_half_width", grade, width.sentence)
 
 
 def _width(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[Reason]:
-    """Coverage from its other side: errors far smaller than what is stated. Batches of one run count as one.
+    """Coverage from its other side: errors far smaller than stated. Batches of one run count as one.
 
-    The errors are held against what a campaign can show of them: it has one day, one sensor and its own shape of load.
+    The errors are compared with the variance that a campaign can show: it has one day, one sensor and its own shape of
+    load.
     """
     entry = {"payload": PAYLOAD, "front_share": FRONT_SHARE}[target]
     by_run: dict[int, list[float]] = {}
@@ -189,7 +192,7 @@ def _width(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[Rea
 
 
 def _stated(expected: Expected, vehicle: Vehicle) -> Reason:
-    """The loads driven may be few and near; this is of all. A normal error is sqrt(2 / pi) sigma on average."""
+    """The loads driven may be few and near; this is over all. A normal error is sqrt(2 / pi) sigma on average."""
     low_kg, high_kg = vehicle.payload_range_kg
     percent = 100.0 * math.sqrt(2.0 / math.pi) * expected.payload_std_kg / (high_kg - low_kg)
     return Reason(
@@ -211,7 +214,7 @@ def _answered(errors: Errors, part: Part) -> Reason:
 
 
 def _agreement(left_out: TargetErrors, validation: TargetErrors) -> Iterator[Reason]:
-    """Validation knows its loads; if it errs more than runs left out do, something other than the load changed."""
+    """Validation knows its loads; if its error exceeds that of runs left out, something other than the load changed."""
     expected, seen = left_out.mean_abs_pct_with_misses, validation.mean_abs_pct_with_misses
     if expected is None or seen is None:
         return
@@ -223,14 +226,14 @@ def _agreement(left_out: TargetErrors, validation: TargetErrors) -> Iterator[Rea
 
 
 _WARNING_TEXT: Final[Mapping[str, str]] = {
-    "springs_from_priors": "Only one load was driven: it sets the zero, and springs are taken from what vehicles "
-    "usually have. Weights away from that load are as uncertain as their intervals say.",
+    "springs_from_priors": "Only one load was driven: it sets the zero; the springs are those of a typical vehicle. "
+    "Weights away from that load are as uncertain as their intervals say.",
     "intervals_untested": "Fewer than three runs: intervals were widened by a rule of thumb, not tested.",
 }
 
 
 def _warnings(assessment: Assessment, estimator: str) -> Iterator[Reason]:
-    """Those of the file, but for what was said of another estimator or is told from the drives themselves."""
+    """Those of the file, except those of another estimator or found again in the drives themselves."""
     skipped = [f"{name}: " for name in ESTIMATOR_NAMES if name != estimator]
     if assessment.outcome:
         skipped += ["run ", *(f"{finding.kind}: " for finding in assessment.outcome.inspection.findings)]
@@ -255,7 +258,7 @@ def _runs(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
         grade = Grade.UNFIT if 2 * len(unusable) > len(verdicts) else Grade.RESERVED
         yield Reason("runs", grade, f"Of {in_all} cannot be used: {_listed(unusable)}.")
     elif doubtful:
-        yield Reason("runs", Grade.RESERVED, f"Of {in_all} want a look: {_listed(doubtful)}.")
+        yield Reason("runs", Grade.RESERVED, f"Of {in_all} need attention: {_listed(doubtful)}.")
     elif verdicts:
         yield Reason("runs", Grade.FIT, f"Without a fault: {in_all}, all there are.")
 
@@ -268,8 +271,10 @@ def _labels(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
         if one.is_usable and any(finding.kind is Kind.LOAD_DISAGREES for finding in one.findings)
     ]
     if doubted:
-        text = f"The other runs weigh {_listed(doubted)} otherwise than the campaign file says: correct the load, or "
-        yield Reason("labels", Grade.UNFIT, f"{text}calibrate without (--runs).")
+        text = (
+            f"The other runs find another weight for {_listed(doubted)} than the campaign file says: correct the load,"
+        )
+        yield Reason("labels", Grade.UNFIT, f"{text} or calibrate without (--runs).")
 
 
 def _sentence(text: str) -> str:

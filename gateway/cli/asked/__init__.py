@@ -1,4 +1,4 @@
-"""Commands that ask a running service over HTTP: what it keeps is its own, and only it changes that.
+"""Commands that use a running service over HTTP: only the service itself changes its records.
 
-Options say which service and with which token (``service``); its answers go out as JSON or as sentences.
+Options name the service and its token (``service``); its answers are printed as JSON or as sentences.
 """

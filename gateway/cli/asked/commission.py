@@ -45,7 +45,7 @@ def commission() -> None:
 
 @commission.command("start")
 @click.option("--line", default=None, help="name of a line (`commission lines`), a file to upload, or `none`")
-@click.option("--name", default=None, help="what you call the vehicle [default: its id]")
+@click.option("--name", default=None, help="name of the vehicle [default: its id]")
 @click.option("--front-axle-kg", type=NUMBER, default=None, help="under the front axle of the empty vehicle")
 @click.option("--rear-axle-kg", type=NUMBER, default=None, help="the same at the rear")
 @click.option("--wheelbase-m", type=NUMBER, default=None, help="from axle to axle")
@@ -54,16 +54,18 @@ def commission() -> None:
     "--sensor-left-m", type=NUMBER, default=None, help="sensor left of the centre line; negative: right of it"
 )
 @click.option("--track-m", type=NUMBER, default=None, help="between the middles of left and right tyres")
-@click.option("--payload-kg", type=NUMBER, default=None, help="most that it may carry [default: as its line, else 450]")
+@click.option("--payload-kg", type=NUMBER, default=None, help="maximum payload [default: as its line, else 450]")
 @click.option(
     "--carries", type=click.Choice([str(one) for one in Carries]), default=None, help="what it usually carries"
 )
-@click.option("--payload-length-m", type=NUMBER, default=None, help="how far along the floor that usually reaches")
-@click.option("--payload-height-m", type=NUMBER, default=None, help="how high above the floor")
-@click.option("--roof-rack", is_flag=True, default=None, help="part of the load may lie on the roof")
-@click.option("--tow-bar", is_flag=True, default=None, help="part of the load may hang on a tow bar")
-@click.option("--empty", is_flag=True, help="you know that the vehicle is empty, and will be until this is over")
-@click.option("--sure", is_flag=True, help="what is asked about is right all the same")
+@click.option("--payload-length-m", type=NUMBER, default=None, help="usual length of the load along the floor")
+@click.option("--payload-height-m", type=NUMBER, default=None, help="usual height of the load above the floor")
+@click.option("--roof-rack", is_flag=True, default=None, help="part of the load may be on the roof")
+@click.option("--tow-bar", is_flag=True, default=None, help="part of the load may be on a tow bar")
+@click.option(
+    "--empty", is_flag=True, help="you know that the vehicle is empty, and will be until the calibration is made"
+)
+@click.option("--sure", is_flag=True, help="confirm the answers in question")
 @click.option("--note", default=None, help="kept in the history")
 @click.option("--follow/--no-follow", default=None, help="show progress until it is made [default: at a terminal]")
 @asks_service
@@ -78,7 +80,7 @@ def start(
     as_json: bool,
     **said: Any,
 ) -> None:
-    """Begin, or go on with what is under way. What no option says is asked at a terminal."""
+    """Begin, or continue a commissioning under way. On a terminal the command asks for answers that no option gives."""
     state = service.ask(PATH)
     if state["underway"] is None:
         state = service.ask(PATH, "POST", {} if note is None else {"note": note})
@@ -88,13 +90,11 @@ def start(
         state = service.ask(f"{PATH}/vehicle", "POST", _vehicle(said))
     if doubts := state["underway"]["doubts"]:
         if not (sure or (_is_at_terminal() and click.confirm(f"{doubts_text(doubts)}\nIs it right all the same?"))):
-            raise SpringscaleError(
-                f"{doubts_text(doubts)}\ncorrect the answers, or say --sure; all that was answered is kept"
-            )
+            raise SpringscaleError(f"{doubts_text(doubts)}\ncorrect the answers, or say --sure; all answers are kept")
         state = service.ask(f"{PATH}/confirm", "POST", {})
     if state["underway"]["step"] == "empty":
         if not (empty or (_is_at_terminal() and click.confirm("Is the vehicle empty, driver and tank as in service?"))):
-            raise SpringscaleError("say --empty once the vehicle is empty; all that was answered is kept")
+            raise SpringscaleError("say --empty once the vehicle is empty; all answers are kept")
         state = service.ask(f"{PATH}/empty", "POST", {"is_empty": True})
     if as_json:
         click.echo(json_line(state))
@@ -108,7 +108,7 @@ def start(
 @asks_service
 @as_json
 def show(service: Service, as_json: bool) -> None:
-    """What is under way, what inspection shows, how much is known, and what was made before."""
+    """The commissioning under way, the findings of inspection, the progress, and earlier calibrations."""
     _tell(service.ask(PATH), as_json=as_json)
 
 
@@ -116,7 +116,7 @@ def show(service: Service, as_json: bool) -> None:
 @asks_service
 @as_json
 def lines(service: Service, as_json: bool) -> None:
-    """The lines there are to choose from."""
+    """The available lines."""
     told = service.ask(f"{PATH}/lines")
     click.echo(json_line(told) if as_json else lines_text(told["items"]))
 
@@ -126,7 +126,9 @@ def lines(service: Service, as_json: bool) -> None:
 @asks_service
 @as_json
 def upload(service: Service, file: Path, as_json: bool) -> None:
-    """Bring a sister's calibration or a line file to the service, and FILE.sig where there is one."""
+    """Upload the calibration of a vehicle of the same model or a line file to the service, and FILE.sig if there is
+    one.
+    """
     told = _upload(service, file)
     click.echo(json_line(told) if as_json else lines_text(told["items"]))
 
@@ -135,7 +137,7 @@ def upload(service: Service, file: Path, as_json: bool) -> None:
 @asks_service
 @as_json
 def fit(service: Service, as_json: bool) -> None:
-    """Make the calibration of what was driven so far, enough or not."""
+    """Calibrate with the data so far, whether sufficient or not."""
     _tell(service.ask(f"{PATH}/fit", "POST", {}), as_json=as_json)
 
 
@@ -143,7 +145,7 @@ def fit(service: Service, as_json: bool) -> None:
 @asks_service
 @as_json
 def confirm(service: Service, as_json: bool) -> None:
-    """What is asked about is right all the same; where the drive contradicts it, its calibration is used."""
+    """Confirm the answers in question; if the drive contradicted them, its calibration is used."""
     _tell(service.ask(f"{PATH}/confirm", "POST", {}), as_json=as_json)
 
 
@@ -151,7 +153,7 @@ def confirm(service: Service, as_json: bool) -> None:
 @asks_service
 @as_json
 def again(service: Service, as_json: bool) -> None:
-    """It was not empty, but is now: forget what was driven, and begin the empty drive again."""
+    """The vehicle was not empty, but is now: discard the drive, and begin the empty drive again."""
     _tell(service.ask(f"{PATH}/empty", "POST", {"is_empty": True, "again": True}), as_json=as_json)
 
 
@@ -159,7 +161,7 @@ def again(service: Service, as_json: bool) -> None:
 @asks_service
 @as_json
 def cancel(service: Service, as_json: bool) -> None:
-    """Forget what is under way; calibrations made before stay."""
+    """Discard the commissioning under way; earlier calibrations stay."""
     _tell(service.ask(PATH, "DELETE"), as_json=as_json)
 
 
@@ -219,7 +221,7 @@ def _upload(service: Service, file: Path) -> dict[str, Any]:
 
 
 def _vehicle(said: dict[str, Any]) -> dict[str, Any]:
-    """The answers; what is missing and must be known is asked."""
+    """The answers; missing ones that are needed are asked for."""
     vehicle = {}
     for option, (key, question, is_needed) in SAID.items():
         answer = said[option]

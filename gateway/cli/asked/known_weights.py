@@ -21,14 +21,14 @@ KINDS: Final = ("ticket", "axle_pads", "delivery_note")
 
 @click.group("tare")
 def tare_commands() -> None:
-    """Tell a running service that its vehicle is empty, take that back, and see what was done."""
+    """State to a running service that its vehicle is empty, take that back, and see what was done."""
 
 
 @tare_commands.command("show")
 @asks_service
 @as_json
 def show_tares(service: Service, as_json: bool) -> None:
-    """What is in use, which load "it is empty now" would be of, and the history."""
+    """What is in use, the load at which "it is empty now" would be taken, and the history."""
     _tell(service.ask(TARE), as_json=as_json)
 
 
@@ -56,14 +56,14 @@ def undo(service: Service, factory: bool, as_json: bool) -> None:
 
 @click.group("ticket")
 def ticket_commands() -> None:
-    """Hand a running service known weights of loads; confirm them; take them back."""
+    """State known weights of loads to a running service; confirm them; take them back."""
 
 
 @ticket_commands.command("show")
 @asks_service
 @as_json
 def show_tickets(service: Service, as_json: bool) -> None:
-    """Every known weight of a load, what was estimated without it, and how far these were off."""
+    """Every known weight of a load, its estimate without it, and the errors of these estimates."""
     _tell(service.ask(TICKETS), as_json=as_json)
 
 
@@ -74,7 +74,7 @@ def show_tickets(service: Service, as_json: bool) -> None:
 @asks_service
 @as_json
 def add(service: Service, weight: dict[str, Any], kind: str, note: str | None, as_json: bool) -> None:
-    """Hand in WEIGHT, such as front_axle_kg=850,rear_axle_kg=1040,at=2026-11-21T04:10:00Z,drive=before."""
+    """State WEIGHT, such as front_axle_kg=850,rear_axle_kg=1040,at=2026-11-21T04:10:00Z,drive=before."""
     made = service.ask(PATH, "POST", {"kind": kind, "weight": weight} | _noted(note))
     click.echo(json_line(made) if as_json else _entry_text(made))
 
@@ -93,16 +93,20 @@ def confirm(service: Service, ticket_id: str, as_json: bool) -> None:
 @asks_service
 @as_json
 def withdraw(service: Service, ticket_id: str, as_json: bool) -> None:
-    """Take TICKET_ID back, as `show` has it, or the first letters of it: the numbers are as if it had never been."""
+    """Take TICKET_ID back, as `show` prints it, or its first letters: the numbers are as if it had never been
+    stated.
+    """
     _tell(service.ask(f"{TICKETS}/{_standing(service, ticket_id)}", "DELETE"), as_json=as_json)
 
 
 def _standing(service: Service, begin: str) -> str:
-    """The one whose id begins so."""
+    """The entry whose id begins with this text."""
     ids = [one["id"] for one in service.ask(PATH)["history"] if one["ended"] is None]
     found = [one for one in ids if one.startswith(begin) or one.removeprefix("sha256:").startswith(begin)]
     if len(found) != 1:
-        raise SpringscaleError(f"{begin}: {len(found)} known weights begin so: `springscale calibration ticket show`")
+        raise SpringscaleError(
+            f"{begin}: {len(found)} known weights begin like this: `springscale calibration ticket show`"
+        )
     return str(found[0])
 
 
@@ -134,7 +138,7 @@ def _count_text(state: dict[str, Any]) -> str:
         return "no known weight is in use: weighed by the calibration alone"
     scatter = "" if state["error_std_kg"] is None else f" (scatter {state['error_std_kg']:.1f} kg)"
     known = one_or_more(state["n_teaching"], "known weight", "known weights")
-    return f"{known} in use; without them estimates were {state['mean_error_kg']:+.1f} kg off{scatter}"
+    return f"{known} in use; without them the estimates' error is {state['mean_error_kg']:+.1f} kg{scatter}"
 
 
 def _payload(load: dict[str, Any], name: str = "payload") -> str:

@@ -1,4 +1,4 @@
-"""springscale record: the ring log of a running service, listed and fetched; or a bus into a log of one's own."""
+"""springscale record: the ring log of a running service, listed and fetched; or a bus recorded into a log."""
 
 import contextlib
 import signal
@@ -60,8 +60,8 @@ def fetch(
 ) -> None:
     """Fetch files of the ring log as one log: NAMES, those of a time, or all.
 
-    Batches are counted from the first frame of a drive: to get the very batches of the service, begin with the
-    file in which the drive began.
+    Batches are counted from the first frame of a drive: to get the very batches of the service, begin with the file in
+    which the drive began.
     """
     items = service.ask(PATH)["items"]
     if unknown := sorted(set(names) - {item["name"] for item in items}):
@@ -81,7 +81,7 @@ def fetch(
 
 @record.command("bus")
 @click.argument("log", type=FILE)
-@click.option("--signals", required=True, help="signal map whose frames are wanted, or springscale:NAME")
+@click.option("--signals", required=True, help="signal map whose frames are recorded, or springscale:NAME")
 @options.interface
 @options.channel
 @click.option("--for-s", type=NumberRange(0.1), default=None, help="so many seconds [default: until Ctrl-C]")
@@ -109,7 +109,7 @@ def from_bus(log: Path, signals: str, interface: str, channel: str, for_s: float
 
 @contextlib.contextmanager
 def _until_told(stop: threading.Event) -> Iterator[None]:
-    """Ctrl-C and SIGTERM end the recording, not the program: what came is written."""
+    """Ctrl-C and SIGTERM end the recording, not the program: received frames are written."""
     before = {number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
@@ -119,7 +119,7 @@ def _until_told(stop: threading.Event) -> Iterator[None]:
 
 
 def _pieces(service: Service, name: str, n_bytes: int) -> Iterator[bytes]:
-    """All of one segment; a link that breaks is taken up again as long as it brings something."""
+    """All of one segment; a broken connection is resumed as long as it makes progress."""
     n_got = 0
     while n_got < n_bytes:
         n_before = n_got

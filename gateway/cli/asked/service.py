@@ -1,4 +1,4 @@
-"""The running service as commands ask it: its address, a token, certificates, and its own words where it refuses."""
+"""The running service for commands: its address, a token, certificates, and its own words if it refuses."""
 
 import functools
 import json
@@ -28,7 +28,7 @@ Command = Callable[..., None]
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """Which service is asked, and how."""
+    """Which service to use, and how."""
 
     config_path: Path | None
     url: str | None
@@ -38,18 +38,20 @@ class Service:
     key: Path | None
 
     def address(self, path: str) -> str:
-        """Where ``path`` is. Raises a usage error where the options name no service, or two."""
+        """Where ``path`` is. Raises a usage error if the options name no service, or two."""
         if (self.config_path is None) == (self.url is None):
             raise click.UsageError("give --config FILE of the service, or its --url")
         if self.config_path is not None:
             return _configured_address(self.config_path) + path
         url = self.url or ""
         if not url.startswith(("http://", "https://")):
-            raise click.UsageError(f"{url!r} is no address such as http://127.0.0.1:8000")
+            raise click.UsageError(f"{url!r} is not an address such as http://127.0.0.1:8000")
         return url.rstrip("/") + path
 
     def ask(self, path: str, method: str = "GET", body: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """The service's answer. Raises SpringscaleError with its own words where it refuses, or is not there."""
+        """The service's answer. Raises SpringscaleError with the service's own words if it refuses or cannot be
+        reached.
+        """
         content = None if body is None else json_line(body).encode()
         with self.opened(path, method, content) as answer:
             record: dict[str, Any] = json.load(answer)
@@ -63,7 +65,7 @@ class Service:
         content: bytes | None = None,
         more: Mapping[str, str] = MappingProxyType({}),
     ) -> Iterator[HTTPResponse]:
-        """The answer, to be read as it comes; ``more`` are headers. Raises as ``ask`` does, while it is read too."""
+        """The answer as a stream; ``more`` are headers. Raises as ``ask`` does, also during reading."""
         address = self.address(path)
         headers = {"Accept": "application/json, */*;q=0.5", "Content-Type": "application/json", **more}
         if self.token:
@@ -75,10 +77,10 @@ class Service:
         except urllib.error.HTTPError as refusal:
             raise SpringscaleError(f"{address}: {_said(refusal)}") from None
         except (OSError, ValueError, HTTPException) as fault:  # not there, not trusted, or not what it should be
-            raise SpringscaleError(f"{address}: no service answers there as it should: {_why(fault)}") from None
+            raise SpringscaleError(f"{address}: no valid answer from a service there: {_why(fault)}") from None
 
     def _opener(self) -> urllib.request.OpenerDirector:
-        """Straight to the service, past any proxy; certificates are checked, and ours is shown where there is one."""
+        """Directly to the service, past any proxy; certificates are checked, and ours is shown if there is one."""
         try:
             context = ssl.create_default_context(cafile=self.ca)
         except OSError as fault:
@@ -96,7 +98,7 @@ class Service:
 
 
 def asks_service(command: Command) -> Command:
-    """The options that say which service is asked; handed to ``command`` as one, first."""
+    """The options that name the service; passed to ``command`` as one argument, first."""
 
     @functools.wraps(command)
     def asking(**options: Any) -> None:
@@ -105,15 +107,15 @@ def asks_service(command: Command) -> Command:
 
     decorated: Command = asking
     for option in (
-        click.option("--key", type=FILE, default=None, help="PEM file of its key, where that is a file of its own"),
+        click.option("--key", type=FILE, default=None, help="PEM file of its key, if that is a separate file"),
         click.option(
             "--certificate",
             type=FILE,
             default=None,
-            help="PEM file of our certificate, for a service that wants one",
+            help="PEM file of our certificate, for a service that requires one",
         ),
         click.option("--ca", type=FILE, default=None, help="PEM file of the authority that signed its certificate"),
-        click.option("--token", envvar="SPRINGSCALE_TOKEN", default=None, help="token, if the service wants one"),
+        click.option("--token", envvar="SPRINGSCALE_TOKEN", default=None, help="token, if the service requires one"),
         click.option("--url", default=None, help="address of the service, such as http://127.0.0.1:8000"),
         click.option("--config", "config_path", type=FILE, default=None, help="springscale.toml of the service"),
     ):
@@ -131,7 +133,7 @@ def _configured_address(config_path: Path) -> str:
 
 
 def _said(refusal: urllib.error.HTTPError) -> str:
-    """Detail and reason of a problem; the status where something else answered."""
+    """Detail and reason of a problem; the status if something else answered."""
     try:
         problem = json.load(refusal)
         return f"{problem['detail']}" + (f" ({problem['reason']})" if problem.get("reason") else "")

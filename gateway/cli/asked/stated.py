@@ -19,7 +19,7 @@ class KnownLoad(click.ParamType[dict[str, Any]]):
     name = "key=value,..."
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> dict[str, Any]:
-        """Raises a usage error that says which keys there are."""
+        """Raises a usage error that lists the keys."""
         if isinstance(value, dict):
             return value
         told: dict[str, Any] = {}
@@ -41,7 +41,7 @@ class KnownLoad(click.ParamType[dict[str, Any]]):
 
 
 def _number(text: str) -> float | None:
-    """None where it is none, or no finite one."""
+    """None unless it is a finite number."""
     try:
         number = float(text)
     except ValueError:

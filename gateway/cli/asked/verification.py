@@ -1,4 +1,4 @@
-"""springscale verification: known loads held against what a running service weighed, as dated records."""
+"""springscale verification: known loads compared with the estimates of a running service, as dated records."""
 
 from pathlib import Path
 from typing import Any, Final
@@ -18,14 +18,14 @@ PATH: Final = "/api/v1/calibration/verifications"
 
 @click.group("verification")
 def verification() -> None:
-    """Hold known loads against what a running service weighed: a dated record with errors and a verdict."""
+    """Compare known loads with the estimates of a running service: a dated record with errors and a verdict."""
 
 
 @verification.command("show")
 @asks_service
 @as_json
 def show(service: Service, as_json: bool) -> None:
-    """What is asked for, when a verification is due, and the records."""
+    """The requirements, when a verification is due, and the records."""
     state = service.ask(PATH)
     click.echo(json_line(state) if as_json else _state_text(state))
 
@@ -43,7 +43,7 @@ def show(service: Service, as_json: bool) -> None:
 @asks_service
 @as_json
 def record(service: Service, loads: tuple[dict[str, Any], ...], note: str | None, as_json: bool) -> None:
-    """Judge known loads by what was weighed of them, and keep the record. Nothing is learned from them."""
+    """Compare known loads with their estimates, and keep the record. The calibration does not change."""
     made = service.ask(PATH, "POST", {"loads": list(loads)} | ({} if note is None else {"note": note}))
     click.echo(json_line(made) if as_json else _record_text(made))
 
@@ -53,11 +53,13 @@ def record(service: Service, loads: tuple[dict[str, Any], ...], note: str | None
 @click.option("--output", type=FILE, required=True, help="the page to write, such as verification.html")
 @asks_service
 def export(service: Service, record_id: str, output: Path) -> None:
-    """Write one record as a page to print: RECORD_ID as `show` has it, or the first letters of it."""
+    """Write one record as a page to print: RECORD_ID as `show` prints it, or its first letters."""
     ids = [entry["id"] for entry in service.ask(PATH)["history"]]
     found = [one for one in ids if one.startswith(record_id) or one.removeprefix("sha256:").startswith(record_id)]
     if len(found) != 1:
-        raise SpringscaleError(f"{record_id}: {len(found)} records begin so: `springscale verification show` has them")
+        raise SpringscaleError(
+            f"{record_id}: {len(found)} records begin like this: `springscale verification show` lists them"
+        )
     with service.opened(f"{PATH}/{found[0]}") as answer:
         page = answer.read()
     with refusal_told(output, SpringscaleError), written_whole(output) as file:

@@ -17,11 +17,11 @@ from gateway.reports.fleet import write_fleet_report
 @click.option("--output", type=FILE, required=True, help="directory to write; an earlier report is written over")
 @as_json
 def fleet_report(dataset: str, output: Path, as_json: bool) -> None:
-    """What DATASET, the output of `springscale reprocess`, tells of each vehicle.
+    """A report on each vehicle of DATASET, the output of `springscale reprocess`.
 
-    Loads over time with intervals, refused batches by reason, what drifts beyond the fleet's seasons and beyond chance,
-    sensors that went bad: report.html with what wants a look, a page for each vehicle, and report.json. DATASET is a
-    folder or a URL (s3://, gs://, az://). Only what a receipt vouches for is counted.
+    Loads over time with intervals, refused batches by reason, drifts beyond the fleet's seasons and beyond chance,
+    faulty sensors: report.html with what needs attention, a page for each vehicle, and report.json. DATASET is a folder
+    or a URL (s3://, gs://, az://). Only batches with a receipt are counted.
     """
     with counted("reading vehicles") as on_step:
         fleet = fleet_of(place_of(dataset), lambda done, of: on_step(done, 2 * of + 1))

@@ -1,4 +1,4 @@
-"""springscale line: what several vehicles of one line tell of the next."""
+"""springscale line: a prior for the next vehicle from several vehicles of one line."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,8 +38,8 @@ def build(files: tuple[Path, ...], output: Path, campaigns: tuple[Path, ...], as
     """Make the line of the calibrations FILES, sisters of one model.
 
     From three on, the scatter between vehicles is estimated. With --logs each vehicle of these campaigns is calibrated
-    once more, by one empty drive and what the others tell, and weighs its other loads: how far intervals are widened
-    comes from there.
+    once more, from one empty drive and the other vehicles, and weighs its other loads: these errors set how far
+    intervals are widened.
     """
     _require_place(output)
     calibrations = [load_calibration(path) for path in files]
@@ -61,7 +61,7 @@ def build(files: tuple[Path, ...], output: Path, campaigns: tuple[Path, ...], as
 @click.argument("file", type=FILE)
 @as_json
 def show(file: Path, as_json: bool) -> None:
-    """What the line FILE says: its vehicles, the scatter between them, and how far intervals are widened."""
+    """The content of the line FILE: its vehicles, the scatter between them, and how far intervals are widened."""
     held = load_like(file)
     if not isinstance(held, LineFile):
         raise ConfigurationError(f"{file}: is the calibration of one vehicle: see `springscale calibration show`")
@@ -69,7 +69,7 @@ def show(file: Path, as_json: bool) -> None:
 
 
 def _build(calibrations: Sequence[CalibrationFile], runs: dict[str, tuple[KnownRun, ...]]) -> LineFile:
-    """A bar telling how many siblings were left out."""
+    """A progress bar of the vehicles left out."""
     done = 0
     with counted("leaving siblings out") as on_step:
 
@@ -84,7 +84,7 @@ def _build(calibrations: Sequence[CalibrationFile], runs: dict[str, tuple[KnownR
 def _runs(
     calibrations: Sequence[CalibrationFile], campaigns: Sequence[Campaign], on_step: Steps
 ) -> dict[str, tuple[KnownRun, ...]]:
-    """By calibration: the drives it was made from."""
+    """The drives of each calibration."""
     runs = {}
     for done, campaign in enumerate(campaigns):
         made = _made_from(campaign, calibrations)
@@ -108,6 +108,6 @@ def _made_from(campaign: Campaign, calibrations: Sequence[CalibrationFile]) -> C
 
 def _require_place(output: Path) -> None:
     if output.is_dir():
-        raise click.UsageError(f"--output {output}: is a folder, a file is wanted")
+        raise click.UsageError(f"--output {output}: is a folder, not a file")
     if not output.parent.is_dir():
         raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")

@@ -1,4 +1,4 @@
-"""springscale campaign: known-load drives as one archive to hand on."""
+"""springscale campaign: known-load drives as one archive to pass on."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from gateway.records import json_line
 
 @click.group("campaign")
 def campaign() -> None:
-    """Known-load drives as one archive, to hand on or to contribute."""
+    """Known-load drives as one archive, to pass on or to contribute."""
 
 
 @campaign.command("pack")

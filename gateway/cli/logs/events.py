@@ -1,4 +1,4 @@
-"""springscale events: logs to load events and trips, as the service tells them."""
+"""springscale events: logs to load events and trips, as the service reports them."""
 
 from pathlib import Path
 

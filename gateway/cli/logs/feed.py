@@ -63,7 +63,7 @@ def feed(
     chosen = [IioDevice(sysfs / name, turn, rate_hz, nodes) for name in names]
     devices = chosen or list(find_devices(turn, rate_hz, sysfs, nodes))
     if not devices and not gps:
-        raise ConfigurationError(f"{sysfs}: has no inertial unit with a buffer, and --gpsd is empty: nothing to feed")
+        raise ConfigurationError(f"{sysfs}: has no inertial unit with a buffer, and --gpsd is empty: nothing to send")
     feeder = Feeder(interface, channel, devices, _gpsd(gps), lambda text: click.echo(f"feed: {text}", err=True))
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: feeder.stop())
@@ -86,12 +86,12 @@ def _gpsd(told: str) -> Gpsd | None:
         return None
     host, _, port = told.rpartition(":")
     if not host or not port.isdecimal():
-        raise ConfigurationError(f"--gpsd {told}: HOST:PORT is wanted, such as {GPSD}")
+        raise ConfigurationError(f"--gpsd {told}: not HOST:PORT, such as {GPSD}")
     return Gpsd(host.strip("[]"), int(port))
 
 
 class _Ticker:
-    """Tells systemd and people how it goes."""
+    """Reports its state to systemd and to people."""
 
     def __init__(self, devices: list[IioDevice]) -> None:
         self.status = StatusLine()
@@ -111,7 +111,7 @@ class _Ticker:
         self._warn_of_gravity(state)
 
     def _warn_of_gravity(self, state: FeedState) -> None:
-        """Once, where the axis that should be up does not carry gravity."""
+        """Once, if the axis that should be up does not show gravity."""
         is_settled = max(state.n_samples.values(), default=0) > SETTLED and math.isfinite(state.gravity_mps2)
         if self._has_warned or not is_settled:
             return

@@ -28,8 +28,8 @@ def import_recording(
 ) -> None:
     """Make a log OUTPUT (.log or .log.gz) of RECORDING, a zip or folder that Sensor Logger or phyphox exported.
 
-    Turns the phone's axes to the vehicle's, and writes the signal map and database of the log beside it. Prints what
-    kept the phone from recording well, and how to mend it.
+    Turns the phone's axes to the vehicle's, and writes the signal map and database of the log beside it. Prints faults
+    of the phone's recording, and how to mend them.
     """
     found, written = import_from(recording, output, forward, with_position=not is_without_position)
     if as_json:
@@ -53,7 +53,7 @@ def _text(found: Imported) -> Iterator[str]:
 
 
 def _axes(found: Imported) -> str:
-    """Which of the phone's axes lie nearest to forward and up, and how sure that is."""
+    """Which of the phone's axes are nearest to forward and up, with the probability."""
     names = []
     for what, row in (("ahead", found.axes.to_vehicle[0]), ("up", found.axes.to_vehicle[2])):
         nearest = max(PHONE_AXES, key=lambda name: float(PHONE_AXES[name] @ row))

@@ -1,10 +1,10 @@
-"""What axle weights make of a campaign's [vehicle], as TOML to paste."""
+"""A campaign's [vehicle] from axle weights, as TOML to paste."""
 
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE, Sprung
 
 
 def vehicle_block(sprung: Sprung) -> str:
-    """The table with a word on where its figures come from. The keys that a tape measures are named, not made up."""
+    """The table with a comment on the source of its figures. The keys that a tape measures are named, not made up."""
     head = [
         "[vehicle]",
         f"# unsprung masses: front {_unsprung(sprung.unsprung_front_kg, sprung.weights.unsprung_front_kg)},",

@@ -44,7 +44,7 @@ def _ranges(held: CalibrationFile) -> Iterator[str]:
 def _expected(held: CalibrationFile) -> Iterator[str]:
     for estimator in held.estimators:
         errors = held.expected_errors.get(estimator)
-        running = "; the service runs this one unless told otherwise" if estimator == held.estimators[0] else ""
+        running = "; the service runs this one by default" if estimator == held.estimators[0] else ""
         yield f"{estimator:28}{'unknown' if errors is None else _errors(errors)}{running}"
 
 
@@ -60,7 +60,7 @@ def _title(part: str, figures: Sequence[Figure]) -> str:
 
 
 def _figures(figures: Sequence[Figure], line: LinePart | None) -> Iterator[str]:
-    """With a line, what was inherited is told from what is the vehicle's own."""
+    """With a line, inherited parameters are distinguished from the vehicle's own."""
     for figure in figures:
         row = f"{figure.name:28}{figure.centre:>12.5g} ± {figure.std:.2g}"
         yield row if line is None else f"{row:52}{'inherited' if figure.name in line.scatter_std else 'its own'}"

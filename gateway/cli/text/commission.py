@@ -6,22 +6,22 @@ from gateway.words import one_or_more
 
 STEPS: Final = {
     "line": "choose the line that this vehicle is of",
-    "vehicle": "state its axle weights, wheelbase, and where the sensor sits",
-    "empty": "say that it is empty, and drive",
+    "vehicle": "state its axle weights, wheelbase, and the sensor's position",
+    "empty": "state that it is empty, and drive",
     "drive": "drive, empty, on any ordinary road above 20 km/h",
     "fit": "the calibration is being made",
 }
 
 
 def state_text(state: dict[str, Any]) -> str:
-    """All of it: what is under way, what is in use, what was made before."""
+    """All of it: the commissioning under way, the calibration in use, earlier ones."""
     lines = [f"in use: {_made_text(state['active']) if state['active'] else 'the calibration of the settings, if any'}"]
     if state["is_pending"]:
         lines.append("another calibration counts from the next drive on")
     if state["underway"] is not None:
         lines.append(underway_text(state["underway"]))
     elif state["why_not"]:
-        lines.append(f"none can be made here: {state['why_not']}")
+        lines.append(f"no calibration can be made here: {state['why_not']}")
     else:
         lines.append("nothing is under way: `springscale commission start` begins")
     lines += [f"  {_made_text(made)}{end_text(made['ended'])}" for made in state["history"]]
@@ -29,15 +29,15 @@ def state_text(state: dict[str, Any]) -> str:
 
 
 def underway_text(underway: dict[str, Any]) -> str:
-    """What is wanted next, what inspection shows, how much is known."""
+    """The next step, the findings of inspection, the progress."""
     lines = [f"next: {STEPS[underway['step']]}"]
     if underway["n_batches"] or underway["driven_s"]:
         lines.append(progress_text(underway))
     if underway["doubts"]:
         lines.append(doubts_text(underway["doubts"]))
-        lines.append("`springscale commission confirm` where it is right all the same")
+        lines.append("`springscale commission confirm` if it is right all the same")
     if any(one["is_of_drive"] for one in underway["doubts"]):
-        lines.append("`springscale commission again` where it was not empty, but is now")
+        lines.append("`springscale commission again` if it was not empty, but is now")
     if underway["fault"]:
         lines.append(f"no calibration yet: {underway['fault']}")
     inspection = underway["inspection"] or {"findings": []}
@@ -46,7 +46,7 @@ def underway_text(underway: dict[str, Any]) -> str:
 
 
 def doubts_text(doubts: list[dict[str, Any]]) -> str:
-    """What is asked, one line each, and the answers that were probably meant."""
+    """The doubts, one line each, and the answers that were probably meant."""
     lines = [f"is this right? {one['text']}: {one['advice']}" for one in doubts]
     meant = doubts[0]["meant"]
     said = " and ".join(f"{name} = {x[1] if isinstance(x, list) else x:g}" for name, x in meant.items())
@@ -60,17 +60,17 @@ def progress_text(underway: dict[str, Any]) -> str:
     if next_s is not None:
         driven += f", next window in {int(next_s) // 60}:{int(next_s) % 60:02}"
     if learned is None:
-        return f"{driven}: nothing is known yet"
+        return f"{driven}: no result yet"
     return (
-        f"{driven}: {learned['share']:.0%} of what is wanted is known; a payload would be told to "
-        f"± {learned['payload_std_kg']:.0f} kg, {learned['needed_std_kg']:.0f} are enough (standard deviations)"
+        f"{driven}: {learned['share']:.0%} of the goal; payload to ± {learned['payload_std_kg']:.0f} kg, goal ± "
+        f"{learned['needed_std_kg']:.0f} kg (standard deviations)"
     )
 
 
 def lines_text(items: list[dict[str, Any]]) -> str:
     """Numbered, for somebody to choose."""
     if not items:
-        return "there is no line: `springscale commission upload FILE` brings one, or go on without"
+        return "there is no line: `springscale commission upload FILE` adds one, or continue without"
     return "\n".join(
         f"{n}: {item['name']} ({item['source']}): {item['fault'] or _line_text(item['vehicle'])}"
         for n, item in enumerate(items, 1)
@@ -89,5 +89,5 @@ def _made_text(made: dict[str, Any]) -> str:
 
 
 def end_text(ended: dict[str, Any] | None) -> str:
-    """Since when something made is out of use, why, and who said so; nothing of what is in use."""
+    """When and why a calibration went out of use, and who said so; empty for the one in use."""
     return "" if ended is None else f", {ended['why']} {ended['at'][:19]}Z by {ended['by']}"

@@ -7,7 +7,7 @@ from gateway.units import si_factor
 
 
 def sentence(record: Mapping[str, Any]) -> str:
-    """One line of the object of ``estimate_to_json``: when, how much, how sure; or why not."""
+    """One line of the object of ``estimate_to_json``: when, how much, with its interval; or why not."""
     when = f"{record['t_start'][:19]}Z"
     if record["rejected"]:
         return f"{when}  no estimate: {', '.join(record['rejected'])}"
@@ -18,7 +18,7 @@ def sentence(record: Mapping[str, Any]) -> str:
 
 
 def _told(record: Mapping[str, Any], name: str, unit: str, form: str, half_form: str) -> str:
-    """A quantity and half its interval; a calibration may hold one of the two alone."""
+    """A quantity and half its interval; a calibration may contain one of the two alone."""
     words, number = name.replace("_", " "), record[f"{name}_{unit}"]
     if number is None:
         return f"{words} unknown"
@@ -27,7 +27,7 @@ def _told(record: Mapping[str, Any], name: str, unit: str, form: str, half_form:
 
 
 def _aside(record: Mapping[str, Any]) -> str:
-    """Where the sprung mass lies sideways, where something tells."""
+    """The lateral position of the sprung mass, if known."""
     if record["cg_left_m"] is None:
         return ""
     half_mm = 1000.0 * _half(record["cg_left_interval95_m"])
@@ -35,11 +35,11 @@ def _aside(record: Mapping[str, Any]) -> str:
 
 
 def _too_much(record: Mapping[str, Any]) -> str:
-    """Which places bear more than they may."""
+    """The places over their limit."""
     over = [place.replace("_", " ") for place, weight in record["weights"].items() if weight["is_over_limit"]]
     return f"   over the limit: {', '.join(over)}" if over else ""
 
 
 def _half(interval95: Sequence[float]) -> float:
-    """Half its width: what stands behind ±."""
+    """Half its width: the number after ±."""
     return (interval95[1] - interval95[0]) / 2.0

@@ -16,7 +16,7 @@ def entry_sentence(entry: Entry) -> str:
 def _event(told: Mapping[str, Any]) -> str:
     change, half = told["change_kg"], _half(told["change_interval95_kg"])
     what = f"{abs(change):.0f} kg {'loaded' if change >= 0.0 else 'unloaded'} (± {half:.0f} kg)"
-    sure = "" if told["probability"] >= SURE else f", {told['probability']:.0%} sure"
+    sure = "" if told["probability"] >= SURE else f", {told['probability']:.0%} probable"
     if told["is_withdrawn"]:
         what, sure = "withdrawn, nothing was loaded or unloaded after all", ""
     after = told["after"]
@@ -33,7 +33,7 @@ def _trip(told: Mapping[str, Any]) -> str:
 
 
 def _span(told: Mapping[str, Any]) -> str:
-    """The day is said again where it is another one at the end."""
+    """The day is repeated if it is another one at the end."""
     (day, begun), (last_day, ended) = (_minute(told[name]) for name in ("t_start", "t_end"))
     return f"{day} {begun} to {ended if last_day == day else f'{last_day} {ended}'}"
 

@@ -1,4 +1,4 @@
-"""Verdicts on known-load drives, as people and programs read them."""
+"""Verdicts on known-load drives, for people and for programs."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -6,7 +6,9 @@ from gateway.calibration.inspection import Finding, Inspection, RunVerdict, Spli
 
 
 def inspection_sentences(inspection: Inspection) -> str:
-    """A line a run, its findings below with what to do about each; then of all runs together, and what is left."""
+    """A line a run, its findings below with what to do about each; then those of all runs together, and the usable
+    runs.
+    """
     lines: list[str] = []
     for one, verdict in zip(inspection.split, inspection.verdicts, strict=True):
         lines += [_run_line(one, verdict), *_finding_lines(verdict.findings)]
@@ -16,7 +18,7 @@ def inspection_sentences(inspection: Inspection) -> str:
 
 
 def _in_all(inspection: Inspection) -> str:
-    """How many runs are left, and what they cover."""
+    """How many runs are usable, and the loads they cover."""
     runs = [one.identification for one in inspection.usable if one.has_identification]
     counted = f"{len(inspection.usable)} of {len(inspection.split)} runs can be used"
     if not runs:
@@ -27,7 +29,7 @@ def _in_all(inspection: Inspection) -> str:
 
 
 def _from_to(numbers: Sequence[float], form: str) -> str:
-    """Least and greatest; one number where they read alike."""
+    """Least and greatest; one number if they print alike."""
     least, greatest = format(min(numbers), form), format(max(numbers), form)
     return least if least == greatest else f"{least} to {greatest}"
 
@@ -50,7 +52,7 @@ def _finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
 
 
 def inspection_json(inspection: Inspection) -> dict[str, object]:
-    """A verdict a run, what is to say of all runs together, and why there is no calibration (null where there is)."""
+    """A verdict a run, findings about all runs together, and why there is no calibration (null if there is one)."""
     return {
         "refusal": inspection.refusal,
         "runs": [

@@ -1,4 +1,4 @@
-"""What a log holds, as people and programs read it."""
+"""The content of a log, for people and for programs."""
 
 import math
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ def _heard(seen: Look) -> Iterator[str]:
 
 
 def _names(seen: Look) -> dict[int, str]:
-    """What each identifier may be, by identity."""
+    """The probable meaning of each identifier, by identity."""
     told = {}
     for one in seen.described:
         other_length = "" if one.has_length else f", which has {one.message.length} bytes there"

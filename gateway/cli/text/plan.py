@@ -5,7 +5,7 @@ from gateway.estimate import Z95
 
 
 def plan_sentences(plan: LoadPlan) -> str:
-    """What is expected now, the runs to drive in order, and what each would bring."""
+    """The present expectation, the runs to drive in order, and the gain of each."""
     is_enough = plan.is_enough_driven
     what = "most would bring" if is_enough else "drive next"
     minutes, kmh = plan.drive.duration_s / 60.0, 3.6 * plan.drive.speed_mps
@@ -28,21 +28,22 @@ def plan_sentences(plan: LoadPlan) -> str:
 
 
 def widths_sentence(widths: StatedWidths) -> str:
-    """What it costs that nobody said what the vehicle carries."""
+    """The cost of not stating what the vehicle carries."""
     kinds = ", ".join(
         f"{one.unsaid.payload_kg:.0f} ± {one.unsaid.half_width_kg:.0f} kg with {kind} "
         f"({one.said.payload_kg:.0f} ± {one.said.half_width_kg:.0f} once said)"
         for kind, one in widths.carries.items()
     )
     return (
-        f"Nobody said what the vehicle carries. One batch would state a load of {widths.payload_kg:g} kg as {kinds}; "
-        "± values are 95 % intervals. Say it in [vehicle]: carries, or payload_length_m and payload_height_m."
+        f"The campaign does not say what the vehicle carries. One batch would state a load of {widths.payload_kg:g} "
+        f"kg as {kinds}; "
+        "± values are 95 % intervals. State it in [vehicle]: carries, or payload_length_m and payload_height_m."
     )
 
 
 def _now(plan: LoadPlan) -> str:
     if plan.now is None:
-        return f"{plan.vehicle}: nothing driven yet; expected from what is usual for road vehicles"
+        return f"{plan.vehicle}: nothing driven yet; expected from typical road vehicles"
     return f"{plan.vehicle}, {plan.n_driven} runs driven: expected {_expected(plan.now)}"
 
 

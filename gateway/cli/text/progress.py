@@ -13,7 +13,7 @@ SHOWN_EVERY_S: Final = 0.2
 
 
 class StatusLine(AbstractContextManager["StatusLine"]):
-    """One line that tells how far work of unknown length is; removed at the end."""
+    """One line that shows the progress of work of unknown length; removed at the end."""
 
     def __init__(self) -> None:
         self._is_shown = sys.stderr.isatty()
@@ -34,14 +34,14 @@ class StatusLine(AbstractContextManager["StatusLine"]):
 
 
 class Steps(Protocol):
-    """Moves a bar: steps done, steps in all, and what is done next where it has a name."""
+    """Moves a bar: steps done, steps in all, and the name of the next step if it has one."""
 
     def __call__(self, done: int, of: int, label: str | None = None) -> None: ...
 
 
 @contextmanager
 def counted(label: str) -> Iterator[Steps]:
-    """click's bar for work that tells its own length."""
+    """click's bar for work of known length."""
     with click.progressbar(length=1, label=label, file=sys.stderr, hidden=not sys.stderr.isatty()) as progress:
 
         def on_step(done: int, of: int, label: str | None = None) -> None:
@@ -53,7 +53,7 @@ def counted(label: str) -> Iterator[Steps]:
 
 
 def on_share(on_step: Steps, parts: Sequence[str]) -> Callable[[str, int, int], None]:
-    """One bar for ``parts`` that each tell (name, steps done, steps in all): every part is as long as the others."""
+    """One bar for ``parts`` that each report (name, steps done, steps in all): every part gets the same length."""
 
     def on_part(name: str, done: int, of: int) -> None:
         percent = 100 * parts.index(name) + 100 * done // of

@@ -1,4 +1,4 @@
-"""What `springscale reprocess` says to people: how far, how much, how it went."""
+"""The texts of `springscale reprocess`: progress, amounts, results."""
 
 from typing import Final
 
@@ -27,7 +27,7 @@ def forecast_in_words(ahead: Forecast) -> str:
     ]
     if ahead.n_new_logs:
         new = counted(ahead.n_new_logs, "log")
-        lines.append(f"never looked into: {new}; which jobs they make is known after that")
+        lines.append(f"not scanned yet: {new}; the scan shows their jobs")
     lines.append(f"to read: {size(ahead.size_to_do)}")
     if ahead.rate is not None and ahead.remaining_s is not None and ahead.size_to_do:
         source = "as earlier jobs went" if ahead.is_timed_before else "as one log went just now"
@@ -64,7 +64,7 @@ def summary_in_words(summary: Summary, output: str) -> str:
 
 
 def size(n_bytes: float) -> str:
-    """In the unit that suits: 999 B, 1.2 kB, 52.0 MB, ..."""
+    """In a suitable unit: 999 B, 1.2 kB, 52.0 MB, ..."""
     for unit in ("B", "kB", "MB", "GB"):
         if n_bytes < 1000.0:
             return f"{n_bytes:.0f} {unit}" if unit == "B" else f"{n_bytes:.1f} {unit}"
@@ -73,7 +73,7 @@ def size(n_bytes: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """In the unit that suits: 42 s, 11 min, 3.5 h, 2.1 days."""
+    """In a suitable unit: 42 s, 11 min, 3.5 h, 2.1 days."""
     if seconds < 100.0:
         return f"{seconds:.0f} s"
     if seconds < 6000.0:

@@ -1,4 +1,4 @@
-"""Alarms in the running service: what batches and the service's own state say, stored, shown, logged, acknowledged."""
+"""Alarms in the running service, from batches and from the service's own state: stored, shown, logged, acknowledged."""
 
 from gateway.service.alarm_desk.conditions import Silence, drift_says
 from gateway.service.alarm_desk.desk import AlarmDesk, rules_of

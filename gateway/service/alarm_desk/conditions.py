@@ -1,4 +1,4 @@
-"""What no batch can say: a sensor that is not heard, a vehicle that drifts."""
+"""Alarms that come from no batch: a silent sensor, a drifting vehicle."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -15,9 +15,9 @@ _HEARD: Final = frozenset({State.WAITING_FOR_SPEED, State.COLLECTING, State.ESTI
 
 
 class Silence:
-    """For how long a needed sensor has not been heard on a bus that is alive, or the bus cannot be read.
+    """For how long a needed sensor has been silent on a live bus, or the bus unreadable.
 
-    While the bus sleeps nobody knows: an alarm stays, and the time begins anew.
+    While the bus sleeps this is unknown: an alarm stays, and the time starts again.
     """
 
     def __init__(self, rules: AlarmRules, clock_s: Callable[[], float] = time.monotonic) -> None:
@@ -49,7 +49,7 @@ def what_is_silent(status: Status) -> str:
 
 
 def drift_says(trends: Sequence[Trend]) -> Iterator[Says]:
-    """Trends are judged over weeks, with 99 % confidence: where one drifts that is final at once."""
+    """Trends are judged over weeks, with 99 % confidence: a drift is final at once."""
     by_name = {trend.name: trend for trend in trends}
     for cause in DRIFTING:
         trend = by_name.get(cause.where or "")

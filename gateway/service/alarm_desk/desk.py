@@ -1,4 +1,6 @@
-"""The desk of alarms: told of every batch and of the service's state, asked by people. It owns them all."""
+"""The alarms of a service: the pipeline reports every batch, a watcher the service's state; people query and
+acknowledge them. It owns them all.
+"""
 
 import json
 import logging
@@ -57,7 +59,7 @@ class AlarmDesk:
         clock_ns: Callable[[], int] = time.time_ns,
         clock_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Goes on from what the store remembers."""
+        """Resumes from the stored alarms."""
         self._rules = rules
         self._subject = subject
         self._store = store
@@ -81,7 +83,7 @@ class AlarmDesk:
                 self._tell(self._watch.weigh(found, calibrated.vehicle, calibrated.unsprung))
 
     def watch(self, status: Status, trends: Sequence[Trend]) -> None:
-        """The service as it is now, by whoever watches it, often; trends are new ones where they were judged anew."""
+        """The present service, reported often; trends are given if they were judged again."""
         with self._lock:
             says = [self._silence.says(status)]
             if trends is not self._trends:
@@ -90,7 +92,7 @@ class AlarmDesk:
             self._tell(self._watch.note(says, self._clock_ns()))
 
     def standing(self) -> str:
-        """JSON: an array of the alarms that stand, the worst first."""
+        """JSON: an array of the active alarms, the worst first."""
         with self._lock:
             return f"[{','.join(map(_text, self._watch.active()))}]"
 
@@ -145,7 +147,7 @@ class AlarmDesk:
 def remembered(reader: StoreReader) -> tuple[list[Alarm], list[Estimate]]:
     """The last alarms and the last batches, oldest first. Raises what the store's reader raises.
 
-    An alarm that cannot be read is passed over: what is wrong is reported again.
+    An unreadable alarm is skipped: a persisting fault raises it again.
     """
     told = reader.entries(kind=ENTRY_KIND, limit=REMEMBERED, newest_first=True)
     page = reader.estimates(limit=DRIVEN, newest_first=True, with_spectra=False)

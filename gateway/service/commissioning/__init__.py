@@ -1,6 +1,7 @@
-"""A vehicle is commissioned on its own machine: which line, what it weighs, an empty drive, the fit, and what it made.
+"""Commissioning a vehicle on its own machine: its line, its weights, an empty drive, the fit, and the calibrations
+made.
 
-``Commissioning`` is the desk that everybody asks: the web for its steps, the batch keeper with every batch, the gateway
+``Commissioning`` is the interface: the web calls its steps, the batch keeper reports every batch, the gateway asks
 whether another calibration is due. It owns ``commissioning.json`` (``Record``), the calibrations named there, and the
 folder ``lines``; the fit runs in a process of its own (``Worker``).
 """

@@ -18,10 +18,12 @@ OnEvent = Callable[[str, Mapping[str, Any]], object]
 
 
 class Book:
-    """Every change is on disk before it is in ``record``. Whoever reads and then changes holds ``lock`` meanwhile."""
+    """Every change is on disk before it is in ``record``. A caller that reads and then changes keeps ``lock`` in
+    between.
+    """
 
     def __init__(self, directory: Path, on_event: OnEvent, clock_ns: Callable[[], int]) -> None:
-        """Reads the file; one that cannot be believed is set aside, and ``fault`` says so."""
+        """Reads the file; an invalid one is set aside, and ``fault`` says so."""
         self.directory = directory
         self.lock = threading.RLock()
         self.fault: str | None = None
@@ -31,11 +33,11 @@ class Book:
         self.record = self._believed()
 
     def keep(self, underway: Underway | None) -> None:
-        """As :meth:`save`, all else being as it was."""
+        """As :meth:`save`, with everything else unchanged."""
         self.save(self.record.model_copy(update={"underway": underway}))
 
     def save(self, record: Record) -> None:
-        """On disk, then in use. Raises CommissioningRefusedError where the disk refuses; then nothing has changed."""
+        """On disk, then in use. Raises CommissioningRefusedError if the disk refuses; then nothing has changed."""
         try:
             self._broken.make_way()
             save_record(self.directory, record)
@@ -56,7 +58,7 @@ class Book:
     def write_calibration(self, text: str, calibration_id: str) -> str:
         """A calibration that was made here -> the name of its file, which was read as the next start will read it.
 
-        Raises CommissioningRefusedError, and CalibrationFileError where it is not what was fitted.
+        Raises CommissioningRefusedError, and CalibrationFileError if it is not what was fitted.
         """
         name = f"{MADE}{calibration_id.removeprefix('sha256:')[:16]}.json"
         self.write(name, text.encode())
@@ -65,7 +67,7 @@ class Book:
         return name
 
     def forget_others(self) -> None:
-        """Remove calibrations and copies of lines that nothing here names any more. Raises OSError."""
+        """Remove calibrations and copies of lines that the record no longer names. Raises OSError."""
         named = {one.file_name for one in self.record.made} | {one.line.copy_name for one in self.record.made}
         if self.record.underway is not None and self.record.underway.line is not None:
             named.add(self.record.underway.line.copy_name)
@@ -74,12 +76,12 @@ class Book:
                 path.unlink()
 
     def cannot_store(self, refusal: Exception) -> None:
-        """What nobody asked for could not be kept: told, and tried again with the next."""
+        """A change without a request could not be stored: logged, and tried again with the next."""
         self.fault = f"the commissioning cannot be kept: {refusal}"
         log_event(Event.COMMISSIONING_NOT_KEPT, level=logging.WARNING, fault=str(refusal))
 
     def tell(self, event: Event, fields: Mapping[str, Any], level: int = logging.INFO) -> None:
-        """To the log, and to whoever keeps what happened."""
+        """To the log, and to the listener that keeps events."""
         tell_event(event, fields, self._on_event, level)
 
     def now(self) -> str:

@@ -1,4 +1,4 @@
-"""The desk at which a vehicle is commissioned: every step, each on disk before it is answered."""
+"""The interface for commissioning a vehicle: every step is on disk before the answer."""
 
 import time
 from collections.abc import Callable
@@ -25,7 +25,7 @@ UPLOADED: Final = "uploaded"
 
 
 class Drives(Protocol):
-    """Where the bus is: the scheduler, as far as an empty drive needs it. Safe from any thread."""
+    """The position of the bus: the scheduler, as far as an empty drive needs it. Safe from any thread."""
 
     @property
     def drive_start_ns(self) -> int | None:
@@ -39,12 +39,12 @@ class Drives(Protocol):
 
     @property
     def open_window_ns(self) -> tuple[int, int] | None:
-        """Where its open window begins, and the newest stamp in it."""
+        """Start of its open window, and the newest stamp in it."""
         ...
 
 
 class Commissioning:
-    """Thread-safe; a call may wait for the disk. Nothing is answered that a power cut could take back."""
+    """Thread-safe; a call may wait for the disk. No answer can be undone by a power cut."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class Commissioning:
         clock_ns: Callable[[], int] = time.time_ns,
         make_worker: MakeWorker | None = None,
     ) -> None:
-        """Reads what was under way, to go on with it. ``make_worker`` stands in for the process that fits."""
+        """Reads a commissioning under way, to resume it. ``make_worker`` replaces the process that fits."""
         self._lines, self._drives, self._vehicle = lines, drives, vehicle
         self._window_s = jobs.batch.window_s
         self._book = Book(jobs.directory, on_event, clock_ns)
@@ -70,12 +70,12 @@ class Commissioning:
 
     @property
     def book(self) -> Book:
-        """What keeps the calibrations made here."""
+        """The store of the calibrations made here."""
         return self._book
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with the book, for people."""
+        """A fault of the record, for people."""
         return self._book.fault
 
     @property
@@ -86,24 +86,24 @@ class Commissioning:
 
     @property
     def wants_all(self) -> bool:
-        """Whether batches are heard of that do not count, too."""
+        """Whether batches that do not count are reported, too."""
         return self._book.record.underway is not None
 
     def start(self) -> None:
-        """Go on with the fit that a stop or a power cut interrupted."""
+        """Resume the fit that a stop or a power cut interrupted."""
         with self._book.lock:
             self._drive.fit()
 
     def hear_no_more(self) -> None:
-        """Batches from now on count for nothing. Never waits."""
+        """Batches from now on are ignored. Never waits."""
         self._drive.is_over = True
 
     def stop(self, _within_s: float = 0.0) -> None:
-        """Do nothing more; what is on disk is gone on with at the next start. May wait for a disk that hangs."""
+        """End; the next start resumes from the disk. May wait for a disk that hangs."""
         self._drive.stop()
 
     def hear(self, kept: KeptBatch) -> None:
-        """Of every batch, provisional and rejected ones too; those that count lie on the shelf already."""
+        """Called with every batch, provisional and rejected ones too; those that count are already on the shelf."""
         self._drive.hear(kept)
 
     def told(self) -> str:
@@ -128,7 +128,7 @@ class Commissioning:
         with self._book.lock:
             if self._book.record.underway is not None:
                 raise CommissioningRefusedError(
-                    "already_begun", "a commissioning is under way: cancel it to begin anew"
+                    "already_begun", "a commissioning is under way: cancel it to start another"
                 )
             begun = Underway(begun_at=self._book.now(), by=by, note=note, signals_id=self._vehicle.signals_id)
             self._drive.forget()
@@ -137,7 +137,7 @@ class Commissioning:
             return self.told()
 
     def choose_line(self, name: str | None, source: Source | None) -> str:
-        """One of ``lines``; None for no line: what is usual of any vehicle."""
+        """One of ``lines``; None for no line: the prior of any vehicle."""
         with self._book.lock:
             underway = self._underway()
             choice = LineChoice(name="")
@@ -150,7 +150,7 @@ class Commissioning:
             return self.told()
 
     def state_vehicle(self, answers: VehicleAnswers) -> str:
-        """What was typed. What is unlikely of it is asked about, and nothing goes on until that is confirmed."""
+        """What was typed. Unlikely answers raise doubts, and no step follows until they are confirmed."""
         with self._book.lock:
             underway = self._underway(Step.VEHICLE)
             line = underway.line or LineChoice(name="")
@@ -160,12 +160,14 @@ class Commissioning:
             return self.told()
 
     def confirm(self, by: str) -> str:
-        """Every doubt that is open is answered: it is so all the same. One that a fit showed puts that fit to use."""
+        """Every doubt that is open is answered: it is so all the same. Confirming a doubt from a fit puts that fit to
+        use.
+        """
         with self._book.lock:
             underway = self._underway(Step.VEHICLE)
             doubts = underway.open_doubts
             if not doubts:
-                raise CommissioningRefusedError("nothing_doubted", "nothing is asked: there is nothing to confirm")
+                raise CommissioningRefusedError("nothing_doubted", "there is no doubt to confirm")
             if underway.line is not None and underway.vehicle is not None:
                 require_alike(self._book.directory, underway.line, self._table(underway.vehicle, underway.line))
             kinds = tuple(dict.fromkeys(one.kind for one in doubts))
@@ -178,7 +180,7 @@ class Commissioning:
             return self.told()
 
     def is_empty(self, by: str, *, again: bool = False) -> str:
-        """From now on it is driven empty; ``again`` forgets what was driven so far."""
+        """From now on it is driven empty; ``again`` discards the drive so far."""
         with self._book.lock:
             underway = self._underway(Step.EMPTY)
             if self._drive.looked is not None and self._drive.looked.has_fault:
@@ -199,7 +201,7 @@ class Commissioning:
             return self.told()
 
     def fit_now(self, by: str) -> str:
-        """Make a calibration of what there is, enough or not."""
+        """Calibrate with the data so far, whether sufficient or not."""
         with self._book.lock:
             underway = self._underway(Step.DRIVE)
             if not underway.batches:
@@ -213,7 +215,7 @@ class Commissioning:
             return self.told()
 
     def cancel(self, by: str) -> str:
-        """Forget what is under way; calibrations made before stay."""
+        """Discard the commissioning under way; earlier calibrations stay."""
         with self._book.lock:
             self._underway()
             self._book.keep(None)
@@ -234,7 +236,7 @@ class Commissioning:
             return self.told()
 
     def _window(self) -> OpenWindow | None:
-        """Of the empty drive: one that had begun before the claim does not count, but the next one does."""
+        """Of the empty drive: a window that began before the statement does not count, the next one does."""
         underway, window_ns, window_s = self._book.record.underway, self._drives.open_window_ns, self._window_s
         drive_start_ns = self._drives.drive_start_ns
         if underway is None or underway.empty is None or window_ns is None or drive_start_ns is None:
@@ -256,7 +258,7 @@ class Commissioning:
         )
 
     def _underway(self, least: Step = Step.LINE) -> Underway:
-        """Raises CommissioningRefusedError where none has come as far as ``least``."""
+        """Raises CommissioningRefusedError unless one is under way and has reached ``least``."""
         self._require_allowed()
         underway = self._book.record.underway
         if underway is None:
@@ -269,7 +271,7 @@ class Commissioning:
         return underway
 
     def _require_usable(self, line: LineChoice, answers: VehicleAnswers | None) -> None:
-        """Raises CommissioningRefusedError where no vehicle follows, or one that is not of the line without a doubt."""
+        """Raises CommissioningRefusedError if no vehicle follows, or one that is surely not of the line."""
         if answers is not None:
             table = self._table(answers, line)
             if not doubts_of(answers, line.facts):
@@ -288,7 +290,7 @@ class Commissioning:
 
 
 def _anew(answers: VehicleAnswers | None, line: LineChoice) -> dict[str, Any]:
-    """What begins anew with another answer: the doubts about it, and what was made of the drive so far."""
+    """What a changed answer resets: its doubts, and the result of the drive so far."""
     doubts = () if answers is None else doubts_of(answers, line.facts)
     return {"doubts": doubts, "confirmed": (), "learned": None, "fault": None}
 

@@ -1,4 +1,4 @@
-"""The empty drive: batches are counted, looked at and fitted, until enough is known of the vehicle."""
+"""The empty drive: batches are counted, inspected and fitted, until the accuracy is sufficient."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -27,7 +27,7 @@ MakeWorker = Callable[[Callable[[Job, Result], None]], Worker]
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """Whose service this is, and whether anything may be made here."""
+    """Identity of the service, and whether it may make a calibration."""
 
     name: str
     signals_id: str
@@ -37,10 +37,10 @@ class Vehicle:
 
 
 class EmptyDrive:
-    """Hears every batch, and what the process that fits found. Thread-safe by the book's lock."""
+    """Receives every batch, and the results of the process that fits. Thread-safe by the book's lock."""
 
     def __init__(self, book: Book, jobs: Jobs, shelf: Shelf, vehicle: Vehicle, make_worker: MakeWorker) -> None:
-        """Takes up what was under way."""
+        """Resumes a commissioning under way."""
         self.looked: Looked | None = None
         self._book, self._jobs, self._shelf, self._vehicle = book, jobs, shelf, vehicle
         self._worker = make_worker(self._on_result)
@@ -63,19 +63,19 @@ class EmptyDrive:
         return sum(entry.duration_s for entry in self._shelf.entries() if entry.id in mine)
 
     def stop(self) -> None:
-        """Hear and do nothing more."""
+        """Ignore every later batch."""
         self.is_over = True
         self._worker.end()
 
     def forget(self) -> None:
-        """Nothing is under way any more."""
+        """The commissioning has ended."""
         self._worker.end()
         self._job = self.looked = None
         with suppress(OSError):
             self._shelf.let_go(OWNER)
 
     def hear(self, kept: KeptBatch) -> None:
-        """Of every batch, provisional and rejected ones too; those that count lie on the shelf already."""
+        """Called with every batch, provisional and rejected ones too; those that count are already on the shelf."""
         with self._book.lock:
             underway = self._book.record.underway
             if self.is_over or underway is None or underway.vehicle is None:
@@ -95,7 +95,9 @@ class EmptyDrive:
                 self._look(kept)
 
     def _take_up(self) -> None:
-        """What was open when the power went is whole now; batches that are gone, or read otherwise, are forgotten."""
+        """A window that was open at a power cut is closed now; batches that are gone, or read with another map, are
+        dropped.
+        """
         underway = self._book.record.underway
         if underway is None:
             return
@@ -113,7 +115,7 @@ class EmptyDrive:
             self._book.cannot_store(refusal)
 
     def _remember(self, underway: Underway, kept: KeptBatch) -> bool:
-        """Add a batch to the drive; True where one counted. Raises OSError, CommissioningRefusedError."""
+        """Add a batch to the drive; True if one counted. Raises OSError, CommissioningRefusedError."""
         batch, before = kept.batch, underway.open_batch
         change: dict[str, Any] = {"open_batch": None}
         if batch.is_provisional and not batch.rejected:
@@ -132,7 +134,7 @@ class EmptyDrive:
         return "batches" in change
 
     def fit(self) -> None:
-        """Begin the fit of all that was driven, if there is anything."""
+        """Begin the fit of the whole drive, if there is any."""
         underway = self._book.record.underway
         if underway is None or underway.vehicle is None or underway.line is None or not underway.batches:
             return
@@ -168,7 +170,7 @@ class EmptyDrive:
             self._book.cannot_store(refusal)
 
     def _on_result(self, job: Job, result: Result) -> None:
-        """What came of a job, in the worker's thread."""
+        """The result of a job, in the worker's thread."""
         with self._book.lock:
             underway = self._book.record.underway
             if self.is_over or underway is None or underway.vehicle is None or job is not self._job:
@@ -183,7 +185,7 @@ class EmptyDrive:
                 self._book.cannot_store(refusal)
 
     def _take(self, underway: Underway, vehicle: VehicleAnswers, result: Result) -> None:
-        """Put a fit to use where enough is known, or somebody asked for it; else drive on."""
+        """Put a fit to use if it is accurate enough, or if somebody requested it; else drive on."""
         has_enough = result.learned is not None and result.learned.is_enough
         is_wanted = underway.is_fit_asked or (has_enough and len(underway.batches) >= LEAST_BATCHES)
         doubts = underway.with_doubts_of_drive(result.doubts)
@@ -223,5 +225,5 @@ class EmptyDrive:
 
 
 def _seconds(job: Job) -> float:
-    """Of driving that it looked at."""
+    """Of the driving that it inspected."""
     return float(job.settings["window_s"]) * len(job.drives[0].batches)

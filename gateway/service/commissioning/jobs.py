@@ -1,4 +1,4 @@
-"""Jobs for the process that fits: which batches, of which vehicle, on which prior."""
+"""Jobs for the process that fits: which batches, of which vehicle, with which prior."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -18,7 +18,7 @@ EMPTY: Final = "empty drive"
 
 @dataclass(frozen=True, slots=True)
 class BatchFile:
-    """A kept batch's file and how long it is."""
+    """A kept batch's file and its length."""
 
     path: Path
     t_start_ns: int

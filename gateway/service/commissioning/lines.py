@@ -1,4 +1,4 @@
-"""Which lines of vehicles there are to choose from: files of the package, of the administrator, and uploaded ones."""
+"""The available lines of vehicles: files of the package, of the administrator, and uploaded ones."""
 
 import hashlib
 import re
@@ -26,7 +26,7 @@ _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,58}\.json")
 
 @dataclass(frozen=True, slots=True)
 class LineFound:
-    """One file: what it holds, or why it cannot be used."""
+    """One file: its content, or why it cannot be used."""
 
     name: str
     source: Source
@@ -36,10 +36,12 @@ class LineFound:
 
 
 class Lines:
-    """All that can be chosen. A file of the package needs no signature, every other one where signatures are asked."""
+    """All that can be chosen. A file of the package needs no signature, every other one does if signatures are
+    required.
+    """
 
     def __init__(self, directory: Path, administrator: Path | None, trust: Trust) -> None:
-        """``directory`` is the service's folder; uploaded files lie in one of their own below it."""
+        """``directory`` is the service's folder; uploaded files lie in a folder below it."""
         self._uploaded = directory / FOLDER
         self._folders: tuple[tuple[Source, Path | None], ...] = (
             ("package", Path(str(files("gateway"))) / FOLDER),
@@ -137,7 +139,7 @@ class Lines:
 
 
 def require_alike(directory: Path, line: LineChoice, vehicle: Vehicle) -> None:
-    """Raises CommissioningRefusedError where a vehicle is none of the line, whose copy lies in ``directory``."""
+    """Raises CommissioningRefusedError if a vehicle is not of the line, whose copy lies in ``directory``."""
     if line.copy_name is None:
         return
     try:
@@ -147,7 +149,7 @@ def require_alike(directory: Path, line: LineChoice, vehicle: Vehicle) -> None:
 
 
 def _figures(held: LikeFile) -> dict[str, object]:
-    """What of it a form may be filled with."""
+    """Its figures that can prefill a form."""
     if isinstance(held, CalibrationFile):
         return asdict(held.vehicle)
     most_kg = held.line.seen.payload_seen_kg[1]
@@ -159,13 +161,13 @@ def _figures(held: LikeFile) -> dict[str, object]:
 
 
 def _form(held: LikeFile) -> dict[str, object]:
-    """Of ``_figures``, what sisters have in common."""
+    """Those of ``_figures`` that the vehicles of the line share."""
     common = ("wheelbase_m", "track_width_m", "payload_range_kg", "kerb_front_axle_kg", "kerb_rear_axle_kg")
     return {name: figure for name, figure in _figures(held).items() if name in common and figure is not None}
 
 
 def _facts(held: LikeFile) -> LineFacts:
-    """What of it typed answers are held against."""
+    """Those of its figures that typed answers are compared with."""
     if not isinstance(held, CalibrationFile):
         line = held.line
         return LineFacts(sprung_kg=line.empty_mass_kg, wheelbase_m=line.wheelbase_m)

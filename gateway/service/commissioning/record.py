@@ -23,10 +23,10 @@ Source = Literal["package", "administrator", "uploaded"]
 
 
 class LineChoice(Part):
-    """The line that was chosen. ``copy_name`` is its copy in the service's folder, None for no line at all.
+    """The line that was chosen. ``copy_name`` is its copy in the service's folder, None without a line.
 
-    ``shared`` is what it says of the vehicle of which nothing was typed, ``facts`` what typed answers are held against,
-    ``figures`` what a form may be filled with.
+    ``shared`` are its values for figures that were not typed, ``facts`` its values to compare typed answers with,
+    ``figures`` its values to prefill a form.
     """
 
     name: str
@@ -39,7 +39,7 @@ class LineChoice(Part):
 
 
 class EmptyClaim(Part):
-    """Who said that the vehicle is empty, and where the bus was then: a window that had begun does not count."""
+    """Who said that the vehicle is empty, and the position of the bus then: a window that had begun does not count."""
 
     at: str
     by: str
@@ -47,7 +47,7 @@ class EmptyClaim(Part):
     newest_ns: int | None
 
     def covers(self, drive_start_ns: int, t_start_ns: int) -> bool:
-        """Whether a window lies after the claim."""
+        """Whether a window lies after the statement."""
         if self.newest_ns is None or drive_start_ns != self.drive_start_ns:
             return True
         return t_start_ns >= self.newest_ns
@@ -71,27 +71,27 @@ class Underway(Part):
     vehicle: VehicleAnswers | None = None
     empty: EmptyClaim | None = None
     batches: tuple[str, ...] = Field((), description="kept batches of the empty drive, oldest first")
-    open_batch: str | None = Field(None, description="the part so far of the window that is open")
+    open_batch: str | None = Field(None, description="the part so far of the open window")
     signals_id: str = Field(description="of the signal map that they were read with")
     learned: Learned | None = None
     is_fit_asked: bool = False
     fault: str | None = Field(None, description="why the last fit made no calibration")
-    doubts: tuple[Doubt, ...] = Field((), description="about what was typed, and about what the last fit shows")
+    doubts: tuple[Doubt, ...] = Field((), description="about typed answers, and about the result of the last fit")
     confirmed: tuple[Confirmed, ...] = ()
 
     @property
     def open_doubts(self) -> tuple[Doubt, ...]:
-        """Those that nobody has confirmed."""
+        """Unconfirmed doubts."""
         confirmed = {kind for one in self.confirmed for kind in one.kinds}
         return tuple(one for one in self.doubts if one.kind not in confirmed)
 
     @property
     def is_vehicle_doubted(self) -> bool:
-        """Whether what was typed is asked about still."""
+        """Whether a typed answer is still in doubt."""
         return any(one.kind not in OF_THE_DRIVE for one in self.open_doubts)
 
     def with_doubts_of_drive(self, found: tuple[Doubt, ...]) -> tuple[Doubt, ...]:
-        """Those of what was typed, and ``found`` in the place of what an earlier fit showed."""
+        """The doubts about typed answers, with ``found`` in place of those from an earlier fit."""
         return (*(one for one in self.doubts if one.kind not in OF_THE_DRIVE), *found)
 
 
@@ -120,7 +120,7 @@ class Made(Part):
 
 
 class Record(Part):
-    """Calibrations that have not ended lie one on the other: the last is in use."""
+    """Calibrations that have not ended form a stack: the last is in use."""
 
     format: Literal["springscale-commissioning"] = "springscale-commissioning"
     version: Literal[1] = 1
@@ -133,7 +133,7 @@ class Record(Part):
         return next((one for one in reversed(self.made) if one.ended is None), None)
 
     def with_made(self, one: Made) -> "Record":
-        """The commissioning is over and this came of it."""
+        """The commissioning has ended with this result."""
         return self.model_copy(update={"underway": None, "made": (*self.made, one)[-MOST_MADE:]})
 
     def ended(self, chosen: tuple[Made, ...], end: Ended) -> "Record":
@@ -143,7 +143,7 @@ class Record(Part):
 
 
 def load_record(directory: Path) -> Record:
-    """Empty where there is none yet. Raises ConfigurationError for a file that is none."""
+    """Empty if there is none yet. Raises ConfigurationError for an invalid file."""
     path = directory / FILE_NAME
     try:
         return Record.model_validate_json(KeptFiles(directory).read(FILE_NAME))
@@ -156,6 +156,6 @@ def load_record(directory: Path) -> Record:
 
 
 def save_record(directory: Path, record: Record) -> None:
-    """On disk when this returns. Raises OSError, and then the old one stands."""
+    """On disk when this returns. Raises OSError, and then the old one stays."""
     text = json.dumps(record.model_dump(mode="json"), indent=1, allow_nan=False, ensure_ascii=False)
     KeptFiles(directory).write(FILE_NAME, (text + "\n").encode())

@@ -1,4 +1,4 @@
-"""With which calibration a service starts: the one made on the vehicle, where there is one."""
+"""The calibration that a service starts with: the one made on the vehicle, if there is one."""
 
 import logging
 
@@ -11,21 +11,21 @@ from gateway.setup import Setup, setup_of
 
 
 def why_not_allowed(settings: Settings) -> str | None:
-    """Why no calibration may be made on this vehicle; None where one may."""
+    """Why no calibration may be made on this vehicle; None if one may."""
     if not settings.commissioning.is_allowed:
         return "[commissioning] is_allowed = false: calibrations come by file"
     if settings.trust.public_keys and not settings.commissioning.is_unsigned_believed:
         return (
-            "[trust] asks for signed calibrations, and nobody signs what is made on the vehicle: "
-            "set [commissioning] is_unsigned_believed to use it all the same"
+            "[trust] requires signed calibrations, and nobody signs those made on the vehicle: set [commissioning] "
+            "is_unsigned_believed to use them all the same"
         )
     return None
 
 
 def with_commissioned(settings: Settings) -> Settings:
-    """The settings with the calibration that was made here and is in use; the same where there is none.
+    """The settings with the calibration that was made here and is in use; unchanged if there is none.
 
-    A book that cannot be believed says nothing here: the service sets it aside and tells.
+    An invalid record is ignored here: the service sets it aside and reports it.
     """
     if why_not_allowed(settings) is not None:
         return settings
@@ -40,7 +40,7 @@ def with_commissioned(settings: Settings) -> Settings:
 
 
 def commissioned(settings: Settings) -> tuple[Settings, Setup, str | None]:
-    """The settings in use, the setup, and what is wrong with the calibration where another stands in for it.
+    """The settings in use, the setup, and the fault of the calibration if another replaces it.
 
     Raises as ``setup_of``.
     """
@@ -57,12 +57,12 @@ def commissioned(settings: Settings) -> tuple[Settings, Setup, str | None]:
 
 
 def setup_in_use(settings: Settings) -> Setup:
-    """The setup with the calibration in use; one that was made here is believed unsigned. Raises as ``setup_of``."""
+    """The setup with the calibration in use; one that was made here is accepted unsigned. Raises as ``setup_of``."""
     chosen = with_commissioned(settings)
     return setup_of(settings) if chosen is settings else _with_made(chosen)
 
 
 def _with_made(chosen: Settings) -> Setup:
-    """All read as the settings trust it, but the one calibration that was made here and that nobody signs."""
+    """All files are read with the settings' trust, except the calibration that was made here and that nobody signs."""
     own, read = chosen.calibration, chosen.trust.for_reading().read
     return setup_of(chosen, read=lambda path: path.read_bytes() if path == own else read(path))

@@ -1,4 +1,4 @@
-"""Which step a commissioning is at, as it follows from what is written, and all of it as the web tells it."""
+"""The step of a commissioning, derived from the record, and its whole state for the web."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -35,7 +35,7 @@ def step_of(underway: Underway) -> Step:
 
 @dataclass(frozen=True, slots=True)
 class Looked:
-    """What inspection found last, and over how many seconds of driving."""
+    """The last findings of inspection, and the seconds of driving they cover."""
 
     findings: tuple[Found, ...]
     seconds: float
@@ -48,7 +48,7 @@ class Looked:
 
 @dataclass(frozen=True, slots=True)
 class OpenWindow:
-    """The window that is being driven: how much of it counts so far, and how long until the next one that counts."""
+    """The open window: how much of it counts so far, and how long until the next one that counts."""
 
     counted_s: float
     next_s: float
@@ -56,7 +56,7 @@ class OpenWindow:
 
 @dataclass(frozen=True, slots=True)
 class Present:
-    """What is not on disk: how things are at this moment."""
+    """State that is not on disk: the present moment."""
 
     why_not_allowed: str | None
     is_calibrated: bool

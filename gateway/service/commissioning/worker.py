@@ -1,4 +1,4 @@
-"""Runs the process that inspects and fits, one at a time, and hears what came of it."""
+"""Runs the process that inspects and fits, one job at a time, and receives its results."""
 
 import contextlib
 import os
@@ -26,10 +26,10 @@ OnResult = Callable[[Job, Result], None]
 
 
 class Worker:
-    """One process at a time. ``on_result`` is called from a thread of the worker's; a job that was ended has none."""
+    """One process at a time. ``on_result`` is called from the worker's thread; a job that was stopped has no result."""
 
     def __init__(self, directory: Path, on_result: OnResult) -> None:
-        """``directory`` is the service's; jobs lie in a folder of their own below it."""
+        """``directory`` is the service's; jobs lie in a folder below it."""
         self.folder = directory / FOLDER
         self._on_result = on_result
         self._lock = threading.Lock()
@@ -43,7 +43,7 @@ class Worker:
             return self._process is not None
 
     def start(self, job: Job, files: Mapping[str, bytes]) -> None:
-        """Begin, with ``files`` in its folder; the one under way, if any, is ended first. Raises OSError."""
+        """Begin, with ``files`` in its folder; a job under way is stopped first. Raises OSError."""
         self.end()
         with self._lock:
             shutil.rmtree(self.folder, ignore_errors=True)
@@ -66,7 +66,7 @@ class Worker:
             self._thread.start()
 
     def end(self) -> None:
-        """Stop what is under way and forget it."""
+        """Stop the job under way and drop its result."""
         with self._lock:
             process, self._process = self._process, None
         if process is not None:

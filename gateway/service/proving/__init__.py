@@ -1,7 +1,8 @@
-"""Known weights, which condition every later estimate; verifications, which teach nothing; and what drifts.
+"""Known weights, which condition every later estimate; verifications, which change nothing; and the trend of the
+parameters.
 
-A weight that somebody states comes in and is attached to the load epoch of its time, as the store has it; dated records
-go out, each kind in a file of its own beside the database.
+A stated weight is attached to the load epoch of its time, from the store; dated records go out, each kind in a file of
+its own beside the database.
 """
 
 from gateway.service.proving.proving import Proving

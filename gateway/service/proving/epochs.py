@@ -24,7 +24,7 @@ Ask = Callable[..., Page]
 
 @dataclass(frozen=True, slots=True)
 class WeighedEpoch:
-    """One load as its counted batches show it together: as it was shown last, and as measured, batch by batch."""
+    """One load as the fused estimate of its counted batches: as last shown, and as measured, batch by batch."""
 
     t_start_ns: int
     t_end_ns: int
@@ -43,7 +43,7 @@ class WeighedEpoch:
         return fused(self.measured)
 
     def require(self, calibration_id: str | None, estimator: str) -> None:
-        """Raises WeightRefusedError where it was weighed by another calibration or estimator."""
+        """Raises WeightRefusedError if it was weighed by another calibration or estimator."""
         if (self.calibration_id, self.estimator) != (calibration_id, estimator):
             raise WeightRefusedError(
                 WeightRefusal.OTHER_CALIBRATION,
@@ -59,7 +59,7 @@ class WeighedEpoch:
 def epochs_of(estimates: Iterable[Estimate]) -> list[WeighedEpoch]:
     """Estimates in order of arrival -> their load epochs, oldest first.
 
-    The count of an epoch's batches begins anew with each epoch; who weighs is the same throughout one.
+    The count of batches restarts with each epoch; vehicle, calibration and estimator are the same throughout one.
     """
     epochs: list[WeighedEpoch] = []
     for estimate in estimates:
@@ -77,9 +77,11 @@ def epochs_of(estimates: Iterable[Estimate]) -> list[WeighedEpoch]:
 
 
 def epoch_at(epochs: Sequence[WeighedEpoch], at_ns: int, drive: Drive | None) -> WeighedEpoch:
-    """The epoch whose load was weighed at this time. Raises WeightRefusedError where there is none, or either of two.
+    """The epoch whose load was weighed at this time. Raises WeightRefusedError if there is none, or if there are two
+    candidates.
 
-    Within a drive there is no doubt. Between two, the load is of the one before, or of the one after, or of both.
+    Within a drive the epoch is unambiguous. Between two, the load is of the one before, or of the one after, or of
+    both.
     """
     near = [epoch for epoch in epochs if epoch.t_start_ns - NEAR_NS <= at_ns <= epoch.t_end_ns + NEAR_NS]
     during = [epoch for epoch in near if epoch.t_start_ns <= at_ns <= epoch.t_end_ns]
@@ -97,14 +99,14 @@ def epoch_at(epochs: Sequence[WeighedEpoch], at_ns: int, drive: Drive | None) ->
     if len(candidates) > 1:
         raise WeightRefusedError(
             WeightRefusal.AMBIGUOUS_EPOCH,
-            f"{iso_utc(at_ns)[:16]}Z lies between two loads, {before[0].told()} and {after[0].told()}: "
-            "say whether it is of the drive before or after",
+            f"{iso_utc(at_ns)[:16]}Z lies between two loads, {before[0].told()} and {after[0].told()}: state whether "
+            f"it belongs to the drive before or after",
         )
     return candidates[0]
 
 
 def epochs_around(ask: Ask, at_ns: int) -> list[WeighedEpoch]:
-    """The epochs that the store tells of around a time. Raises WeightRefusedError where it cannot be read."""
+    """The stored epochs around a time. Raises WeightRefusedError if the store cannot be read."""
     try:
         return epochs_of(_estimates(ask, at_ns - NEAR_NS, at_ns + NEAR_NS))
     except (StoreError, TimeoutError) as fault:
@@ -122,7 +124,7 @@ def _estimates(ask: Ask, since_ns: int, until_ns: int) -> Iterator[Estimate]:
 
 
 def _epoch_so_far(found: Estimate) -> WeighedEpoch | None:
-    """What a counted batch tells of its load; None for rejected ones."""
+    """The load by a counted batch; None for rejected ones."""
     measured = found.as_measured
     if not found.counted or found.epoch is None or measured is None:
         return None

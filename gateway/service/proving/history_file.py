@@ -1,4 +1,4 @@
-"""A history of the service in one file of its own: believed or set aside, replaced in one step."""
+"""A history of the service in one file of its own: validated or set aside, replaced in one step."""
 
 import logging
 from pathlib import Path
@@ -15,10 +15,10 @@ H = TypeVar("H", bound=Part)
 
 
 class HistoryFile(Generic[H]):
-    """Not thread-safe: its desk is. ``fault`` says what became of a file that could not be believed."""
+    """Not thread-safe: its owner is. ``fault`` says what happened to an invalid file."""
 
     def __init__(self, path: Path, empty: H) -> None:
-        """Reads the file; ``empty`` is the history where there is none, and of its kind."""
+        """Reads the file; ``empty`` is the history if there is no file, and defines its kind."""
         self._path = path
         self._files = KeptFiles(path.parent)
         self._broken = BrokenFile(path)
@@ -41,6 +41,6 @@ class HistoryFile(Generic[H]):
         except (OSError, ValidationError) as broken:
             fault = str(broken)
         aside = self._broken.set_aside()
-        self.fault = f"{self._path} cannot be believed, its history begins anew (it {aside})"
+        self.fault = f"{self._path} is invalid, its history starts empty (it {aside})"
         log_event(Event.HISTORY_SET_ASIDE, level=logging.ERROR, file=str(self._path), fault=fault, set_aside=aside)
         return empty

@@ -1,7 +1,7 @@
 """Known weights of a running service: "it is empty now", tickets, axle pads, delivery notes. The one owner of the file.
 
-Each is attached to a load that was weighed and kept with that load's posterior as measured. What they teach together
-(core.known_weights) is computed from the list whenever it changes, and counts from the next batch on.
+Each is attached to a load that was weighed and kept with that load's posterior as measured. Their combined effect
+(core.known_weights) is computed from the list whenever it changes, and applies from the next batch on.
 """
 
 import math
@@ -67,9 +67,9 @@ class KnownWeightService:
         on_event: OnEvent,
         clock_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        """Reads the file and puts what it teaches into use. ``ask`` queries the store for estimates.
+        """Reads the file and applies its known weights. ``ask`` queries the store for estimates.
 
-        A file that is damaged is set aside: weighing goes on without known weights, and ``fault`` says so.
+        A damaged file is set aside: weighing goes on without known weights, and ``fault`` says so.
         """
         self._subject, self._pipeline, self._ask = subject, pipeline, ask
         self._stale_after_s = stale_after_s
@@ -81,7 +81,7 @@ class KnownWeightService:
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with the file, and which known weights wait for a confirmation, for people."""
+        """Faults of the file, and known weights that wait for a confirmation, for people."""
         held = [one for one in self._own() if one.is_held]
         if self._file.fault or not held:
             return self._file.fault
@@ -92,7 +92,9 @@ class KnownWeightService:
         )
 
     def zeros(self) -> list[tuple[str, float]]:
-        """When the vehicle was empty and what the calibration alone read then (kg), ended entries too, oldest first."""
+        """When the vehicle was empty and the estimate of the calibration alone then (kg), ended entries too, oldest
+        first.
+        """
         empty = [one for one in self._own() if one.kind is KnownWeightKind.EMPTY]
         return [(one.at, float(one.observation.off[PAYLOAD])) for one in empty]
 
@@ -117,7 +119,9 @@ class KnownWeightService:
         )
 
     def add(self, kind: KnownWeightKind, by: str, note: str | None, stated: StatedWeight | None = None) -> str:
-        """One more known weight -> its JSON. Nothing stated: the vehicle is empty now. Raises WeightRefusedError."""
+        """One more known weight -> its JSON. Without a stated load the vehicle is empty now. Raises
+        WeightRefusedError.
+        """
         with self._lock:
             calibrated = self._calibrated()
             if stated is None:
@@ -191,7 +195,7 @@ class KnownWeightService:
             return self.state((KnownWeightKind.EMPTY,))
 
     def payload_without(self, epoch: WeighedEpoch) -> Quantity:
-        """What a load is weighed as without the known weights that are of this very load."""
+        """The estimate of a load without the known weights of this very load."""
         others = [one for one in self._own() if not set(one.batch_ids) & set(epoch.batch_ids)]
         if len(others) == len(self._own()):
             return epoch.payload
@@ -212,7 +216,7 @@ class KnownWeightService:
         return {**shown, "state": state}
 
     def _offer(self) -> dict[str, Any]:
-        """The load that "it is empty now" would be of, or why there is none."""
+        """The load at which "it is empty now" would be taken, or why there is none."""
         try:
             self._calibrated()
             load = self._present()
@@ -267,7 +271,7 @@ class KnownWeightService:
         return _Load.of_epoch(epoch)
 
     def _estimated(self, load: _Load) -> Posterior:
-        """What the load is weighed as by the calibration and the known weights that are in use."""
+        """The estimate of the load by the calibration and the known weights in use."""
         knowledge = self._pipeline.flow.knowledge
         return load.posterior if knowledge is None else knowledge.applied(load.posterior, load.t_end_ns)
 
@@ -277,8 +281,8 @@ class KnownWeightService:
         if other is not None:
             raise WeightRefusedError(
                 WeightRefusal.ALREADY_KNOWN,
-                f"the weight of that load is known already ({other.payload_kg:.0f} kg, {other.id[:19]}): "
-                "take that back first",
+                f"that load has a known weight already ({other.payload_kg:.0f} kg, {other.id[:19]}): take that back "
+                f"first",
             )
 
     def _standing(self, entry_id: str) -> KnownWeight:
@@ -297,7 +301,7 @@ class KnownWeightService:
             self._tell(Event.WEIGHT_TAKEN_BACK, entry, by)
 
     def _keep(self, history: KnownWeights) -> None:
-        """On disk, then in use. Raises WeightRefusedError where the disk refuses; then nothing has changed."""
+        """On disk, then in use. Raises WeightRefusedError if the disk refuses; then nothing has changed."""
         try:
             self._file.keep(history)
         except OSError as fault:
@@ -311,10 +315,10 @@ class KnownWeightService:
         self._pipeline.flow.knowledge = self._file.history.knowledge(subject.calibration_id, subject.estimator)
 
     def _tell(self, event: Event, entry: KnownWeight, by: str) -> None:
-        """To the log, and to whoever keeps what happened."""
+        """To the log, and to the listener that keeps events."""
         weights = {"payload_kg": entry.payload_kg, "estimated_payload_kg": entry.estimated_payload_kg}
         said = {"known_weight_id": entry.id, "kind": str(entry.kind), "by": by, **weights, "is_held": entry.is_held}
         tell_event(event, said, self._on_event)
 
 
-_NO_SUCH: Final = "there is no such known weight that still stands"
+_NO_SUCH: Final = "there is no such known weight in use"

@@ -1,4 +1,4 @@
-"""All that holds the weighing against what is known: one part of the service, with a thread of its own."""
+"""Checks of the weighing against known loads: one part of the service, with a thread of its own."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ class Proving:
         *,
         stale_after_s: float,
     ) -> None:
-        """Puts what known weights teach into use in ``pipeline``."""
+        """Applies known weights in ``pipeline``."""
         ask = store.reader().estimates
         self.known_weights = KnownWeightService(
             directory, subject, pipeline, ask, stale_after_s=stale_after_s, on_event=store.write_event
@@ -51,5 +51,5 @@ class Proving:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What is due, drifts or is broken, for people."""
+        """A due verification, a drift or a fault, for people."""
         return tuple(fault for fault in (self.known_weights.fault, self.verification.fault, self.trend.fault) if fault)

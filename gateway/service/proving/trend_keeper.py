@@ -1,4 +1,4 @@
-"""The thread that follows the vehicle's own parameters: reads what the store has, an hour at a time."""
+"""The thread that follows the vehicle's own parameters: reads the stored batches, an hour at a time."""
 
 import json
 import logging
@@ -29,7 +29,7 @@ class TrendKeeper:
     """Adds new batches to trend.json. A store or a disk that refuses is tried again in an hour."""
 
     def __init__(self, directory: Path, subject: Subject, ask: Ask, zeros: Zeros) -> None:
-        """``zeros``: when the vehicle was empty and what the calibration alone read (kg), oldest first."""
+        """``zeros``: when the vehicle was empty and the estimate of the calibration alone (kg), oldest first."""
         self._subject = subject
         self._ask = ask
         self._zeros = zeros
@@ -44,7 +44,7 @@ class TrendKeeper:
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """What is not read yet is read after the next start."""
+        """Unread batches are read after the next start."""
         self._stop.set()
         self._thread.join(timeout_s)
 
@@ -56,7 +56,7 @@ class TrendKeeper:
 
     @property
     def trends(self) -> Sequence[Trend]:
-        """As they were judged last: the same object until they are judged anew."""
+        """As last judged: the same object until the next judgement."""
         return self._trends
 
     def told(self) -> str:
@@ -66,7 +66,7 @@ class TrendKeeper:
         )
 
     def catch_up(self) -> None:
-        """Read everything that is new, and judge. Raises StoreError, TimeoutError or OSError."""
+        """Read all new batches, and judge. Raises StoreError, TimeoutError or OSError."""
         history = before = self._file.history
         while not self._stop.is_set():
             page = self._ask(limit=PAGE, cursor=history.cursor, with_spectra=False)

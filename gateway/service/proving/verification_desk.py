@@ -1,4 +1,6 @@
-"""Where a running service is verified: known loads against what it weighed, as dated records; nothing is learned."""
+"""Verification of a running service: known loads compared with its estimates, as dated records; the calibration does
+not change.
+"""
 
 import threading
 import time
@@ -48,9 +50,9 @@ class VerificationDesk:
         on_event: OnEvent,
         clock_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        """``ask`` is the store's question after estimates; ``every_days`` 0: a verification is never due.
+        """``ask`` queries the store for estimates; ``every_days`` 0: a verification is never due.
 
-        ``payload_without`` is what a load is weighed as where it is not itself among the known weights.
+        ``payload_without`` gives a load's estimate without itself among the known weights.
         """
         self._subject = subject
         self._ask = ask
@@ -64,7 +66,7 @@ class VerificationDesk:
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with the file, and that a verification is due, for people."""
+        """Faults of the file, and a due verification, for people."""
         due = self.status()
         last = "there is none of this calibration" if due.last_at is None else f"the last was {due.last_at[:10]}"
         return self._file.fault or (f"a verification with known loads is due: {last}" if due.is_due else None)
@@ -88,7 +90,7 @@ class VerificationDesk:
         )
 
     def told(self) -> str:
-        """JSON: what is asked for, when one is due, and the records, newest first."""
+        """JSON: the requirements, when the next one is due, and the records, newest first."""
         entries = [entry.model_dump(mode="json") for entry in reversed(self._file.history.entries)]
         return json_line(
             {
@@ -100,7 +102,7 @@ class VerificationDesk:
         )
 
     def record(self, record_id: str) -> Mapping[str, Any] | None:
-        """One record by its id; None where there is none."""
+        """One record by its id; None if there is none."""
         found = next((entry for entry in self._file.history.entries if entry.id == record_id), None)
         return None if found is None else found.model_dump(mode="json")
 

@@ -1,4 +1,4 @@
-"""What the pipeline sees go by, kept for those who ask how the vehicle is: signals, and whether it stands."""
+"""Observations of the pipeline's frames for the status: the health of signals, and whether the vehicle stands."""
 
 from gateway.service.watching.signals import SignalWatch
 from gateway.service.watching.standing import StandingWatch

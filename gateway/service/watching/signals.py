@@ -1,4 +1,4 @@
-"""When each signal last spoke, how often it does, and what the vehicle's own load sensors last said."""
+"""When each signal was last received, its interval, and the last values of the vehicle's own load sensors."""
 
 import time
 
@@ -9,7 +9,7 @@ from gateway.units import NS_PER_S
 
 
 class SignalWatch:
-    """When each signal last spoke and how often, for the status page. Written by one thread, read by any."""
+    """When each signal was last received and how often, for the status page. Written by one thread, read by any."""
 
     def __init__(self, signals: tuple[Signal, ...]) -> None:
         self.last_heard: dict[Signal, float] = {}

@@ -1,4 +1,4 @@
-"""Whether the vehicle stands, and whether its load may have changed since it was weighed."""
+"""Whether the vehicle stands, and whether its load may have changed since the last weighing."""
 
 import time
 from collections.abc import Callable
@@ -18,16 +18,16 @@ CLOCK_PUT_BACK_S: Final = 1.0  # nobody knows then how long it stood
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """From the last sample that moved to the first that did again, by the frames' time."""
+    """From the last moving sample to the next one, by the frames' time."""
 
     begin_ns: int
     end_ns: int
 
 
 class StandingWatch:
-    """Told of every row; written by one thread, read by any.
+    """Called with every row; written by one thread, read by any.
 
-    Nobody knows what happened before the first row: that counts as a stop.
+    The time before the first row is unknown: that counts as a stop.
     """
 
     def __init__(self, standstill_speed_mps: float, clock_s: Callable[[], float] = time.monotonic) -> None:
@@ -63,7 +63,7 @@ class StandingWatch:
         self._moved_ns, self._moved_s = int(moving_ns[-1]), self._clock_s()
 
     def stood_s(self) -> float | None:
-        """For how long it has stood by now; None while it drives. A bus that sleeps is a vehicle that stands."""
+        """How long it has stood by now; None while it drives. A bus that sleeps is a vehicle that stands."""
         silent_s = self._clock_s() - (self._begun_s if self._moved_s is None else self._moved_s)
         told_s = 0.0
         if self._newest_ns is not None and self._moved_ns is not None and self._moved_s is not None:
@@ -77,6 +77,6 @@ class StandingWatch:
 
 
 def _speed_of(motion: Motion) -> tuple[I64, F64]:
-    """The wheels' where there is no other, as for batches."""
+    """The wheels' speed if there is no other, as for batches."""
     t_ns, speed_mps = motion.of(Signal.SPEED)
     return (t_ns, speed_mps) if t_ns.size else motion.of(Signal.WHEEL_SPEED)
