@@ -48,8 +48,8 @@ class RunTable(_Table):
     )
     payload_left_m: MetresLeft | None = Field(
         None,
-        description=f"its centre of gravity left of the vehicle's centre line, negative: right of it; absent: about "
-        "there, with a standard deviation of {PAYLOAD_LEFT_STD_M:g} m",
+        description="its centre of gravity left of the vehicle's centre line, negative: right of it; absent: about "
+        f"there, with a standard deviation of {PAYLOAD_LEFT_STD_M:g} m",
     )
     split: Literal["identification", "validation"] | None = Field(
         None, description="use the whole run for this alone; absent: cut at `identification_fraction`"
