@@ -27,8 +27,7 @@ Generated from `tests/faults.toml` and from the last recorded run by `python doc
 
 Every row is a test. Those under `tests/vm` run the installed Debian package under real systemd on a real SocketCAN
 interface, in a small virtual machine (`make test-vm`); the others run everywhere (`make test`). Recovery is measured
-from the moment the cause is gone, or from the fault where nobody has to mend anything, until the service does again
-what it is for.
+from the end of the cause, or from the fault if nobody has to mend anything, until the service works again.
 """
 
 
@@ -87,7 +86,7 @@ FIGURES = {
     "late_ms": "ms that canplayer's frames were late at most, 99 of 100, in the replay compared below",
     "reference_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log that canplayer read, reference "
     "map; 0.5 standard deviations are allowed, for the kernel stamps frames when they come",
-    "j1939_new_stamps_kg": "kg between HTTP and `springscale estimate` on canplayer's log, J1939; likewise",
+    "j1939_new_stamps_kg": "kg between HTTP and `springscale estimate` on canplayer's log, J1939; the same allowance",
 }
 
 

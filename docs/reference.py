@@ -110,7 +110,7 @@ def sprung_section() -> str:
     return f"""\
 ## From axle weights to sprung mass and front share
 
-`kerb_front_axle_kg` and `kerb_rear_axle_kg` are enough: where `empty_mass_kg` is absent, it, its front share and their
+`kerb_front_axle_kg` and `kerb_rear_axle_kg` are enough: if `empty_mass_kg` is absent, it, its front share and their
 standard deviation follow from them as below, as in [commissioning](commissioning.md).
 
 A weighbridge shows F under the front axle and R under the rear one. Weigh the empty vehicle on level ground, with
@@ -125,7 +125,7 @@ $$M = F + R - u_f - u_r \\qquad s = \\frac{{F - u_f}}{{M}}$$
 
 | symbol | key | meaning |
 |---|---|---|
-| $F$, $R$ | `kerb_front_axle_kg`, `kerb_rear_axle_kg` | what the scales show, kg |
+| $F$, $R$ | `kerb_front_axle_kg`, `kerb_rear_axle_kg` | scale reading, kg |
 | $u_f$, $u_r$ | `unsprung_front_kg`, `unsprung_rear_kg` | unsprung masses, kg |
 | $M$ | `empty_mass_kg` | sprung mass of the empty vehicle, kg |
 | $s$ | `empty_front_share_pct` | its share on the front axle, in percent in the file |
@@ -142,8 +142,8 @@ k = {100 * UNSPRUNG_SHARE:.1f} % of the sprung mass, so with both unknown
 
 $$M = \\frac{{F + R}}{{1 + 2 k}}$$
 
-The same share is the centre of calibration's prior, and an estimate is left out of the block, so that calibration goes
-on treating it as one. Sources:
+The same share is the centre of calibration's prior, and the block does not contain an estimate, so that calibration
+goes on treating it as one. Sources:
 
 - the paper's van has 160 kg beside 1240 kg (Table 1, read as four times 40 kg), {100 * 80 / 1240:.1f} % an axle;
 - published parameters of two real vehicles have {cars}
@@ -182,80 +182,81 @@ SHARES: Final = ("gap_share", "usable_share", "roll_usable_share", "shares")
 
 NULL: Final = {
     "id": "",
-    "vehicle_id": "null where no configuration names the vehicle",
-    "vin": "absent unless `[vehicle] vin` says it",
+    "vehicle_id": "null if no configuration names the vehicle",
+    "vin": "absent unless `[vehicle] vin` states it",
     "t_start_ns": "",
     "t_end_ns": "",
     "estimator": "",
     "calibration_id": "null without a calibration",
-    "payload": "null where rejected, or where the ratio index has no model of it",
-    "front_share": "null where rejected, or where the ratio index has no model of it",
+    "payload": "null if rejected, or if the ratio index has no model of it",
+    "front_share": "null if rejected, or if the ratio index has no model of it",
     "payload_front_share_correlation": "null where rejected",
-    "cg_left": "null where rejected, by the ratio index, and without a roll rate",
+    "cg_left": "null if rejected, by the ratio index, and without a roll rate",
     "left_share": "as above",
     "payload_cg_left_correlation": "as above",
     "front_share_cg_left_correlation": "as above",
     "roll_share_front": "as above",
     "roll_share_front_std": "as above",
-    "weights": "what is unknown in it is null and says what it lacks; see below",
-    "ratio_index_acceleration": "null where rejected before it was computed, and without a calibrated ratio index",
+    "weights": "unknown weights are null and say what they lack; see below",
+    "ratio_index_acceleration": "null if rejected before it was computed, and without a calibrated ratio index",
     "ratio_index_pitch_rate": "as above",
-    "mean_speed_mps": "null where no speed is known",
+    "mean_speed_mps": "null if no speed is known",
     "gap_share": "",
     "usable_share": "",
-    "roll_usable_share": "null without a roll rate in the signal map, and where nothing is usable",
+    "roll_usable_share": "null without a roll rate in the signal map, and if nothing is usable",
     "roughness_mps2": "null without spectra or speed",
     "shares": "",
     "rejected": "",
     "is_provisional": "absent in the estimate of a whole batch",
-    "spectra": "absent where nothing could be transformed, and where the request says `spectra=false`",
-    "diagnostics": "empty where rejected before a fit",
-    "epoch": "absent where rejected or provisional; the place is null where no batch told it",
-    "way": "null in what early versions stored, and in an early look; what is unknown in it is null",
-    "known_weights_id": "absent where no known weight is in use",
-    "raw_payload": "absent where no known weight is in use",
+    "spectra": "absent if nothing could be transformed, and if the request says `spectra=false`",
+    "diagnostics": "empty if rejected before a fit",
+    "epoch": "absent if rejected or provisional; the lateral position is null if no batch has one",
+    "way": "null in records of early versions, and in a provisional estimate; unknown parts are null",
+    "known_weights_id": "absent if no known weight is in use",
+    "raw_payload": "absent if no known weight is in use",
     "raw_front_share": "as above",
     "error_budget": "empty where rejected",
     "posterior": "absent where rejected",
-    "measured": "absent where no known weight is in use",
+    "measured": "absent if no known weight is in use",
 }
 """When a field is unknown, by the part of Estimate that it shows. Empty: never."""
 
 DIAGNOSTICS: Final = {
-    "reach": "how far the load lies beyond the known ones, in parts of the empty sprung mass; 0 among them",
-    "misfit": "likelihood ratio per degree of freedom against free matrices: about 1 where the model fits",
+    "reach": "distance of the load beyond the known ones, in parts of the empty sprung mass; 0 among them",
+    "misfit": "likelihood ratio per degree of freedom against free matrices: about 1 if the model fits",
     "n_segments": "segments that were averaged",
-    "amplitude_ratio": "how much the vehicle moved, over the usual in calibration",
+    "amplitude_ratio": "movement of the vehicle, relative to the usual one in calibration",
     "damper_front_ratio": "front dampers' rate over the calibrated",
     "damper_rear_ratio": "rear dampers' rate over the calibrated",
-    "damper_front_freed_ratio": "the same, without what the search believes of dampers where it strained at that",
-    "damper_rear_freed_ratio": "likewise of the rear dampers",
-    "delay_scale": "by which share the rear axle came later than wheelbase and speed say",
-    "tension": "how far the vehicle lies off its calibration: chi-squared of five; refused above 25.7",
+    "damper_front_freed_ratio": "front dampers' rate over the calibrated, if the search is free to find worn ones",
+    "damper_rear_freed_ratio": "the same for the rear dampers",
+    "delay_scale": "relative delay of the rear axle beyond wheelbase and speed",
+    "tension": "deviation of the vehicle from its calibration: chi-squared of five; refused above 25.7",
     "sensor_position_score": "pull to another place or gain of the sensor, in standard deviations; refused beyond 6",
-    "sensor_noise_score": "pull towards more noise in the acceleration, as roll makes it, likewise; refused above 6",
-    "noise_acceleration_ratio": "how loud the accelerometer is from 16.5 to 20 Hz over what is expected at most: from "
-    "2 on its noise is reckoned with",
-    "noise_pitch_rate_ratio": "likewise of the pitch rate",
-    "noise_roll_rate_ratio": "likewise of the roll rate",
-    "gyro_gain_ratio": "the gyro's gain over that in calibration, as bends tell it; refused beyond 3.5 standard "
-    "deviations of 1",
+    "sensor_noise_score": "slope towards more noise in the acceleration, as roll makes it, in the same unit; refused "
+    "above 6",
+    "noise_acceleration_ratio": "noise of the accelerometer from 16.5 to 20 Hz relative to the greatest expected: "
+    "from 2 on the model includes it",
+    "noise_pitch_rate_ratio": "the same for the pitch rate",
+    "noise_roll_rate_ratio": "the same for the roll rate",
+    "gyro_gain_ratio": "gain of the gyro over that in calibration, measured in bends; refused beyond 3.5 standard "
+    "deviations from 1",
     "gyro_gain_ratio_std": "its standard deviation",
     "payload_gyration_m2": "squared radius of gyration in pitch of the load, as the fit began with it",
     "payload_mode_hz": "frequency at which the payload rings on its floor",
-    "payload_damping_ratio": "how much its floor or mount damps that, of critical",
+    "payload_damping_ratio": "damping of its floor or mount, relative to critical",
     "delay_s": "mean time from axle to axle",
     "delay_std_s": "its standard deviation over the segments",
 }
 """What cross_spectrum says of its own; the ratio index says nothing."""
 
 LACKS: Final = {
-    Lack.CALIBRATION: "nobody says what the vehicle weighs empty: no calibration is in use",
-    Lack.ESTIMATE: "the batch was rejected, or the estimator does not tell the front share",
+    Lack.CALIBRATION: "the empty vehicle's weight is unknown: no calibration is in use",
+    Lack.ESTIMATE: "the batch was rejected, or the estimator does not give the front share",
     Lack.UNSPRUNG_MASS: "`[vehicle]` of the campaign states neither the axle's unsprung mass nor its kerb weight, and "
     "the calibration has no part for cross_spectrum, which would have found it",
     Lack.TRACK_WIDTH: "`[vehicle]` of the campaign states no `track_width_m`",
-    Lack.ROLL_RATE: "nothing tells where the load lies sideways: no roll rate, or a calibration without one",
+    Lack.ROLL_RATE: "the lateral position of the load is unknown: no roll rate, or a calibration without one",
 }
 """What a weight may lack, in words."""
 
@@ -324,7 +325,7 @@ def _meaning(column: str) -> str:
     if column in others:
         return others[column]
     if column == OVER_LIMIT:
-        return "places of `weights` that bear more than their limit; empty where none is known to"
+        return "places of `weights` over their limit; empty if none is known to be"
     one = next(field for field in FIELDS if column in (field.name, *field.columns))
     if column == one.name or len(one.columns) < 2:
         return one.description or ""

@@ -48,11 +48,11 @@ DIAGNOSTICS: Final = (
 """What an estimator says of its own, as docs/estimate.md explains it: a column each, null where it says nothing."""
 
 PROVENANCE: Final[Mapping[str, str]] = {
-    "log": "in which the batch ended: its path in the archive",
-    "log_sha256": "hash of that file as it lies there",
+    "log": "the log in which the batch ended: its path in the archive",
+    "log_sha256": "hash of that file as stored",
     "signals_id": "hash of the signal map, its databases resolved",
     "software": "the version of springscale and the hash of the code that weighs",
-    "job": "hash of everything that the row follows from; also the name of its file and receipt",
+    "job": "hash of all inputs of the row; also the name of its file and receipt",
 }
 """Columns that no estimate has; `calibration_id` and `known_weights_id` are among the estimate's own."""
 

@@ -110,12 +110,12 @@ class ManifestFile(Means):
 
     logs: str = Field(".", description="folder below which the vehicles' folders are, or a URL")
     pattern: str | None = Field(
-        None, description="which files are logs, e.g. *.txt.gz [default: those whose suffix says so, packed or not]"
+        None, description="which files are logs, e.g. *.txt.gz [default: those with the suffix of a log, packed or not]"
     )
     batch: BatchSection = BatchSection()
     trust: TrustSection = TrustSection()
     vehicles: tuple[VehicleEntry, ...] = Field((), description="one table a vehicle and span of time")
-    vehicles_in: str | None = Field(None, description="a Parquet file of such tables, one row each, in their stead")
+    vehicles_in: str | None = Field(None, description="a Parquet file of such tables, one row each, instead of them")
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,13 +67,18 @@ class VehicleFields:
 
     __pydantic_config__ = STRICT
 
-    name: str = field(metadata=described("what you call it; the calibration file and its report show it", min_length=1))
+    name: str = field(
+        metadata=described("name of the vehicle; the calibration file and its report show it", min_length=1)
+    )
     wheelbase_m: float = field(metadata=described("from axle to axle: l", ge=0.8, le=20.0, examples=[2.75]))
     sensor_position_m: Metres = field(
         metadata=described("the sensor's, behind the front axle; negative: ahead of it", examples=[1.2])
     )
     sensor_position_std_m: float = field(
-        default=0.1, metadata=described("how sure the sensor's position is; the fit moves it that far", gt=0.0, le=10.0)
+        default=0.1,
+        metadata=described(
+            "standard deviation of the sensor's position; the fit may move it accordingly", gt=0.0, le=10.0
+        ),
     )
     sensor_offset_left_m: MetresLeft | None = field(
         default=None,
@@ -82,7 +87,7 @@ class VehicleFields:
     sensor_offset_left_std_m: float | None = field(
         default=None,
         metadata=described(
-            f"how sure that is; absent: {MEASURED_OFFSET_STD_M:g} with an offset, by tape, "
+            f"standard deviation of that; absent: {MEASURED_OFFSET_STD_M:g} with an offset, by tape, "
             f"{UNKNOWN_OFFSET_STD_M:g} without one",
             gt=0.0,
             le=2.0,
@@ -116,8 +121,8 @@ class VehicleFields:
     payload_length_m: float | None = field(
         default=None,
         metadata=described(
-            "how far along the floor it usually reaches, where you know that better than `carries` says: 1.2 for a "
-            "pallet, the floor's length for parcels",
+            "usual length of the load along the floor, if you know it better than `carries` says: 1.2 for a pallet, "
+            "the floor's length for parcels",
             ge=0.1,
             le=20.0,
             examples=[2.4],
@@ -125,11 +130,11 @@ class VehicleFields:
     )
     payload_height_m: float | None = field(
         default=None,
-        metadata=described("how high above the floor it usually reaches", ge=0.05, le=5.0, examples=[1.2]),
+        metadata=described("usual height of the load above the floor", ge=0.05, le=5.0, examples=[1.2]),
     )
-    roof_rack: bool = field(default=False, metadata=described("part of the load may lie on the roof"))
+    roof_rack: bool = field(default=False, metadata=described("part of the load may be on the roof"))
     tow_bar: bool = field(
-        default=False, metadata=described("part of the load may hang on a tow bar: a carrier, a trailer's tongue")
+        default=False, metadata=described("part of the load may be on a tow bar: a carrier, a trailer's tongue")
     )
     front_axle_limit_kg: WeightKg | None = field(default=None, metadata=described("permitted load of the front axle"))
     rear_axle_limit_kg: WeightKg | None = field(default=None, metadata=described("permitted load of the rear axle"))
@@ -156,16 +161,15 @@ class Vehicle(VehicleFields):
     empty_front_share_std_pct: float = field(
         default=0.5,
         metadata=described(
-            "how sure the front share is, in percentage points; front shares and axle loads are no surer",
+            "standard deviation of the front share, in percentage points; front shares and axle loads are no more "
+            "precise",
             gt=0.0,
             le=50.0,
         ),
     )
     payload_range_kg: tuple[Kilograms, Kilograms] = field(
         default=(0.0, 450.0),
-        metadata=described(
-            "payloads the vehicle may carry, rising; scales percentages, never clips; a plan asks for it"
-        ),
+        metadata=described("payloads the vehicle may carry, rising; scales percentages, never clips; a plan needs it"),
     )
     front_share_range_pct: tuple[Percent, Percent] = field(
         default=(40.0, 60.0),
@@ -173,7 +177,7 @@ class Vehicle(VehicleFields):
     )
     kerb_front_axle_kg: WeightKg | None = field(
         default=None,
-        metadata=described("what scales show under the empty vehicle's front axle, for weights on the road"),
+        metadata=described("scale reading under the empty vehicle's front axle, for weights on the road"),
     )
     kerb_rear_axle_kg: WeightKg | None = field(default=None, metadata=described("the same at the rear"))
     wheel_radius_m: float | None = field(

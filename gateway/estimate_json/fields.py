@@ -126,7 +126,7 @@ FIELDS: Final = (
         1795233000000000000,
         columns=(),
     ),
-    _field("estimator", "estimator", TEXT, "who weighed: cross_spectrum or ratio_index", "ratio_index"),
+    _field("estimator", "estimator", TEXT, "the estimator: cross_spectrum or ratio_index", "ratio_index"),
     _field("calibration_id", "calibration_id", TEXT, "hash of the calibration used", "sha256:9f86d081"),
     *_found("payload", 271.3, 6.1, [259.3, 283.3]),
     *_found("front_share", 50.4, 0.1, [50.2, 50.6]),
@@ -139,18 +139,18 @@ FIELDS: Final = (
     ),
     _field("ratio_index_acceleration", "ratio_index_acceleration", NUMBER, "R_a of the paper", 0.97),
     _field("ratio_index_pitch_rate", "ratio_index_pitch_rate", NUMBER, "R_g of the paper", 1.21),
-    _field("mean_speed_mps", "mean_speed_mps", NUMBER, "over what every gate let through", 13.9),
+    _field("mean_speed_mps", "mean_speed_mps", NUMBER, "over the samples that every gate accepted", 13.9),
     _field("gap_share", "gap_share", NUMBER, "share of the batch without samples", 0.001),
-    _field("usable_share", "usable_share", NUMBER, "share of the batch that every gate let through", 0.93),
+    _field("usable_share", "usable_share", NUMBER, "share of the batch that every gate accepted", 0.93),
     EstimateField(
         "roughness_mps2",
         "roughness_mps2",
         ROUGH_NUMBER,
-        "of the road: rms vertical acceleration, 1 to 15 Hz, brought to 80 km/h",
+        "of the road: rms vertical acceleration, 1 to 15 Hz, scaled to 80 km/h",
         1.1,
     ),
     EstimateField("shares", "shares", NUMBERS_BY_NAME, "part of the batch that each cause masked", {}),
-    _field("rejected", "rejected", REASONS, "why there is no answer; empty: this batch counted", []),
+    _field("rejected", "rejected", REASONS, "why there is no estimate; empty: this batch counted", []),
     EstimateField("diagnostics", "diagnostics", NUMBERS_BY_NAME, "the estimator's own figures", {}),
     EstimateField(
         "epoch_payload_kg", "epoch.payload.number", NUMBER, "all batches of this load together", 270.4, _KNOWN
@@ -165,7 +165,7 @@ FIELDS: Final = (
         "known_weights_id",
         "known_weights_id",
         TEXT,
-        "hash of the known weights that this answer takes into account; absent: none",
+        "hash of the known weights that this estimate takes into account; absent: none",
         presence=_KNOWN,
     ),
     EstimateField("raw_payload_kg", "raw_payload.number", NUMBER, _RAW, 283.7, _KNOWN),
@@ -205,7 +205,7 @@ FIELDS: Final = (
         "share of `usable_share` with a known roll rate",
         0.99,
     ),
-    EstimateField("way", "way", WAY, "how far it went, where it stood, what door and ignition did", EXAMPLE),
+    EstimateField("way", "way", WAY, "distance, standstills, door and ignition", EXAMPLE),
     _field(
         "epoch_payload_interval95_kg",
         "epoch.payload.interval95",
@@ -218,7 +218,7 @@ FIELDS: Final = (
         "error_budget",
         "error_budget",
         BUDGET,
-        "what each source adds to the error, largest payload first: one standard deviation each",
+        "contribution of each source to the error, largest payload first: one standard deviation each",
         _BUDGET,
     ),
     EstimateField(
@@ -251,6 +251,6 @@ FIELDS: Final = (
         "true: an early look at a batch that is still growing",
         presence=_KNOWN,
     ),
-    EstimateField("spectra", "spectra", SPECTRA, "of both sensors, for people to look at", presence=_KNOWN),
+    EstimateField("spectra", "spectra", SPECTRA, "of both sensors, for display", presence=_KNOWN),
 )
 COLUMNS: Final = tuple(column for one in FIELDS for column in one.columns)

@@ -56,7 +56,7 @@ def test_empty_now_is_stated_and_taken_back_after_a_question(
         page.get_by_label("Note").fill("yard")
         page.keyboard.press("Enter")
         expect(page.get_by_role("dialog")).to_be_hidden()
-        expect(page.locator("#weights-in-use")).to_have_text("1; without them estimates were +12 kg off")
+        expect(page.locator("#weights-in-use")).to_have_text("1; without them the error of estimates is +12 kg")
         expect(page.locator("#weights-said")).to_have_text("Kept. It counts from the next batch on.")
         page.get_by_text("All stated weights").click()
         expect(page.locator("#weights-entries li")).to_contain_text("empty: 0 ± 20 kg known, 12 ± ")
@@ -96,7 +96,7 @@ def test_a_ticket_that_contradicts_is_shown_with_both_numbers_and_confirmed(
             "The load was weighed as 276 ± "
         )
         page.get_by_role("button", name="The known weight is right").click()
-        expect(page.locator("#weights-in-use")).to_have_text("1; without them estimates were −124 kg off")
+        expect(page.locator("#weights-in-use")).to_have_text("1; without them the error of estimates is −124 kg")
         expect(held).to_have_count(0)
         assert watched.complaints == []
         gateway.board.close()

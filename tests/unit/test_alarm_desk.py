@@ -154,5 +154,5 @@ def test_settings_are_the_cores() -> None:
 
 
 def test_an_alarm_that_there_is_not_cannot_be_switched_off() -> None:
-    with pytest.raises(ValueError, match="is no alarm; there are overload, "):
+    with pytest.raises(ValueError, match="is no alarm; known are overload, "):
         settings.AlarmsSection(off=("overlaod",))

@@ -33,7 +33,7 @@ def test_it_tells_what_there_is_what_was_done_and_that_nothing_is_left(archive: 
     assert ahead.exit_code == 0, ahead.output
     first_line, *_ = ahead.stdout.splitlines()
     assert first_line.startswith("1 vehicle, 1 log, ")
-    assert "never looked into: 1 log;" in ahead.stdout
+    assert "not scanned yet: 1 log;" in ahead.stdout
     assert "on 1 worker, each reading" in ahead.stdout
     assert not (archive / "dataset").exists()
     first, second = called(archive), called(archive, "--json")

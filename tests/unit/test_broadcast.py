@@ -148,7 +148,7 @@ def test_a_bus_that_fails_is_told_and_tried_again(
     [
         (
             'interface = "virtual"\nchannel = "X"\nsource_address = 66',
-            "[broadcast] virtual X is the bus that is",
+            "[broadcast] virtual X is the bus that the service listens to",
         ),
         ('interface = "virtual"\nsource_address = 66', "interface needs channel and source_address"),
         ('channel = "y"', "nothing is sent without interface"),

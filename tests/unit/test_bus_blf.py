@@ -113,7 +113,7 @@ def test_a_start_beyond_all_time_refuses_every_stamp(year, read):
 
 @pytest.mark.parametrize("content", [b"", b"LOGG", b"no such thing" * 100])
 def test_what_is_no_blf_is_refused(content, read):
-    with pytest.raises(LogUnreadableError, match=r"a\.blf: cannot be read as \.blf: it does not begin as one"):
+    with pytest.raises(LogUnreadableError, match=r"a\.blf: cannot be read as \.blf: it does not begin like one"):
         read(lambda _: content)
 
 

@@ -191,7 +191,7 @@ def test_shipped_maps_are_found_by_name():
 
 
 def test_an_unknown_shipped_map_names_those_there_are():
-    with pytest.raises(SignalMapError, match=r"springscale:referenz: no such map; there are .*reference"):
+    with pytest.raises(SignalMapError, match=r"springscale:referenz: no such map; known are .*reference"):
         load_signal_map("springscale:referenz")
 
 

@@ -240,7 +240,7 @@ def test_stopping_before_starting_does_nothing():
 
 
 def test_an_unknown_interface_names_the_known():
-    with pytest.raises(BusError, match=r"'sockercan' is unknown; there are .*socketcan"):
+    with pytest.raises(BusError, match=r"'sockercan' is unknown; known are .*socketcan"):
         LiveSource("sockercan", "can0", MAP)
 
 

@@ -42,11 +42,11 @@ def test_it_says_by_what_is_weighed_where_no_calibration_is_configured(tmp_path:
 @pytest.mark.parametrize(
     ("sections", "words"),
     [
-        ({"bus": 'interface = "socketcn"\nchannel = "can0"'}, "interface 'socketcn' is unknown; there are "),
+        ({"bus": 'interface = "socketcn"\nchannel = "can0"'}, "interface 'socketcn' is unknown; known are "),
         ({"bus": 'interface = "udp_multicast"\nchannel = "239.0.0.1"'}, "needs the Python package msgpack"),
         ({"web": 'host = "0.0.0.0"'}, "springscale token create NAME --config"),
         ({"web": "stale_after_s = 200.0"}, "stale_after_s = 200 is below [batch] window_s = 300"),
-        ({"alarms": 'off = ["overlaod"]'}, "is no alarm; there are overload, imbalance, "),
+        ({"alarms": 'off = ["overlaod"]'}, "is no alarm; known are overload, imbalance, "),
         ({"webhook": 'url = "https://fleet.example/hook"'}, "url needs secret_file"),
         (
             {"webhook": 'url = "http://fleet.example/hook"\nsecret_file = "none"'},
@@ -79,7 +79,7 @@ def test_a_map_that_cannot_weigh_is_not_called_good(tmp_path: Path) -> None:
     config.write_text(config.read_text().replace("springscale:reference", str(tmp_path / "map.toml")))
     again = CliRunner().invoke(springscale, ["check-config", str(config)])
     assert isinstance(again.exception, ConfigurationError)
-    assert "maps no pitch_rate: nothing can be weighed without it" in str(again.exception)
+    assert "maps no pitch_rate, which every estimate needs" in str(again.exception)
 
 
 def test_a_store_that_cannot_be_written_is_not_called_good(tmp_path: Path) -> None:

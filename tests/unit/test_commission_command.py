@@ -42,7 +42,7 @@ def test_one_call_answers_everything(url: str, bench: Bench) -> None:
     bench.worker.finish(fitted(payload_std_kg=36.0))
     shown = run(url, "show")
     assert "next: drive, empty" in shown.stdout
-    assert "5 min driven, one window: 50% of what is wanted is known" in shown.stdout
+    assert "5 min driven, one window: 50% of the goal" in shown.stdout
     assert "next: the calibration is being made" in run(url, "fit").stdout
     bench.worker.finish(fitted(payload_std_kg=36.0))
     made = run(url, "show").stdout

@@ -25,7 +25,7 @@ def sentence(**changed: Any) -> str:
 
 
 def test_what_was_unloaded_when_and_how_surely() -> None:
-    assert sentence() == "2026-01-01 00:14 to 00:31  180 kg unloaded (± 20 kg), 87% sure; 220 kg aboard then"
+    assert sentence() == "2026-01-01 00:14 to 00:31  180 kg unloaded (± 20 kg), 87% probable; 220 kg aboard then"
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,7 @@ def test_set_show_and_undo_with_a_token_from_the_environment(url: str, tokens: T
     assert "empty: 0.0 ± 19.6 kg known, 12.0 ± " in made.output
     assert "by workshop (yard)" in made.output
     shown = run("show", "--url", url + "/", "--token", token).output.splitlines()
-    assert shown[0] == "one known weight in use; without them estimates were +12.0 kg off"
+    assert shown[0] == "one known weight in use; without them the estimates' error is +12.0 kg"
     assert shown[-1] == "  " + made.output.strip()
     undone = run("undo", "--url", url, "--token", token, "--json")
     assert json.loads(undone.output)["known_weights_id"] is None
@@ -78,7 +78,7 @@ def test_a_ticket_is_added_confirmed_and_withdrawn(url: str, tokens: TokenFile, 
     entry_id = json.loads(ticket("show", "--json", *asked).output)["history"][0]["id"]
     assert isinstance(ticket("confirm", "sha256:none", *asked).exception, SpringscaleError)
     confirmed = ticket("confirm", entry_id[:19], *asked)
-    assert "one known weight in use; without them estimates were -124.0 kg off" in confirmed.output
+    assert "one known weight in use; without them the estimates' error is -124.0 kg" in confirmed.output
     assert "withdrawn" in ticket("withdraw", entry_id.removeprefix("sha256:")[:12], *asked).output
     refused = ticket("add", "payload_kg=1,at=2020-01-01T00:00:00Z", *asked).exception
     assert isinstance(refused, SpringscaleError)
@@ -135,7 +135,7 @@ def test_a_service_that_asks_for_a_certificate_is_shown_one(mutual: str, tmp_pat
 def test_where_nobody_answers_that_is_said() -> None:
     fault = run("show", "--url", "http://127.0.0.1:1").exception
     assert isinstance(fault, SpringscaleError)
-    assert "http://127.0.0.1:1/api/v1/calibration/tare: no service answers there" in str(fault)
+    assert "http://127.0.0.1:1/api/v1/calibration/tare: cannot reach the service" in str(fault)
     assert "nothing is listening" in str(fault)
 
 

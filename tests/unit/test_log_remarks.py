@@ -53,4 +53,4 @@ def test_estimate_tells_them_on_standard_error(tmp_path):
         springscale, ["estimate", str(tmp_path / "a.log.zst"), "--signals", "springscale:reference"]
     )
     assert ran.exit_code == 0
-    assert ran.stderr.startswith(f"{tmp_path / 'a.log.zst'}: the zstd stream is cut off; what lies before was read\n")
+    assert ran.stderr.startswith(f"{tmp_path / 'a.log.zst'}: the zstd stream is cut off; everything before was read\n")

@@ -77,7 +77,7 @@ class Service:
         except urllib.error.HTTPError as refusal:
             raise SpringscaleError(f"{address}: {_said(refusal)}") from None
         except (OSError, ValueError, HTTPException) as fault:  # not there, not trusted, or not what it should be
-            raise SpringscaleError(f"{address}: no valid answer from a service there: {_why(fault)}") from None
+            raise SpringscaleError(f"{address}: cannot reach the service: {_why(fault)}") from None
 
     def _opener(self) -> urllib.request.OpenerDirector:
         """Directly to the service, past any proxy; certificates are checked, and ours is shown if there is one."""

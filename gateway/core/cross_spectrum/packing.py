@@ -27,7 +27,7 @@ LEAST_STRAIN: Final = 4.6
 
 DECISIVE: Final = 100.0
 """By so much it must explain a batch better before it is the answer. Loads that stood on soft mounts gained 446 and
-more (recorded drives, 9 Hz), firm ones at most 10; a real car, where seats and people ring too, up to 51.
+more (recorded drives, 9 Hz), firm ones at most 10; a real car, whose seats and people resonate too, up to 51.
 """
 WORN_DECISIVE: Final = 80.0
 """Likewise of worn dampers. Healthy simulated vans gained at most 9, recorded drives 12 and, on the roughest road,

@@ -1,4 +1,4 @@
-"""The fleet's page: what wants a look, every vehicle in a line, and the fleet week by week."""
+"""The fleet's page: what needs attention, every vehicle in a line, and the fleet week by week."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence

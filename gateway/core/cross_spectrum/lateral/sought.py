@@ -44,7 +44,7 @@ class Sideways:
     """The place (m) of the centre of gravity of all that is sprung, left of the centre line, under a load that is
     known.
 
-    own_variance (m2) is what the batch's length and road leave. moves (n,) is by how much the place moves with each
+    own_variance (m2) is the error from the batch's length and road. moves (n,) is by how much the place moves with each
     parameter of the vehicle, moves_with_load (2,) with payload (m/kg) and front share (m per 0..1). is_mount_changed:
     the sensor is not where, or not turned as, it was calibrated.
     """

@@ -290,7 +290,7 @@ export const DASHBOARD = {
   "kind.axle_pads": ["axle pads", "Achslastwaagen"],
   "kind.delivery_note": ["delivery note", "Lieferschein"],
   weights_none: ["none: weighed by the calibration alone", "keine: nach der Kalibrierung allein gewogen"],
-  weights_some: ["{n}; without them estimates were {error} off{scatter}", "{n}; ohne sie lagen Schätzungen um {error} daneben{scatter}"],
+  weights_some: ["{n}; without them the error of estimates is {error}{scatter}", "{n}; ohne sie lagen Schätzungen um {error} daneben{scatter}"],
   scatter: [", scatter {kg}", ", Streuung {kg}"],
   offer: ["possible for the load weighed as {kg}, {span}", "möglich für die Ladung, die mit {kg} gewogen wurde, {span}"],
   "no_offer.no_calibration": ["Not possible: no calibration is loaded.", "Nicht möglich: Es ist keine Kalibrierung geladen."],
