@@ -2,9 +2,9 @@
 
     coverage(Scope(), seed) -> CoverageTable
 
-The vans, loads, roads and seeds serve this study alone: nothing of the estimators was chosen on them. Sensors sit up
-to 0.4 m beside the centre line. Every van is calibrated and judged twice on the same drives: with its roll rate mapped,
-and without.
+The vans, loads, roads and seeds serve this study alone: no setting of the estimators was chosen with them. Sensors sit
+up to 0.4 m beside the centre line. Every van is calibrated and judged twice on the same drives: with its roll rate
+mapped, and without.
 """
 
 from dataclasses import replace

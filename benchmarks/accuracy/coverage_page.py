@@ -47,7 +47,7 @@ def _protocol(found: Mapping[str, Any]) -> str:
         "calibration saw it; as calibrated and mixed with the load 0.15 to 0.35 m to one side (0 to 0.1 m else). The "
         "sensor sits up to 0.4 m beside the centre line, its place measured; of every other van nobody noted where the "
         "known loads stood sideways. Every van is calibrated and judged twice on the same drives: with its roll rate "
-        "mapped, and without. Nothing of either estimator was chosen on these vans, roads or seeds. "
+        "mapped, and without. No setting of either estimator was chosen with these vans, roads or seeds. "
         "Batches of 300 s; errors are percent of the payload each van is rated for and of 20 percentage points; with "
         "misses, a rejected batch counts as a mid-range answer. Coverage is the share of 95 % intervals that held the "
         "truth, with its own 95 % limits: batches of one run (of one van) are alike, so the limits are those of as "

@@ -4,7 +4,7 @@
 
 Each goes the way that the service goes: what was typed is asked about (``doubts_of``), made a vehicle and held against
 its line, then its empty drive is fitted and held against both (``contradictions``). A fact is caught where any of these
-stops it or asks. Nothing was chosen on these vans: the seed serves this study alone.
+stops it or asks. No setting was chosen with these vans: the seed serves this study alone.
 """
 
 from collections.abc import Callable, Iterator, Mapping

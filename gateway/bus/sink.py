@@ -12,7 +12,7 @@ from typing import Any, Final, Literal
 import can
 
 from gateway.bus.frames import take
-from gateway.bus.live import require_known_interface
+from gateway.bus.live import require_usable_interface
 from gateway.bus.live.source import system_reason
 from gateway.bus.logs import LogReport, open_whole_log
 from gateway.bus.messages import message_of
@@ -32,7 +32,7 @@ class BusSink(AbstractContextManager["BusSink"]):
 
     def __init__(self, interface: str, channel: str, **options: Any) -> None:
         """Raises BusError if the channel cannot be opened."""
-        require_known_interface(interface)
+        require_usable_interface(interface)
         if interface == "virtual":
             options = {"preserve_timestamps": True, **options}
         try:

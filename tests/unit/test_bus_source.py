@@ -244,8 +244,15 @@ def test_an_unknown_interface_names_the_known():
         LiveSource("sockercan", "can0", MAP)
 
 
+def test_a_missing_driver_package_is_named_before_anything_starts(monkeypatch):
+    """The receive thread died of it, and with it the service, some time after the start."""
+    monkeypatch.setattr("gateway.bus.live.python_can.importlib.util.find_spec", lambda name: None)
+    with pytest.raises(BusError, match="'gs_usb' needs the Python package gs-usb: pip install gs-usb"):
+        LiveSource("gs_usb", "0", MAP)
+
+
 def test_options_an_interface_does_not_take_are_told():
-    source = LiveSource("udp_multicast", "not an address", MAP)
+    source = LiveSource("socketcand", "can0", MAP)
     source.start()
     wait_for(lambda: source.reason)
     assert source.state is SourceState.READER_FAULT

@@ -25,7 +25,8 @@ def sensitivity_page(found: Mapping[str, Any]) -> str:
             f"--seed {found['seed']}`; do not edit by hand.",
             "",
             "Some constants follow from no derivation. Here each is halved and doubled in turn, all else as it is, on "
-            f"{found['n_vans']} simulated vans that nothing was chosen on: calibrated on six known loads, then driven "
+            f"{found['n_vans']} simulated vans that were not used to choose any setting: calibrated on six known "
+            f"loads, then driven "
             "once in each of the ways of [coverage](coverage.md), each time with another load. Errors are percent of "
             "the rated payload and of 20 percentage points, over batches that were answered; held is the share of "
             "these whose 95 % interval holds the truth, +- the mean of half these intervals, and the score that of "

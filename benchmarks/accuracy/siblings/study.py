@@ -2,7 +2,7 @@
 
     siblings(n_vans, seed) -> SiblingsTable
 
-Vans, roads and seeds serve this study alone: nothing of the line's calibration was chosen on them.
+Vans, roads and seeds serve this study alone: no setting of the line's calibration was chosen with them.
 """
 
 from collections.abc import Iterator, Sequence

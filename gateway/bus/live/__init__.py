@@ -6,7 +6,7 @@ loss counted. After a bus error the thread waits and opens the bus again; it nev
 
 from gateway.bus.live.around import Around, around_of
 from gateway.bus.live.inbox import Inbox
-from gateway.bus.live.python_can import require_known_interface, usable_interfaces, what_lacks
+from gateway.bus.live.python_can import require_usable_interface, usable_interfaces, what_lacks
 from gateway.bus.live.source import LiveSource, OpenReceiver, SourceState
 
 __all__ = [
@@ -16,7 +16,7 @@ __all__ = [
     "OpenReceiver",
     "SourceState",
     "around_of",
-    "require_known_interface",
+    "require_usable_interface",
     "usable_interfaces",
     "what_lacks",
 ]

@@ -115,7 +115,14 @@ def open_python_can(
     return PythonCanReceiver(bus, width)
 
 
-def require_known_interface(interface: str) -> None:
+def require_usable_interface(interface: str) -> None:
+    """Raise BusError, saying what to install or to change, for an interface that cannot be used on this computer."""
+    lacking = what_lacks(interface)
+    if lacking is not None:
+        raise BusError(lacking)
+
+
+def _require_known_interface(interface: str) -> None:
     """Raise BusError, with the names of the known ones, for an interface python-can does not know."""
     if interface not in can.VALID_INTERFACES:
         raise BusError(f"[bus] interface {interface!r} is unknown; known are {', '.join(sorted(can.VALID_INTERFACES))}")
@@ -127,7 +134,7 @@ def what_lacks(interface: str) -> str | None:
     Drivers of adapters are not checked: only opening the channel would show that.
     """
     try:
-        require_known_interface(interface)
+        _require_known_interface(interface)
     except BusError as fault:
         return str(fault)
     module, package = _PACKAGES.get(interface, ("can", "python-can"))

@@ -18,7 +18,7 @@ from typing import Any, Final
 import can
 
 from gateway.bus.live.inbox import Inbox
-from gateway.bus.live.python_can import open_python_can, require_known_interface
+from gateway.bus.live.python_can import open_python_can, require_usable_interface
 from gateway.bus.live.receiver import BUS_OFF, Burst, Receiver
 from gateway.bus.live.socketcan import open_socketcan, packets_received
 from gateway.bus.signals import SignalMap
@@ -93,8 +93,8 @@ class LiveSource:
         silence_s: float = 2.0,
         open_receiver: OpenReceiver | None = None,
     ) -> None:
-        """``open_receiver`` replaces the interface (tests). Raises BusError on an unknown interface."""
-        require_known_interface(interface)
+        """``open_receiver`` replaces the interface (tests). Raises BusError if it cannot be used here."""
+        require_usable_interface(interface)
         self._interface, self._channel = interface, channel
         self._silence_s = silence_s
         width = signal_map.payload_width

@@ -46,8 +46,8 @@ _LESS: Final = np.expm1(-np.array(levels()))[:, _AXLES]  # (5, 4) of the axle of
 
 
 def at_levels(car: HalfCar, theta: F64) -> HalfCar:
-    """The vehicles theta (..., p), of which ``car`` has numbers (..., 1, 1), as they act at each of :func:`levels`: the
-    rates of springs and dampers are (..., 5, 1).
+    """``car`` with the spring and damper rates that friction gives it at each of :func:`levels`. theta (..., p) are the
+    parameters of ``car``, whose numbers are (..., 1, 1); the rates of the result are (..., 5, 1).
     """
     left = np.maximum(1.0 + theta[..., None, _SHARES] * _LESS, LEAST_LEFT)[..., None]
     dampers, springs = left[..., :2, :], left[..., 2:, :]
