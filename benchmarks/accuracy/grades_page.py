@@ -36,8 +36,8 @@ def grades_page(found: Mapping[str, Any]) -> str:
             "--output DIR`; do not edit by hand. Everything is simulated.",
             "",
             f"{n_vans} simulated vans that were not used to choose any setting, each with every sensor on the same "
-            "drives: calibrated with it on six known loads of ten minutes near 50 km/h, then driven twice with a load within "
-            "the calibrated ones, as calibrated and mixed (town, country, motorway). The reference unit gives "
+            "drives: calibrated with it on six known loads of ten minutes near 50 km/h, then driven twice with a load "
+            "within the calibrated ones, as calibrated and mixed (town, country, motorway). The reference unit gives "
             f"{_of(found)['rate_hz']:g} samples and {_of(found)['fixes_hz']:g} fixes a second, rounded to "
             f"{_of(found)['accel_resolution_mps2']:g} m/s2 and {_of(found)['gyro_resolution_radps']:.1e} rad/s; every "
             "other line changes one thing of it. Noise is white, its density one-sided, that of each axis. Errors "

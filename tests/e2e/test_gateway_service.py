@@ -107,7 +107,7 @@ def test_a_sensor_under_another_identifier_is_named_by_the_status(config: Path) 
         threading.Thread(target=others, daemon=True).start()
 
     Gateway(settings, setup_of(settings), on_started=on_started).run()
-    assert told[0].startswith("The bus is awake (identifiers heard: 1), but none that is mapped.")
+    assert told[0].startswith("The bus is awake (identifiers heard: 1), but none of them is mapped.")
     assert "vertical acceleration (no frame of its message; similar on the bus: 123, " in told[0]
     assert "8 bytes" in told[0]
 

@@ -101,7 +101,7 @@ def test_a_fitter_walks_through_it(gateway: Gateway, bench: Bench, browser: Any,
         bench.drive(1)
         bench.worker.finish(fitted(payload_std_kg=36.0))
         news(gateway, watched)
-        expect(page.locator("#commissioning-learned")).to_contain_text("50 % of what is wanted is known")
+        expect(page.locator("#commissioning-learned")).to_contain_text("50 % of the goal")
         assert page.locator("#commissioning-progress").evaluate("(bar) => bar.value") == 0.5
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         bench.drive(2)

@@ -176,7 +176,7 @@ def test_why_an_estimate_is_uncertain_is_said_largest_source_first(gateway: Gate
         remedies = page.locator("#budget-remedies li")
         said = remedies.all_inner_texts()
         assert len({*said}) == len(said) == len({line.remedy for line in budget if helps(line, posterior.std(0))})
-        expect(page.locator("#budget-remedies")).to_contain_text("Say in the vehicle's data what it carries")
+        expect(page.locator("#budget-remedies")).to_contain_text("State in the vehicle's data what it carries")
         expect(remedies.first).to_contain_text(f"± {half} kg becomes ± ")
         assert page.locator("#budget-lines li").count() == sum(line.payload_kg > 0.0 for line in budget)
         assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []

@@ -127,7 +127,9 @@ def test_without_a_roll_rate_it_says_why_no_wheel_is_weighed(tmp_path: Path, wat
         gateway.publish(weighed(0, PAYLOAD_KG, 48.0, calibrated))
         page = watched.page
         page.goto(server.url)
-        expect(page.locator("#weights")).to_contain_text("Wheelsunknown: no roll rate tells where the load lies")
+        expect(page.locator("#weights")).to_contain_text(
+            "Wheelsunknown: the lateral position of the load needs a roll rate"
+        )
         expect(page.locator("#van text.on-wheel")).to_have_count(0)
         expect(page.locator("#van ellipse")).to_have_count(0)
         expect(page.locator("#van rect.spread")).to_have_count(1)

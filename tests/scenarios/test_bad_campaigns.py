@@ -203,7 +203,7 @@ def test_faults_that_leave_one_load_of_several_are_refused(folder: Path) -> None
     short = table_of(folder, 10).rstrip() + "\nend_s = 20.0\n\n"
     exit_code, found = check(altered(folder, "one-left", [1, 10], run10=short))
     assert (exit_code, kinds(found)) == (1, {0: ["warning:one_load_only", UNTOLD], 1: [], 2: ["fault:too_short"]})
-    assert found["refusal"] == "faults leave runs with 0 kg alone, which is no scale"
+    assert found["refusal"] == "faults leave only runs with 0 kg, which is no scale"
 
 
 @pytest.mark.parametrize(("one", "other"), [(4, 8), (1, 10)])

@@ -37,7 +37,7 @@ def test_an_id_does_not_depend_on_where_files_lie(
         asked = ["calibrate", str(where), "--output", str(tmp_path / name), "--estimator", "ratio_index", *WINDOW]
         monkeypatch.setattr("sys.argv", ["springscale", *asked])
         done = run(*asked)
-        assert "payload_range_kg: not stated: 0 to 450 kg is taken" in done.stderr
+        assert "payload_range_kg: not stated: using 0 to 450 kg" in done.stderr
         ids.add(load_calibration(tmp_path / name).id)
     assert len(ids) == 1
     command = load_calibration(tmp_path / "a.json").provenance.command

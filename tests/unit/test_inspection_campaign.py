@@ -144,7 +144,7 @@ def test_a_calibration_is_refused_only_where_faults_leave_no_scale() -> None:
     assert inspection((FAULT,), (WARNING,), (FAULT,), ()).refusal is None
     assert inspection((FAULT,), (FAULT,), (FAULT,), (FAULT,)).refusal == "no run can be used"
     alone = inspection((WARNING,), (FAULT,), (FAULT,), (FAULT,))
-    assert alone.refusal == "faults leave runs with 0 kg alone, which is no scale"
+    assert alone.refusal == "faults leave only runs with 0 kg, which is no scale"
 
 
 def test_the_calibration_file_remembers_faults_of_runs_left_out_and_warnings_of_the_others() -> None:

@@ -148,7 +148,7 @@ def test_the_report_says_what_was_inherited(drives: Path, sisters: list[Path], t
     page = (tmp_path / "report" / "report.html").read_text()
     for said in (
         "Calibrated on 1 run and what 1 vehicle of its line told",
-        "what others do was inherited from 1 vehicle of its line",
+        "the effect of others was inherited from 1 vehicle of its line",
         "These stay at what its line told",
         load_calibration(sisters[0]).id,
     ):
