@@ -154,7 +154,7 @@ FAULTS = [
     (campaign_text('signals = "s"', None, EMPTY_RUN | {"end_s": "inf"}), "runs[1].end_s: Input should be a finite"),
     (
         campaign_text(vehicle={"kerb_rear_axle_kg": "600.0"}),
-        "vehicle.kerb_rear_axle_kg: is 20 kg less than the load on this axle by empty_mass_kg and empty_front_share_pct",
+        "vehicle.kerb_rear_axle_kg: is 20 kg less than the load on this axle by empty_mass_kg",
     ),
     ('signals = "s"\n[vehicle]\n' + lines(VEHICLE), "runs: missing"),
     ('signals = "s"\nruns = []\n[vehicle]\n' + lines(VEHICLE), "runs: "),
