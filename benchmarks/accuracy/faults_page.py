@@ -37,7 +37,8 @@ def faults_page(found: Mapping[str, Any]) -> str:
             f"- Answered outside an interval: {total['n_batches'] - total['n_refused'] - total['n_held']}, under "
             f"{len(wrong)} of {len(lines)} faults and strengths. The first line has no fault: such answers are among "
             "the 5 % that an interval of 95 % leaves out of each quantity.",
-            f"- Refused or held in at least {100.0 * LEAST_SAFE:.0f} % of the batches: all but {_named(unsafe) or 'none'}.",
+            f"- Refused or held in at least {100.0 * LEAST_SAFE:.0f} % of the batches: "
+            f"all but {_named(unsafe) or 'none'}.",
             "",
             *table(COLUMNS, map(_cells, lines)),
             "",
