@@ -106,7 +106,9 @@ def test_a_refused_batch_casts_doubt_on_the_number_before_it_and_on_early_ones(
         expect(watched.page.locator("#payload")).to_have_text("270 kg")
         expect(watched.page.locator("#note")).to_be_hidden()  # of the road: nothing against it
         gateway.publish(make_estimate(2, Why.MODEL_MISFIT))
-        expect(watched.page.locator("#note")).to_contain_text("could not be weighed: model misfit. This number may not")
+        expect(watched.page.locator("#note")).to_contain_text(
+            "could not be weighed: model misfit. This number may be wrong"
+        )
         gateway.board.publish(replace(weighed(4, 270.0, 48.0, calibrated), is_provisional=True))
         expect(watched.page.locator("#note")).to_contain_text("Early value")
         expect(watched.page.locator("#note")).to_contain_text("model misfit")

@@ -49,7 +49,7 @@ def news(gateway: Gateway, watched: Watched) -> None:
 
 def say_what_is_carried(page: Any) -> None:
     page.get_by_label("What it usually carries").select_option("parcels")
-    page.get_by_label("How far along the floor").fill("2.4")
+    page.get_by_label("How long the load is along the floor").fill("2.4")
     page.get_by_label("Part of it may be on the roof").check()
 
 

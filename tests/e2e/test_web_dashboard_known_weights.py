@@ -172,7 +172,7 @@ def test_why_an_estimate_is_uncertain_is_said_largest_source_first(gateway: Gate
         expect(page.locator("#budget-why")).to_have_text(f"Why ± {half} kg?")
         expect(page.locator("#budget")).to_have_attribute("open", "")  # there is room for it
         first = page.locator("#budget-lines li").first
-        expect(first).to_have_text(re.compile(r"usually are\s*±\s43\skg"))
+        expect(first).to_have_text(re.compile(r"vehicle's loads\s*±\s43\skg"))
         remedies = page.locator("#budget-remedies li")
         said = remedies.all_inner_texts()
         assert len({*said}) == len(said) == len({line.remedy for line in budget if helps(line, posterior.std(0))})

@@ -85,14 +85,7 @@ def test_errors_stay_small_and_intervals_true(
 
 @pytest.mark.parametrize(
     ("drives", "n_batches", "most_refused"),
-    [
-        ("known_loads", 10, 1),
-        ("sideways", 10, 1),
-        pytest.param(
-            *("mixed", 24, 6),
-            marks=pytest.mark.xfail(strict=True, reason="with the roll rate lost, mixed: 74 % of front shares held"),
-        ),
-    ],
+    [("known_loads", 10, 1), ("sideways", 10, 1), ("mixed", 24, 6)],
 )
 def test_a_lost_roll_rate_leaves_true_intervals(
     calibration: Path, drives: str, n_batches: int, most_refused: int

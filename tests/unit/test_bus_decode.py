@@ -54,7 +54,7 @@ def test_all_signals_of_a_message_share_its_row(reference):
 
 
 def test_nothing_decodes_to_nothing(reference):
-    assert reference.decode(frames()).columns.shape == (0, 10)
+    assert reference.decode(frames()).columns.shape == (0, 12)
 
 
 @pytest.mark.parametrize(
