@@ -8,6 +8,7 @@ import numpy as np
 from gateway.core.bends import Bends, gyro_gain_of
 from gateway.core.sample_clock import retimed
 from gateway.core.settings import BatchSettings
+from gateway.core.spectrum import longest_run, runs_of
 from gateway.core.timeline import in_order_of_time, onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
 from gateway.records import F64, I64, Batch, Bool, Motion, SensorTraits, Signal, Why
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
@@ -62,7 +63,7 @@ def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: T
         gravity_mps2=gravity,
         gap_share=_gap_share(shares),
         shares=shares,
-        longest_stop_s=_longest_run(speed < settings.standstill_speed_mps) / settings.rate_hz,
+        longest_stop_s=longest_run(speed < settings.standstill_speed_mps) / settings.rate_hz,
         rejected=_reasons((acceleration, pitch_rate), window, n, usable, gravity, shares, settings),
         is_provisional=window.is_provisional,
         roll_rate_radps=roll_radps,
@@ -161,8 +162,8 @@ def _saturated_spans(t_ns: I64, x: F64, trait: SensorTraits) -> I64:
 
 def _spans_of(t_ns: I64, chosen: Bool) -> I64:
     """(k, 2) first and last time of every run of chosen samples."""
-    edges = np.flatnonzero(np.diff(np.r_[False, chosen, False].astype(np.int8)))
-    return np.column_stack([t_ns[edges[::2]], t_ns[edges[1::2] - 1]])
+    first, end = runs_of(chosen).T
+    return np.column_stack([t_ns[first], t_ns[end - 1]])
 
 
 def _spans_onto_grid(spans_ns: I64, window: Window, n: int, rate_hz: float) -> Bool:
@@ -237,11 +238,6 @@ def _gap_share(shares: Mapping[Why, float]) -> float:
 
 def _mean(x: F64, usable: Bool) -> float:
     return float(np.mean(x[usable])) if usable.any() else float("nan")
-
-
-def _longest_run(mask: Bool) -> int:
-    edges = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(np.int8)))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
 
 
 def _reasons(

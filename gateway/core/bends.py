@@ -1,10 +1,10 @@
-"""The gyro's gain, told by bends: what turns a vehicle also pushes it aside.
+"""The gyro's gain, measured in bends: what turns a vehicle also accelerates it sideways.
 
     gyro_gain_of(Bends(lateral_acceleration_mps2, yaw_rate_radps, ...), usable, rate_hz) -> (gain, std) | None
 
 In a bend the accelerometer reads speed times yaw rate, and beside it g times the roll angle, which is the integral of
-the roll rate. So bends hold the gyro against the accelerometer, as gravity holds the accelerometer against the earth.
-All three rates come from one device: where its gain changes, the pitch rate's does.
+the roll rate. So bends compare the gyro with the accelerometer, as gravity checks the accelerometer itself.
+All three rates come from one device: if its gain changes, that of the pitch rate changes too.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway.core.spectrum import runs_of
 from gateway.records import F64, Bool
 from gateway.units import STANDARD_GRAVITY_MPS2
 
@@ -87,8 +88,7 @@ def joined_gains(gains: Sequence[tuple[float, float] | None]) -> tuple[float, fl
 
 def _pieces(known: Bool, rate_hz: float) -> Iterator[slice]:
     """Stretches without gaps, the long ones cut into equal pieces."""
-    edges = np.flatnonzero(np.diff(np.r_[False, known, False].astype(np.int8)))
-    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for begin, end in runs_of(known).tolist():
         if end - begin >= LEAST_PIECE_S * rate_hz:
             cuts = np.linspace(begin, end, int(np.ceil((end - begin) / (MOST_PIECE_S * rate_hz))) + 1).astype(int)
             yield from (slice(a, b) for a, b in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True))

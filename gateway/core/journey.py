@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.settings import BatchSettings
+from gateway.core.spectrum import runs_of
 from gateway.core.timeline import sort_by_time
 from gateway.estimate import NOWHERE, UNWATCHED, Place, Stop, Watched, Way
 from gateway.records import F64, I64, JOURNEY, Batch, Bool, Motion, SensorTraits, Signal
@@ -75,11 +76,9 @@ def _happened(rows: Motion, signal: Signal, begin_ns: int, end_ns: int, is_so: C
 
 def _stands(still: Bool, rate_hz: float, start_ns: int) -> list[tuple[int, int]]:
     """From and to of every standstill that is long enough, or that touches an end of the batch."""
-    edges = np.flatnonzero(np.diff(np.r_[False, still, False].astype(np.int8)))
-    spans = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [
         (start_ns + round(begin / rate_hz * NS_PER_S), start_ns + round(end / rate_hz * NS_PER_S))
-        for begin, end in spans
+        for begin, end in runs_of(still).tolist()
         if end - begin >= LEAST_STOP_S * rate_hz or begin == 0 or end == len(still)
     ]
 

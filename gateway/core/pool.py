@@ -21,6 +21,7 @@ from gateway.core.change import Rules
 from gateway.core.journey import LEAST_STOP_S
 from gateway.core.loads import Halt, Link, Weighing, halts_of, loads_of
 from gateway.core.settings import BatchSettings
+from gateway.core.spectrum import longest_run
 from gateway.estimate import Estimate, Way
 from gateway.posterior import Posterior
 from gateway.records import F64, Batch, Bool, Why
@@ -68,8 +69,7 @@ def can_be_pooled(window: Batch, settings: BatchSettings) -> bool:
 
 def has_stretch(window: Batch) -> bool:
     """Whether any spectrum fits into what is usable of it."""
-    edges = np.flatnonzero(np.diff(np.r_[False, window.usable, False].astype(np.int8)))
-    return bool(np.max(edges[1::2] - edges[::2], initial=0) >= LEAST_RUN_S * window.rate_hz)
+    return longest_run(window.usable) >= LEAST_RUN_S * window.rate_hz
 
 
 def continued(parts: Parts, window: Batch) -> Parts:

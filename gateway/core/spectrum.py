@@ -14,13 +14,22 @@ DISPLAY_SEGMENT_N = 256
 DISPLAY_BAND_HZ = (0.5, 15.0)
 
 
+def runs_of(mask: Bool) -> I64:
+    """(k, 2) begin and end of every unbroken run of True in ``mask`` (n,); the end is the first sample after it."""
+    return np.flatnonzero(np.diff(np.r_[False, mask, False].astype(np.int8))).reshape(-1, 2)
+
+
+def longest_run(mask: Bool) -> int:
+    """How many samples the longest unbroken run of True has; 0 if there is none."""
+    return int(np.max(np.diff(runs_of(mask)), initial=0))
+
+
 def segment_starts(usable: Bool, n_segment: int, n_step: int) -> I64:
     """First samples (k,) of the segments of ``n_segment`` samples that lie wholly in ``usable`` (n,).
 
     Within each unbroken run segments follow one another every ``n_step`` samples.
     """
-    edges = np.flatnonzero(np.diff(np.r_[False, usable, False].astype(np.int8)))
-    runs = [np.arange(a, b - n_segment + 1, n_step) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    runs = [np.arange(begin, end - n_segment + 1, n_step) for begin, end in runs_of(usable).tolist()]
     return np.concatenate([*runs, np.empty(0, np.int64)]).astype(np.int64)
 
 
