@@ -1,4 +1,4 @@
-"""What of a vehicle and its gyro is no longer as calibrated: what batches found of it, week by week.
+"""How a vehicle and its gyro have changed since calibration: what batches found, week by week.
 
 Each batch finds its dampers and the scale of its delay beside the load (core.cross_spectrum.drift), and bends tell the
 gyro's gain (core.bends). A trend is a robust slope over months. A level is where the newest batches stand, which shows
@@ -8,10 +8,11 @@ shows.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from statistics import NormalDist
+from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
@@ -26,36 +27,57 @@ FILE_NAME: Final = "trend.json"
 MOST_WEEKS: Final = 520  # of all calibrations together, the newest
 LEAST_POINTS: Final = {"week": 8, "zero": 5}
 CONFIDENCE: Final = 0.99  # of a change's interval
-DAMPER_CHANGE_PCT: Final = 5.0  # chosen: the search's own belief lets a damper go 3 % (core.cross_spectrum.drift)
-DELAY_CHANGE_PCT: Final = 1.0  # likewise; it believes in 0.3 %
-GYRO_GAIN_CHANGE_PCT: Final = 2.0  # likewise; temperature alone moves it by 0.4 %
-DAMPER_LEVEL_PCT: Final = 20.0  # chosen: friction on rough roads hides as much of them in single batches
 LEAST_BATCHES: Final = 24  # of a level: two hours, which one load or road seldom fills; chosen
 ALIKE_BATCHES: Final = 6  # of one load and road err alike; chosen
 ZERO_CHANGE_SHARE: Final = 0.01  # of the empty mass; likewise
 
-_RATIOS: Final = {  # of the calibrated: 1
-    "damper_front_freed_ratio": "damper_front",
-    "damper_rear_freed_ratio": "damper_rear",
-    "gyro_gain_ratio": "gyro_gain",
-}
-_SHARES: Final = {"delay_scale": "delay"}  # by which it is off: 0
-_LEAST_CHANGE_PCT: Final = {
-    "damper_front": DAMPER_CHANGE_PCT,
-    "damper_rear": DAMPER_CHANGE_PCT,
-    "delay": DELAY_CHANGE_PCT,
-    "gyro_gain": GYRO_GAIN_CHANGE_PCT,
-}
-_LEAST_LEVEL_PCT: Final = {
-    "damper_front": DAMPER_LEVEL_PCT,
-    "damper_rear": DAMPER_LEVEL_PCT,
-    "gyro_gain": GYRO_GAIN_CHANGE_PCT,
-}
-_OFF: Final = {  # below and above the calibration
-    "damper_front": ("the front dampers are {:.0f} % weaker", "the front dampers are {:.0f} % stiffer"),
-    "damper_rear": ("the rear dampers are {:.0f} % weaker", "the rear dampers are {:.0f} % stiffer"),
-    "gyro_gain": ("the gyro's gain is {:.1f} % smaller", "the gyro's gain is {:.1f} % larger"),
-}
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """A parameter whose trend is kept, and the diagnostic that reports it: a ratio to the calibrated, or a deviation.
+
+    A trend below ``least_change_pct`` or a level below ``least_level_pct`` is no finding; without the latter no level
+    is reported. ``lower`` and ``higher`` put a level into words. All limits are chosen.
+    """
+
+    diagnostic: str
+    least_change_pct: float
+    is_ratio: bool = True
+    least_level_pct: float | None = None
+    lower: str = ""
+    higher: str = ""
+
+    def off_pct(self, found: float) -> float | None:
+        """How far a batch's diagnostic is off the calibration, in percent; None if it says nothing."""
+        if not self.is_ratio:
+            return 100.0 * found
+        return 100.0 * math.log(found) if found > 0.0 else None
+
+
+def _dampers(which: str) -> Watched:
+    return Watched(
+        f"damper_{which}_freed_ratio",
+        least_change_pct=5.0,  # the search's own belief lets a damper go 3 % (core.cross_spectrum.drift)
+        least_level_pct=20.0,  # friction on rough roads hides as much of them in single batches
+        lower=f"the {which} dampers are {{:.0f}} % weaker",
+        higher=f"the {which} dampers are {{:.0f}} % stiffer",
+    )
+
+
+WATCHED: Final[Mapping[str, Watched]] = MappingProxyType(
+    {
+        "damper_front": _dampers("front"),
+        "damper_rear": _dampers("rear"),
+        "delay": Watched("delay_scale", least_change_pct=1.0, is_ratio=False),  # the search believes in 0.3 %
+        "gyro_gain": Watched(
+            "gyro_gain_ratio",
+            least_change_pct=2.0,  # temperature alone moves it by 0.4 %
+            least_level_pct=2.0,
+            lower="the gyro's gain is {:.1f} % smaller",
+            higher="the gyro's gain is {:.1f} % larger",
+        ),
+    }
+)
 
 
 class Sums(Part):
@@ -137,7 +159,8 @@ class Trend:
         """The warning of one that is off or drifts."""
         if self.is_off and self.level is not None and self.level99 is not None:
             low, high = sorted(abs(end) for end in self.level99)
-            said = _OFF[self.name][self.level > 0.0].format(abs(self.level))
+            watched = WATCHED[self.name]
+            said = (watched.higher if self.level > 0.0 else watched.lower).format(abs(self.level))
             return f"{said} than at calibration ({low:.1f} to {high:.1f} %, 99 %): look at them, and calibrate again"
         if not self.is_drifting or self.change is None or self.interval99 is None:
             return None
@@ -155,14 +178,16 @@ def found_pct(estimate: Estimate) -> dict[str, float] | None:
     counts too, of the gyro alone where the sensor changed.
     """
     if estimate.rejected == (Why.SENSOR_CHANGED,):
-        heard = {"gyro_gain_ratio"}
+        believed = {"gyro_gain"}
     elif estimate.counted or estimate.rejected == (Why.MODEL_MISFIT,):
-        heard = {*_RATIOS, *_SHARES}
+        believed = set(WATCHED)
     else:
         return None
-    told = {key: number for key, number in estimate.diagnostics.items() if key in heard and math.isfinite(number)}
-    found = {name: 100.0 * math.log(told[key]) for key, name in _RATIOS.items() if told.get(key, 0.0) > 0.0}
-    found |= {name: 100.0 * told[key] for key, name in _SHARES.items() if key in told}
+    found = {}
+    for name, watched in WATCHED.items():
+        number = estimate.diagnostics.get(watched.diagnostic, math.nan)
+        if name in believed and math.isfinite(number) and (off_pct := watched.off_pct(number)) is not None:
+            found[name] = off_pct
     return found or None
 
 
@@ -178,10 +203,10 @@ def trends_of(
     """Of the calibration in use; ``zeros`` say when the vehicle was empty and what the calibration alone read (kg)."""
     own = [week for week in weeks if week.calibration_id == calibration_id]
     found = []
-    for name, least_change in _LEAST_CHANGE_PCT.items():
+    for name, watched in WATCHED.items():
         sums = [(week.monday, week.found[name]) for week in own if name in week.found]
         points = tuple(Point(monday, one.sum_pct / one.n, one.n) for monday, one in sums)
-        trend = trend_of(name, "%", points, LEAST_POINTS["week"], least_change)
+        trend = trend_of(name, "%", points, LEAST_POINTS["week"], watched.least_change_pct)
         found.append(_with_level(trend, [one for _, one in sums]))
     empty = tuple(Point(at, payload_kg, 1) for at, payload_kg in zeros)
     return (*found, trend_of("zero", "kg", empty, LEAST_POINTS["zero"], ZERO_CHANGE_SHARE * empty_mass_kg))
@@ -194,7 +219,7 @@ def _with_level(trend: Trend, weeks: Sequence[Sums]) -> Trend:
         newest = week if newest is None else newest.plus(week)
         if newest.n >= LEAST_BATCHES:
             break
-    least_pct = _LEAST_LEVEL_PCT.get(trend.name)
+    least_pct = WATCHED[trend.name].least_level_pct
     if newest is None or newest.n < LEAST_BATCHES or least_pct is None:
         return trend
     mean = newest.sum_pct / newest.n
