@@ -18,6 +18,17 @@ def rejected_cell(line: Mapping[str, Any]) -> str:
     return f"{line['n_rejected']}: {reasons}" if reasons else str(line["n_rejected"])
 
 
+def refused_cell(n: int, by_reason: Mapping[str, int]) -> str:
+    """How many, and why in brackets."""
+    reasons = ", ".join(f"{reason} {count}" for reason, count in by_reason.items())
+    return f"{n} ({reasons})" if reasons else str(n)
+
+
+def all_but(exceptions: Sequence[str]) -> str:
+    """Which lines of a table a verdict is true of."""
+    return f"all but {', '.join(exceptions)}." if exceptions else "every line."
+
+
 def number_cell(x: float | None) -> str:
     """Two decimals."""
     return "none" if x is None else f"{x:.2f}"

@@ -38,7 +38,7 @@ def coverage_page(found: Mapping[str, Any]) -> str:
 
 def _protocol(found: Mapping[str, Any]) -> str:
     return (
-        f"{len(found['vans'])} vans, drawn about the simulator's three types with scattered masses, wheelbases, "
+        f"{len(found['vans'])} vans, random variations of the simulator's three types in masses, wheelbases, "
         "springs, dampers, friction, tyres and places. Each is calibrated on six known loads of ten minutes near "
         "50 km/h, the loads fixed to the floor, then driven with loads it has not seen: as calibrated; at another "
         "steady speed between 30 and 110 km/h; mixed: town, country and motorway in one drive, on roads whose "

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from benchmarks.accuracy.cells import number_cell, score_cell, table
+from benchmarks.accuracy.cells import all_but, number_cell, refused_cell, score_cell, table
 from benchmarks.accuracy.coverage_table import ALL_KINDS
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED
 from gateway.records import Why
@@ -63,11 +63,10 @@ def is_mended(line: Mapping[str, Any], undisturbed: Mapping[str, Any]) -> bool:
 
 
 def _cells(line: Mapping[str, Any]) -> list[str]:
-    why = ", ".join(f"{reason} {n}" for reason, n in line["rejected_by_reason"].items())
     return [
         line["kind"],
         str(line["n_batches"]),
-        f"{line['n_rejected']}" + (f" ({why})" if why else ""),
+        refused_cell(line["n_rejected"], line["rejected_by_reason"]),
         *(
             "–" if line[name] is None else f"{line[name]:.1f}"
             for name in ("payload_mean_abs_pct", "front_share_mean_abs_pct")
@@ -91,10 +90,6 @@ def _verdicts(lines: list[Mapping[str, Any]]) -> list[str]:
     ]
     unmended = [one["kind"] for one in lines if DISTURBANCES[one["kind"]].is_mended and not is_mended(one, undisturbed)]
     return [
-        f"- Held or refused in at least {100 * WELL:.0f} % of the batches: {_told(misled)}",
-        f"- Time stamps, losses and lags within {MENDED_WITHIN:g} times the undisturbed errors: {_told(unmended)}",
+        f"- Held or refused in at least {100 * WELL:.0f} % of the batches: {all_but(misled)}",
+        f"- Time stamps, losses and lags within {MENDED_WITHIN:g} times the undisturbed errors: {all_but(unmended)}",
     ]
-
-
-def _told(exceptions: list[str]) -> str:
-    return "every line." if not exceptions else f"all but {', '.join(exceptions)}."

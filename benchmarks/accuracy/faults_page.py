@@ -1,9 +1,9 @@
 """The page of the sensor faults: what `python -m benchmarks.accuracy faults` found, from its numbers alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
-from benchmarks.accuracy.cells import table
+from benchmarks.accuracy.cells import all_but, refused_cell, table
 
 COLUMNS: Final = (
     "Fault", "Strength", "Batches", "Refused, and why", "Held", "Outside",
@@ -17,7 +17,11 @@ def faults_page(found: Mapping[str, Any]) -> str:
     lines = found["lines"]
     total = {name: sum(line[name] for line in lines) for name in ("n_batches", "n_refused", "n_held")}
     wrong = [line for line in lines if _n_outside(line)]
-    unsafe = [line for line in lines if _n_outside(line) > (1.0 - LEAST_SAFE) * line["n_batches"]]
+    unsafe = [
+        f"{line['fault']} {line['strength']}".strip()
+        for line in lines
+        if _n_outside(line) > (1.0 - LEAST_SAFE) * line["n_batches"]
+    ]
     return "\n".join(
         [
             "# Sensor faults",
@@ -29,7 +33,7 @@ def faults_page(found: Mapping[str, Any]) -> str:
             "known loads are rewritten, each time with one fault from the first frame on, and weighed as `springscale "
             "estimate` weighs them, by a calibration that was made with a sound sensor. A fault is harmless where the "
             "batch is refused, or where the 95 % intervals of both payload and front share hold the truth. An answer "
-            "outside is the worst that can happen: nobody sees it. How far outside is told in half-widths of the "
+            "outside is the worst that can happen: nobody sees it. The distance outside is given in half-widths of the "
             f"interval. The {total['n_batches']} batches took {found['cpu_s'] / 60:.0f} minutes of one core.",
             "",
             f"- Refused: {total['n_refused']} of {total['n_batches']} batches.",
@@ -37,8 +41,7 @@ def faults_page(found: Mapping[str, Any]) -> str:
             f"- Answered outside an interval: {total['n_batches'] - total['n_refused'] - total['n_held']}, under "
             f"{len(wrong)} of {len(lines)} faults and strengths. The first line has no fault: such answers are among "
             "the 5 % that an interval of 95 % leaves out of each quantity.",
-            f"- Refused or held in at least {100.0 * LEAST_SAFE:.0f} % of the batches: "
-            f"all but {_named(unsafe) or 'none'}.",
+            f"- Refused or held in at least {100.0 * LEAST_SAFE:.0f} % of the batches: {all_but(unsafe)}",
             "",
             *table(COLUMNS, map(_cells, lines)),
             "",
@@ -46,22 +49,17 @@ def faults_page(found: Mapping[str, Any]) -> str:
     )
 
 
-def _named(lines: Sequence[Mapping[str, Any]]) -> str:
-    return ", ".join(f"{line['fault']} {line['strength']}".strip() for line in lines)
-
-
 def _n_outside(line: Mapping[str, Any]) -> int:
     return int(line["n_batches"] - line["n_refused"] - line["n_held"])
 
 
 def _cells(line: Mapping[str, Any]) -> list[str]:
-    why = ", ".join(f"{reason} {n}" for reason, n in line["refused_by_reason"].items())
     furthest = (line["payload_furthest"], line["front_share_furthest"])
     return [
         line["fault"],
         line["strength"],
         str(line["n_batches"]),
-        f"{line['n_refused']}" + (f" ({why})" if why else ""),
+        refused_cell(line["n_refused"], line["refused_by_reason"]),
         str(line["n_held"]),
         str(_n_outside(line)),
         *(f"{x:.2f}" if x else "" for x in furthest),
