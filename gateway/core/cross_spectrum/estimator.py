@@ -31,6 +31,7 @@ from gateway.core.cross_spectrum.sensor_change import (
     is_gyro_gain_changed,
     is_gyro_late,
     is_gyro_turned,
+    off_calibration,
 )
 from gateway.estimate import Estimate
 from gateway.posterior import PAYLOAD, Posterior, Source
@@ -310,4 +311,4 @@ def _unseen(speed_mps: float, shaken_mps2: float, calibration: CrossSpectrumCali
 
 
 def _ratio(located: Located, calibration: CrossSpectrumCalibration, name: str) -> float:
-    return math.exp(located.point.theta[INDEX[name]] - calibration.parameters[INDEX[name]])
+    return math.exp(off_calibration(located.point, calibration, name))

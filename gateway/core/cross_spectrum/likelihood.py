@@ -86,8 +86,8 @@ class Curvature:
 class _Whitened:
     """The model solved at a point, and L^-1 S L^-H for its M = L L^H, with what whitens other matrices alike.
 
-    The trace is (b, m). rows (b m p^2, k) are the slopes of the
-    residuals by the ``known`` entries, as far as they have been asked for.
+    The trace is (b, m). rows (b m p^2, k) are the slopes of the residuals by the ``known`` entries, those that have
+    been asked for so far.
     """
 
     point: Point

@@ -71,19 +71,24 @@ class SensorScores:
         return abs(self.position) > calibration.most_position_score or self.noise > calibration.most_noise_score
 
 
+def off_calibration(point: Point, calibration: CrossSpectrumCalibration, name: str) -> float:
+    """By how much a parameter lies above its calibration at ``point``, in its unit or as a logarithm."""
+    return float(point.theta[INDEX[name]] - calibration.parameters[INDEX[name]])
+
+
 def is_gyro_turned(point: Point, calibration: CrossSpectrumCalibration, loudness: F64) -> bool:
     """True where the pitch rate holds noise within the vehicle's frequencies alone: roll must leak into it.
 
     ``point`` is the answer, ``loudness`` (p,) how loud each sensor is above these frequencies. Without a roll rate the
     noise is held where calibration has it, and this is never so.
     """
-    found = (point.theta - calibration.parameters)[INDEX["noise_pitch_rate_rad2ps"]]
-    return bool(found > MOST_GYRO_NOISE) and not np.any(loudness[1:2] > QUIET)
+    found = off_calibration(point, calibration, "noise_pitch_rate_rad2ps")
+    return found > MOST_GYRO_NOISE and not np.any(loudness[1:2] > QUIET)
 
 
 def is_gyro_late(point: Point, calibration: CrossSpectrumCalibration) -> bool:
     """True where the gyro lags, or leads, by more than a change of its filter explains. ``point`` is the answer."""
-    return bool(abs((point.theta - calibration.parameters)[INDEX["gyro_lag_s"]]) > MOST_LAG_CHANGE_S)
+    return abs(off_calibration(point, calibration, "gyro_lag_s")) > MOST_LAG_CHANGE_S
 
 
 def scores_of(
