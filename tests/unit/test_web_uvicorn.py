@@ -84,7 +84,8 @@ def test_a_server_that_sleeps_ends_as_soon_as_it_is_told(monkeypatch: pytest.Mon
     monkeypatch.setattr("gateway.service.web_server.TICK_S", 3600.0)
 
     async def serve() -> None:
-        server = WebServer(uvicorn.Config(lambda: None))  # type: ignore[arg-type,return-value]
+        config = uvicorn.Config(lambda: None)  # type: ignore[arg-type,return-value]  # no app: nobody asks
+        server = WebServer(config)
         looping = asyncio.create_task(server.main_loop())
         await asyncio.sleep(0)
         assert not looping.done()
